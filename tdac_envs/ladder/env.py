@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.drive.disturbances import Disturbances
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.epuck.env import EPuckEnv
@@ -244,8 +243,7 @@ def _shared(
 ) -> dict[str, Any]:
     """What the setups of both robots have; the nominal task is that of world 0."""
     file = task_set.file
-    own, robot = file.disturbances, file.robot
-    hidden = robot.wheel_radius_error if isinstance(robot, EPuckParams) else 0.0
+    own = file.disturbances
     return {
         "nominal": source.task(0),
         "variation": "nominal",
@@ -253,15 +251,7 @@ def _shared(
         "on_collision": "terminate",
         "motor_lag": own.motor_lag,
         "delay": own.delay,
-        "disturbances": Disturbances(
-            wheel_slip=file.slip,
-            wheel_gains=own.wheel_gains,
-            axle_error=own.axle_error,
-            odometry="odometry" in file.observed,
-            odometry_scale=own.odometry_scale,
-            odometry_noise=own.odometry_noise,
-            wheel_radius_error=hidden,
-        ),
+        "disturbances": file.errors,
         "weights": weights_of(weights),
         "source": source,
     }

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import replace
 from typing import Annotated, Literal, Self
 
 import numpy as np
@@ -9,7 +12,6 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.generators.draft import ordered
-from tdac_envs.ladder.space_time import earliest_arrival
 from tdac_envs.map2d.placing import Cast
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.spec import (
@@ -63,28 +65,39 @@ class MoversOfSet(BaseModel):
         ]
 
 
-def draw_movers(groups: tuple[MoversOfSet, ...], task: Map2DTask, key: bytes) -> Movers:
+def draw_movers(
+    groups: tuple[MoversOfSet, ...],
+    task: Map2DTask,
+    key: bytes,
+    arrives: Callable[[Map2DTask], bool],
+) -> Movers:
     """The movers of a world, among which a robot that knows all can reach the goal.
 
-    Where bouncing movers block every way, they are drawn again; after `TRIES` draws,
-    half of them are left out.
+    Where they block every way, they start elsewhere; after `TRIES` draws, half of them
+    are left out.
 
     Args:
         groups: What the movers are like.
         task: The task of the world; its movers are ignored.
         key: 32 bytes; all that is random follows from them.
+        arrives: Whether such a robot reaches the goal of a task with movers.
     """
     seed = int.from_bytes(key[:16], "little")
     random = np.random.Generator(np.random.Philox(key=seed))
-    part = 1.0
+    specs = [spec for group in groups for spec in group.draw(random)]
     while True:
-        for _ in range(TRIES):
-            specs = [spec for group in groups for spec in group.draw(random)]
-            specs = specs[: int(part * len(specs))]
-            try:
-                movers = Cast.of(specs, task).start(task, random)
-            except TaskError:
-                continue  # There is no room for all of them.
-            if not specs or earliest_arrival(task, movers) is not None:
+        for movers in _starts(specs, task, random):
+            if not specs or arrives(replace(task, movers=movers)):
                 return movers
-        part *= 0.5
+        specs = specs[: len(specs) // 2]
+
+
+def _starts(
+    specs: list[AnySpec], task: Map2DTask, random: np.random.Generator
+) -> Iterator[Movers]:
+    """Draws where movers start, up to `TRIES` times, where there is room for them."""
+    with suppress(TaskError):
+        cast = Cast.of(specs, task)
+        for _ in range(TRIES):
+            with suppress(TaskError):
+                yield cast.start(task, random)

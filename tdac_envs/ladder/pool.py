@@ -1,14 +1,17 @@
 """Tasks of the training worlds, which are made once and kept in files.
 
-A task takes about 13 bytes per pixel. Its file is mapped, not read: the memory belongs
-to the system's cache of files, and a robot loads only the parts of a map where it
-drives. So thousands of tasks stay at hand, and drawing one takes microseconds.
+A task takes about 13 bytes per pixel, and up to 8 more with a crowd. Its file is
+mapped, not read: the memory belongs to the system's cache of files, and a robot loads
+only the parts of a map where it drives. So thousands of tasks stay at hand, and drawing
+one takes microseconds.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
+import math
 import mmap
 import os
 import tempfile
@@ -16,7 +19,7 @@ import zlib
 from collections import OrderedDict
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,16 +31,17 @@ from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import Terrain
 from tdac_envs.mapping.params import RobotParams
-
-Bytes = NDArray[np.uint8]
-Scalar = TypeVar("Scalar", bound=np.generic)
+from tdac_envs.movers.places import Places
+from tdac_envs.movers.state import Movers
 
 _MAPPED = 16_384
 """Mapped tasks that a process keeps; Linux allows 65,530 mappings."""
 _IN_MEMORY = 256
 """Tasks without a file that a process keeps in memory."""
-_HEAD = 8
-"""Numbers before the arrays: height, width, start, goal, horizon."""
+_ALIGNED = 8
+"""Arrays begin at multiples of so many bytes."""
+_MOVERS = "traits", "now", "points", "people", *Places._fields
+"""Arrays of movers that are kept; the others are blank at a start."""
 
 
 class TrainingPool:
@@ -73,15 +77,13 @@ class TrainingPool:
         path = None if self._folder is None else self._folder / f"{index}.bin"
         task = None if path is None else _mapped_task(path, self._set)
         if task is None:
-            made = self._set.task_of(self._set.world("train", index))
+            made = self._set.task("train", index)
             assert isinstance(made, Map2DTask)
             if path is not None:
                 _write(path, made)
                 task = _mapped_task(path, self._set)
             if task is None:
-                made = self._set.with_movers(made, "train", index)
                 return _keep(self._made, index, made, _IN_MEMORY)
-        task = self._set.with_movers(task, "train", index)
         return _keep(self._mapped, index, task, _MAPPED)
 
 
@@ -114,17 +116,20 @@ def _sources() -> str:
 
 def _write(path: Path, task: Map2DTask) -> None:
     """Writes a task completely or not at all."""
-    terrain = task.terrain
-    height, width = terrain.grid.cells.shape
-    head = [height, width, *task.start, *task.goal, task.horizon]
-    arrays = (
-        np.array(head, np.float64),
-        task.field,
-        terrain.padded_clear,
-        terrain.leaps,
-        terrain.grid.cells,
-    )
-    body = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
+    terrain, movers = task.terrain, task.movers
+    arrays: dict[str, NDArray[Any]] = {
+        "ends": np.array([*task.start, *task.goal, task.horizon], np.float64),
+        "field": task.field,
+        "clear": terrain.padded_clear,
+        "leaps": terrain.leaps,
+        "cells": terrain.grid.cells,
+    }
+    if movers is not None:
+        arrays |= {name: getattr(movers, name) for name in _MOVERS}
+    head = json.dumps({name: (a.dtype.str, a.shape) for name, a in arrays.items()})
+    parts = [len(head).to_bytes(8, "little"), head.encode("ascii")]
+    parts += [np.ascontiguousarray(array).tobytes() for array in arrays.values()]
+    body = b"".join(part + bytes(-len(part) % _ALIGNED) for part in parts)
     check = zlib.crc32(body).to_bytes(8, "little")
     # Without room on the disk, the task is made anew next time.
     with contextlib.suppress(OSError):
@@ -148,37 +153,44 @@ def _mapped_task(path: Path, task_set: TaskSet) -> Map2DTask | None:
     check, body = data[:8], data[8:]
     if len(body) == 0 or zlib.crc32(body) != int.from_bytes(check, "little"):
         return None
-    return _task(np.frombuffer(body, np.uint8), task_set)
+    return _task(body, task_set)
 
 
-def _task(data: Bytes, task_set: TaskSet) -> Map2DTask:
-    height, width, x, y, heading, *goal, horizon = (
-        data[: 8 * _HEAD].view(np.float64).tolist()
-    )
-    shape = int(height), int(width)
-    padded = shape[0] + 2, shape[1] + 2
-    at = 8 * _HEAD
+def _arrays(body: memoryview) -> dict[str, NDArray[Any]]:
+    """The arrays of a file by their names."""
+    arrays: dict[str, NDArray[Any]] = {}
+    at = 8 + int.from_bytes(body[:8], "little")
+    for name, (dtype, shape) in json.loads(bytes(body[8:at])).items():
+        at += -at % _ALIGNED
+        array = np.frombuffer(body, dtype, math.prod(shape), at).reshape(shape)
+        arrays[name], at = array, at + array.nbytes
+    return arrays
 
-    def part(dtype: type[Scalar], *sides: int) -> NDArray[Scalar]:
-        nonlocal at
-        size = int(np.prod(sides)) * np.dtype(dtype).itemsize
-        piece, at = data[at : at + size], at + size
-        return piece.view(dtype).reshape(sides)
 
-    field = part(np.float32, *shape)
-    clear = part(np.float32, *padded)
-    leaps = part(np.uint8, 4, *padded)
-    grid = OccupancyGrid(part(np.bool_, *shape))
+def _task(body: memoryview, task_set: TaskSet) -> Map2DTask:
+    arrays = _arrays(body)
+    clear, field = arrays["clear"], arrays["field"]
+    x, y, heading, goal_x, goal_y, horizon = arrays["ends"].tolist()
+    grid = OccupancyGrid(arrays["cells"])
     file, robot = task_set.file, task_set.file.robot
     assert isinstance(robot, RobotParams)
     return Map2DTask(
-        terrain=Terrain(grid, clear[1:-1, 1:-1], clear, leaps),
+        terrain=Terrain(grid, clear[1:-1, 1:-1], clear, arrays["leaps"]),
         start=Pose(x, y, heading),
-        goal=(goal[0], goal[1]),
+        goal=(goal_x, goal_y),
         robot=robot,
         goal_tolerance=file.goal_tolerance,
         dt=file.dt,
         horizon=int(horizon),
         field=field,
         shortest=float(field[round(y), round(x)]),
+        movers=_movers(arrays, file.dt) if "traits" in arrays else None,
     )
+
+
+def _movers(arrays: dict[str, NDArray[Any]], dt: float) -> Movers:
+    """The movers of a task at its start."""
+    places = Places(*(arrays[name] for name in Places._fields))
+    crowd = places if len(arrays["people"]) else None
+    movers = Movers.blank(len(arrays["traits"]), arrays["points"], dt, crowd)
+    return movers._replace(**{name: arrays[name] for name in _MOVERS})

@@ -20,7 +20,7 @@ from pydantic import (
 from tdac_envs.core.arguments import MOST_STEPS
 from tdac_envs.core.errors import TaskError, first_problem, hint, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
-from tdac_envs.drive.disturbances import MOST_HIDDEN
+from tdac_envs.drive.disturbances import MOST_HIDDEN, Disturbances
 from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.ladder.files.spec import FilesSpec
 from tdac_envs.ladder.generators.plates import Plates
@@ -217,6 +217,22 @@ class SetFile(_Strict):
         """Relative standard deviation of a wheel's slip in a step of `dt`."""
         return self.disturbances.wheel_slip * math.sqrt(SLIP_STEP / self.dt)
 
+    @property
+    def errors(self) -> Disturbances:
+        """The disturbances of wheels and odometry."""
+        own, robot = self.disturbances, self.robot
+        return Disturbances(
+            wheel_slip=self.slip,
+            wheel_gains=own.wheel_gains,
+            axle_error=own.axle_error,
+            odometry="odometry" in self.observed,
+            odometry_scale=own.odometry_scale,
+            odometry_noise=own.odometry_noise,
+            wheel_radius_error=(
+                robot.wheel_radius_error if isinstance(robot, EPuckParams) else 0.0
+            ),
+        )
+
     def spec(self, index: int) -> WorldSpec | PlatesSpec:
         """What generated world `index` is like; generators take turns."""
         generator, own = self.worlds[index % len(self.worlds)], self.admission
@@ -299,13 +315,13 @@ def _placed(values: dict[Any, Any], path: Path) -> dict[Any, Any]:
 
 BUILT_IN = Path(__file__).parent / "sets"
 """Folder of the sets that come with the package."""
+LEVELS = "known", "unknown", "lost", "moving", "crowd", "epuck"
+"""Names of these sets, the easiest first."""
 
 
 def set_names() -> tuple[str, ...]:
     """Names of the sets that come with the package, the easiest first."""
-    order = {"known": 0, "unknown": 1, "lost": 2, "moving": 3, "epuck": 4}
-    names = [path.stem for path in BUILT_IN.glob("*.yaml")]
-    return tuple(sorted(names, key=lambda name: (order.get(name, len(order)), name)))
+    return LEVELS
 
 
 def find_set_file(name: str | Path) -> SetFile:

@@ -38,13 +38,13 @@ class Arrival(NamedTuple):
     path: Array
 
 
-def earliest_arrival(task: Map2DTask, movers: Movers) -> Arrival | None:
+def earliest_arrival(task: Map2DTask) -> Arrival | None:
     """The earliest arrival that is found within the horizon; None if there is none.
 
     Args:
-        task: The task.
-        movers: The movers at the start, which are only read.
+        task: The task with its movers, which are only read.
     """
+    movers = Movers.none() if task.movers is None else task.movers
     places = np.empty((task.horizon + 1, len(movers.traits), 2))
     terrain, own = task.terrain, movers.fresh()
     # Arrays of a task that was pickled can be written to.

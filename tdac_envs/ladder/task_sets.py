@@ -18,9 +18,11 @@ from tdac_envs.ladder.files.found import FoundWorld
 from tdac_envs.ladder.files.opened import FileWorlds, opened
 from tdac_envs.ladder.files.placed import placed_world
 from tdac_envs.ladder.moving import draw_movers
+from tdac_envs.ladder.orca_driver import drive_by_orca
 from tdac_envs.ladder.plate_worlds import PlatesWorld, make_plates
 from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import SetFile, Split, find_set_file
+from tdac_envs.ladder.space_time import earliest_arrival
 from tdac_envs.ladder.words import world_key
 from tdac_envs.ladder.worlds import LadderWorld, WorldSpec, make_world
 from tdac_envs.map2d.task import Map2DTask
@@ -151,8 +153,16 @@ class TaskSet:
         """The task of a world with its movers, if the set has any."""
         if not self.file.movers or not isinstance(task, Map2DTask):
             return task
-        key = self.key(split, index, "movers", salt)
-        return replace(task, movers=draw_movers(self.file.movers, task, key))
+        own, key = self.file.movers, self.key(split, index, "movers", salt)
+        crowd = any(group.kind == "crowd" for group in own)
+
+        def arrives(among: Map2DTask) -> bool:
+            if not crowd:
+                return earliest_arrival(among) is not None
+            noise = self.noise(split, index, salt)
+            return drive_by_orca(among, self.file.errors, noise) is not None
+
+        return replace(task, movers=draw_movers(own, task, key, arrives))
 
     def task_of(self, world: AnyWorld) -> AnyTask:
         """The task of a world of this set, without its movers."""

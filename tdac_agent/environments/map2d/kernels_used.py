@@ -6,8 +6,10 @@ import numpy as np
 
 import tdac_envs
 from tdac_agent.environments.kernels_used import use_robot
+from tdac_envs.drive.disturbances import Disturbances
 from tdac_envs.ladder.dead_ends import Sensor, dead_ends
 from tdac_envs.ladder.generators.clutter import Clutter, draw
+from tdac_envs.ladder.orca_driver import drive_by_orca
 from tdac_envs.ladder.space_time import earliest_arrival
 from tdac_envs.ladder.words import Words
 from tdac_envs.ladder.worlds import WorldSpec, make_world
@@ -26,7 +28,8 @@ def use_kernels() -> None:
     post = {"kind": "route", "points": [(45.0, 10.0)], "radius": 3.0}
     people = {"kind": "crowd", "count": 2, "radius": 2.0, "speed": 5.0}
     disc = use_robot("TDAC-Map2D-v0", map=grid.cells, movers=[post, people], **ends)
-    earliest_arrival(disc.task, disc.task.movers)
+    earliest_arrival(disc.task)
+    drive_by_orca(disc.task, Disturbances(), np.random.default_rng(0))
     velocity_among(np.zeros((1, 5)), np.zeros(2), 1.0, 1.0, 0.1, np.empty(2))
     rays.sees(disc.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
     _use_ladder()

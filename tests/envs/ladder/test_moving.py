@@ -1,5 +1,6 @@
 """Promises of task sets with movers, and of the planner in space and time."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,6 @@ from tdac_envs.ladder.space_time import earliest_arrival
 from tdac_envs.ladder.task_sets import load_set
 from tdac_envs.ladder.vector import LadderVectorEnv
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.movers.state import Movers
 
 SET = """
 schema: 1
@@ -123,7 +123,7 @@ class TestPlanner:
     def test_nobody_in_the_way(self):
         """Straight on, as fast as the lattice allows."""
         task = self.task(None)
-        found = earliest_arrival(task, Movers.none())
+        found = earliest_arrival(replace(task, movers=None))
         # 5 px in two steps of 4 px each.
         assert found.steps == pytest.approx(2 * 160 / 5, abs=4)
         np.testing.assert_allclose(found.path[0, 1:], (20, 30), atol=5)
@@ -143,8 +143,8 @@ class TestPlanner:
             "phase": 0.0,
         }
         task = self.task([route], map=cells)
-        alone = earliest_arrival(task, Movers.none())
-        found = earliest_arrival(task, task.movers)
+        alone = earliest_arrival(replace(task, movers=None))
+        found = earliest_arrival(task)
         assert found.steps > alone.steps
         assert found.path[:, 2].max() > 38
 
@@ -155,7 +155,7 @@ class TestPlanner:
             env = Map2DEnv(**{**self.OPTIONS, "movers": movers})
             env.reset(seed=seed)
             task = env.task
-            found = earliest_arrival(task, task.movers)
+            found = earliest_arrival(task)
             assert found is not None
             times, x, y = found.path.T
             at = np.arange(found.steps + 1)
@@ -173,4 +173,4 @@ class TestPlanner:
             {**wall, "points": [[100, y]], "radius": 9} for y in (10, 20, 30, 40, 49)
         ]
         task = self.task(walls)
-        assert earliest_arrival(task, task.movers) is None
+        assert earliest_arrival(task) is None
