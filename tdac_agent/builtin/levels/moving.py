@@ -1,11 +1,12 @@
 """Drives to a goal without a map, among discs that move straight on and bounce.
 
-A grid keeps where rays have hit and what they have crossed. A hit in the midst of cells
-that were free is of a disc: such hits are grouped, tracked, and extrapolated with their
-bounces. A field of path lengths to the goal takes unseen space for free. In each step,
-a search in space and time around the robot finds the course of the next seconds that
-ends nearest to the goal and keeps away from where the discs will be; it may also wait
-or withdraw. The robot drives backwards as well as forwards.
+A grid keeps where rays have hit and what they have crossed. Ranges are exact, so the
+circle through hits of a disc gives its centre and radius, and two centres its velocity;
+where it will be follows from that, bounces included. A field of path lengths to the
+goal takes unseen space for free. In each step, a search in space and time around the
+robot finds the course of the next seconds that ends nearest to the goal and keeps away
+from where the discs will be; it may also wait or withdraw. The robot drives backwards
+as well as forwards.
 """
 
 import heapq
@@ -19,10 +20,9 @@ with open("params.json") as file:
 ROBOT = PARAMS["robot"]
 RADIUS, AXLE, RANGE = ROBOT["radius"], ROBOT["axle_length"], ROBOT["range_max"]
 DT = PARAMS["dt"]
-FASTEST = ROBOT["max_wheel_speed"]  # px/s
+STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
 RAYS = ROBOT["n_rays"]
-VIEW = math.radians(ROBOT["field_of_view_deg"])
-FAN = np.linspace(-0.5 * VIEW, 0.5 * VIEW, RAYS)
+FAN = math.radians(ROBOT["field_of_view_deg"]) * np.linspace(-0.5, 0.5, RAYS)
 
 CELL = 2.0  # px
 HALF = 480.0  # px from the start to the border of the grid
@@ -31,27 +31,31 @@ FREE, SOLID = -3, 3  # evidence below which a cell is free, and from which it is
 LEAST, MOST = -8, 8  # evidence never goes beyond
 SAMPLES = np.arange(0.0, RANGE, CELL)  # px along a ray
 KEEP = RADIUS + 2.2  # px from a robot's centre to the nearest wall
-DISC = 7.0  # px, radius of a disc as long as nothing else is known
 NEAR = 4.0  # px from a wall within which a hit may be of the wall
-JOIN = 9.0  # px between two hits of one disc, at most
-GATE = 9.0  # px from where a disc is expected to where it is found, at most
-COAST = 15  # steps for which a disc is remembered that is not seen
+SMALLEST, LARGEST, USUAL = 4.5, 9.5, 7.0  # px, radii of discs
+SAME = 0.05  # px between the centres of two circles that are of one disc
+FASTEST = 3.3  # px that a disc moves in a step, at most
+GATE = 4.0  # px from where a disc is expected to where it is found, at most
+COAST = 30  # steps for which a disc is remembered that is not seen
+TALL = 3  # cells around a bounce whose walls say how it goes
 NODE = 4.0  # px between the nodes of both searches
 LAYER = 2  # steps between two layers of the search in space and time
 LAYERS = 18
-WINDOW = 20  # nodes from the robot to the border of the search
-TOUCH, SHY = 1.5, 6.0  # px from a disc that are forbidden; that are avoided
-REPLAN = 6  # steps between two fields of path lengths
-COLUMNS, ROWS = np.meshgrid(
-    NODE * np.arange(-WINDOW, WINDOW + 1), NODE * np.arange(-WINDOW, WINDOW + 1)
-)
-MOVES = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
 HELD = 2  # layers for which wheel speeds are held
-LEVELS = np.array([-1.0, -0.7, -0.4, -0.15, 0.0, 0.15, 0.4, 0.7, 1.0])
-PAIRS = np.array([(left, right) for left in LEVELS for right in LEVELS])
-ANGLES = np.array([math.atan2(row, column) for row, column in MOVES])
-HURRY = 0.1  # price of a layer, as a part of the length that is left
+WINDOW = 18  # nodes from the robot to the border of the search
+TOUCH, WIDTH = 0.5, 0.5  # px from a disc at which a contact is as likely as not
+SPREAD, FADE = 0.1, 0.95  # by how much less is known of discs with each layer
+LOST = 800.0  # px that a contact costs
+HURRY = 0.3  # price of a layer, as a part of the length that is left
+PAUSE = 0.6  # px that a layer of waiting costs
 TURNING, HABIT = 5.0, 0.3  # px that a rad costs; that a change of a wheel costs
+REPLAN = 6  # steps between two fields of path lengths
+STEPS = NODE * np.arange(-WINDOW, WINDOW + 1)
+COLUMNS, ROWS = np.meshgrid(STEPS, STEPS)
+MOVES = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
+ANGLES = np.array([math.atan2(row, column) for row, column in MOVES])
+SPEEDS = np.array([-1.0, -0.7, -0.4, -0.15, 0.0, 0.15, 0.4, 0.7, 1.0])
+PAIRS = np.array([(left, right) for left in SPEEDS for right in SPEEDS])
 STATE = {}
 
 
@@ -87,179 +91,287 @@ def grown(mask, offsets):
     return out
 
 
-def apart(ranges, cos, sin):
-    """Which rays hit something narrow in front of what is around it."""
-    out = np.zeros(RAYS, bool)
-    jumps = np.flatnonzero(np.abs(np.diff(ranges)) > 8.0) + 1
-    for begin, end in zip(jumps[:-1].tolist(), jumps[1:].tolist(), strict=True):
-        nearer = ranges[begin - 1] > ranges[begin] and ranges[end] > ranges[end - 1]
-        wide = math.hypot(
-            ranges[end - 1] * cos[end - 1] - ranges[begin] * cos[begin],
-            ranges[end - 1] * sin[end - 1] - ranges[begin] * sin[begin],
-        )
-        out[begin:end] = nearer and wide < 2.2 * DISC
-    return out
-
-
 class Map:
     """What is known of walls.
 
     Attributes:
         evidence: Above 0 for walls, below 0 for free space, 0 where nothing was seen.
         blocked: Cells where the centre of the robot cannot be.
+        beside: Cells at a wall.
     """
 
     def __init__(self):
         self.evidence = np.zeros((SIDE, SIDE), np.int8)
         self.blocked = np.zeros((SIDE, SIDE), bool)
+        self.beside = np.zeros((SIDE, SIDE), bool)
 
-    def add(self, x, y, heading, ranges):
-        """Adds a scan; returns the hits of discs: numbers of the rays, and points."""
-        angles = heading + FAN
+    def surprising(self, hits):
+        """Which hits lie where free space was seen, and not at a wall."""
+        rows, columns = cells(*hits.T)
+        return (self.evidence[rows, columns] <= FREE) & ~self.beside[rows, columns]
+
+    def add(self, x, y, angles, ranges, of_discs):
+        """Adds a scan; some of its rays have hit discs."""
         cos, sin = np.cos(angles), np.sin(angles)
-        hit = ranges < RANGE - 1e-3
-        rows, columns = cells(x + (ranges + 0.7) * cos, y + (ranges + 0.7) * sin)
-        (top, bottom), (left, right) = self.window(x, y, RANGE + 12.0)
+        (top, bottom), (left, right) = window(x, y, RANGE + 12.0)
         part = self.evidence[top:bottom, left:right]
-        solid = part >= SOLID
-        beside = grown(solid, BESIDE)
-        known = part[rows - top, columns - left]
-        moving = hit & (known <= FREE) & ~beside[rows - top, columns - left]
-        narrow = hit & apart(ranges, cos, sin) & ~beside[rows - top, columns - left]
         far = SAMPLES[None, :]
         crossed = far < (ranges - 1.5)[:, None]
-        free_rows, free_columns = cells(
+        rows, columns = cells(
             (x + far * cos[:, None])[crossed], (y + far * sin[:, None])[crossed]
         )
         seen = np.zeros(part.shape, np.int8)
-        seen[free_rows - top, free_columns - left] = -1
-        still = hit & ~moving
+        seen[rows - top, columns - left] = -1
+        still = (ranges < RANGE - 1e-3) & ~of_discs
+        rows, columns = cells(x + (ranges + 0.7) * cos, y + (ranges + 0.7) * sin)
         seen[rows[still] - top, columns[still] - left] = 1
-        seen[rows[moving] - top, columns[moving] - left] = 0
         np.clip(part + seen, LEAST, MOST, out=part)
         solid = part >= SOLID
         self.blocked[top:bottom, left:right] = grown(solid, BODY)
-        at = np.column_stack([x + ranges * cos, y + ranges * sin])
-        maybe = moving | narrow
-        return np.flatnonzero(maybe), at[maybe]
+        self.beside[top:bottom, left:right] = grown(solid, BESIDE)
 
-    def window(self, x, y, reach):
-        """First and last rows and columns within a distance of a point."""
-        rows, columns = cells([x - reach, x + reach], [y - reach, y + reach])
-        return (rows[0], rows[1] + 1), (columns[0], columns[1] + 1)
+    def bounced(self, place, rate):
+        """The velocity after a bounce off the walls near a place."""
+        row, column = (int(each) for each in cells(*place))
+        part = self.evidence[
+            row - TALL : row + TALL + 1, column - TALL : column + TALL + 1
+        ]
+        rows, columns = np.nonzero(part > 0)
+        if not len(rows):
+            return -rate
+        at_x = (columns + column - TALL + 0.5) * CELL - HALF
+        at_y = (rows + row - TALL + 0.5) * CELL - HALF
+        off_x, off_y = place[0] - at_x, place[1] - at_y
+        weight = 1.0 / np.maximum(off_x**2 + off_y**2, 1.0)
+        away = np.array([(off_x * weight).sum(), (off_y * weight).sum()])
+        away /= max(math.hypot(*away), 1e-9)
+        into = float(rate @ away)
+        return rate - 2.0 * into * away if into < 0.0 else rate
+
+
+def window(x, y, reach):
+    """First and last rows and columns within a distance of a point."""
+    rows, columns = cells([x - reach, x + reach], [y - reach, y + reach])
+    return (rows[0], rows[1] + 1), (columns[0], columns[1] + 1)
 
 
 class Disc:
-    """A disc that moves: place (px), velocity (px/s), steps since it was seen."""
+    """A disc that moves.
 
-    def __init__(self, place):
-        self.place, self.velocity = place, np.zeros(2)
-        self.age, self.unseen = 0, 0
+    Attributes:
+        place: Its centre, px.
+        rate: Its velocity, px per step; zero if it is not known.
+        radius: px.
+        seen: Steps in which its centre was found.
+        unseen: Steps since it was hit by a ray.
+    """
 
-    def meet(self, place):
-        """Corrects place and velocity by what was seen in this step."""
-        off = place - self.place
-        if self.age == 0:
-            self.velocity = off / DT
-        else:
-            self.velocity = self.velocity + (0.5 if self.age < 4 else 0.25) / DT * off
-        speed = float(np.hypot(*self.velocity))
-        if speed > 1.1 * FASTEST:
-            self.velocity *= 1.1 * FASTEST / speed
-        self.place = self.place + (0.6 if self.age else 1.0) * off
-        self.age, self.unseen = self.age + 1, 0
+    def __init__(self, place, radius):
+        self.place, self.radius = np.array(place), radius
+        self.rate, self.seen, self.unseen = np.zeros(2), 0, 0
+
+    def meet(self, place, radius):
+        """Corrects place and velocity by the circle that was found in this step."""
+        off = np.array(place) - self.place  # from where it was expected
+        self.rate = self.rate + off if self.seen else off
+        fast = math.hypot(*self.rate)
+        if fast > FASTEST:
+            self.rate *= FASTEST / fast
+        self.place, self.radius = np.array(place), radius
+        self.seen, self.unseen = self.seen + 1, 0
+
+    def guess(self, place):
+        """Corrects them by a place that is not exact."""
+        off = np.array(place) - self.place
+        self.rate = self.rate + 0.4 * off
+        self.place, self.unseen = self.place + 0.6 * off, 0
 
 
-def groups(numbers, points):
-    """Groups of hits of one disc each: neighbours in number and in place."""
+def circles(numbers, points, x, y):
+    """Circles through three hits each, as lists of centre, radius and hits."""
     found = []
-    for number, point in zip(numbers.tolist(), points, strict=True):
-        if found:
-            last_number, last = found[-1][-1]
-            if number - last_number <= 2 and np.hypot(*(point - last)) <= JOIN:
-                found[-1].append((number, point))
-                continue
-        found.append([(number, point)])
-    return [np.array([point for _, point in group]) for group in found]
+    for k in range(len(numbers) - 2):
+        if numbers[k + 2] - numbers[k] > 5:
+            continue
+        (ax, ay), (bx, by), (cx, cy) = points[k : k + 3].tolist()
+        ux, uy, vx, vy = bx - ax, by - ay, cx - ax, cy - ay
+        twice = 2.0 * (ux * vy - uy * vx)
+        if abs(twice) < 1e-3:
+            continue
+        u, v = ux * ux + uy * uy, vx * vx + vy * vy
+        px, py = (vy * u - uy * v) / twice, (ux * v - vx * u) / twice
+        radius, px, py = math.hypot(px, py), ax + px, ay + py
+        behind = math.hypot(px - x, py - y) > math.hypot(bx - x, by - y)
+        if not (SMALLEST < radius < LARGEST and behind):
+            continue
+        for other in found:
+            if math.hypot(px - other[0][0], py - other[0][1]) < SAME:
+                other[2].update((k, k + 1, k + 2))
+                break
+        else:
+            found.append(((px, py), radius, {k, k + 1, k + 2}))
+    return found
 
 
-def centre_of(points, x, y):
-    """The centre of a disc of which some points were hit from (x, y)."""
-    away = points.mean(axis=0) - (x, y)
-    away /= np.hypot(*away)
-    centre = points.mean(axis=0) + 0.8 * DISC * away
-    for _ in range(4):
-        off = centre - points
-        far = np.maximum(np.hypot(*off.T), 1e-6)
-        centre = centre - ((1.0 - DISC / far)[:, None] * off).mean(axis=0)
-    ahead = (points - (x, y)) @ away
-    # It lies behind what was hit.
-    if (centre - (x, y)) @ away < ahead.min():
-        centre = points.mean(axis=0) + DISC * away
-    return centre
+def track(discs, chart, numbers, hits, pose):
+    """Finds discs in the hits; returns which hits are of discs.
+
+    Args:
+        discs: The discs; new ones are added.
+        chart: What is known of walls.
+        numbers: Numbers of the rays that have hit something.
+        hits: Where, shape (n, 2), px.
+        pose: Pose of the robot.
+    """
+    taken = np.zeros(len(hits), bool)
+    if len(hits):
+        surprising = chart.surprising(hits)
+        find_circles(discs, numbers, hits, pose, surprising, taken)
+        find_known(discs, hits, pose, taken)
+        left = np.flatnonzero(~taken & surprising).tolist()
+        find_others(discs, groups(left, numbers, hits), hits, pose, taken)
+    return taken
 
 
-def track(discs, found, chart, pose, ranges):
-    """Assigns what was found to discs; returns the discs that are kept."""
-    x, y, heading = pose
+def find_circles(discs, numbers, hits, pose, surprising, taken):
+    """Finds discs by circles.
+
+    Four hits on one circle are of a disc. Three may be of a wall: their circle counts
+    where a disc is expected, or where free space was seen.
+    """
+    x, y, _ = pose
+    met = set()
+    found = circles(numbers, hits, x, y)
+    for place, radius, on_circle in sorted(found, key=lambda each: -len(each[2])):
+        own, k = sorted(on_circle), expected(discs, place, radius, met)
+        sure = len(own) > 3 or surprising[own].all()
+        if taken[own].any() or (k is None and not sure):
+            continue
+        if k is None:
+            k = len(discs)
+            discs.append(Disc(place, radius))
+        discs[k].meet(place, radius)
+        taken[own] = True
+        met.add(k)
+
+
+def find_known(discs, hits, pose, taken):
+    """Finds discs whose radius is known by one or two hits."""
+    x, y, _ = pose
     for disc in discs:
-        disc.place, disc.velocity = moved(disc.place, disc.velocity, DT, chart)
-    pairs = sorted(
-        (float(np.hypot(*(place - disc.place))), k, m)
-        for k, place in enumerate(found)
-        for m, disc in enumerate(discs)
-    )
-    taken, met = set(), set()
-    for far, k, m in pairs:
-        if far <= GATE + (6.0 if discs[m].age < 2 else 0.0) and not (
-            k in taken or m in met
-        ):
-            discs[m].meet(found[k])
-            taken.add(k)
-            met.add(m)
+        if not disc.seen or not disc.unseen:
+            continue
+        off = np.abs(np.hypot(*(hits - disc.place).T) - disc.radius)
+        own = np.flatnonzero(~taken & (off < 1.5))
+        if len(own) == 2 and own[1] == own[0] + 1:
+            place = behind(*hits[own], disc.radius, x, y)
+            if place is not None and math.dist(place, disc.place) < 3.0:
+                disc.meet(place, disc.radius)
+                taken[own] = True
+        elif len(own) and off[own].min() < 0.5:
+            disc.unseen = 0
+            taken[own] = True
+
+
+def find_others(discs, groups_of_hits, hits, pose, taken):
+    """Finds discs by hits where free space was seen, about where they are."""
+    x, y, _ = pose
+    for own in groups_of_hits:
+        taken[own] = True
+        middle = hits[own].mean(axis=0)
+        away = (middle - (x, y)) / max(math.dist(middle, (x, y)), 1e-6)
+        place = middle + 0.8 * USUAL * away
+        near = [disc for disc in discs if math.dist(disc.place, place) < GATE + FASTEST]
+        if not near:
+            discs.append(Disc(place, USUAL))
+        elif not any(disc.seen for disc in near):
+            near[0].guess(place)
+
+
+def expected(discs, place, radius, met):
+    """The disc that is expected nearest to a circle, not yet met; None if none is."""
+    best, least = None, math.inf
+    for k, disc in enumerate(discs):
+        if k in met or (disc.seen and abs(disc.radius - radius) > 0.1):
+            continue
+        off = math.dist(place, disc.place)
+        if off < min(least, GATE if disc.seen > 1 else GATE + FASTEST):
+            best, least = k, off
+    return best
+
+
+def behind(one, two, radius, x, y):
+    """The centre of a disc with two points on its border, behind them; or None."""
+    half = 0.5 * math.dist(one, two)
+    if not 0.0 < half < radius:
+        return None
+    along = (two - one) / (2.0 * half)
+    across = np.array([-along[1], along[0]])
+    middle = 0.5 * (one + two)
+    if across @ (middle - (x, y)) < 0.0:
+        across = -across
+    return middle + math.sqrt(radius**2 - half**2) * across
+
+
+def groups(left, numbers, hits):
+    """Hits that are neighbours in number and in place."""
+    found = []
+    for k in left:
+        last = found[-1][-1] if found else k
+        near = numbers[k] - numbers[last] <= 2
+        if last < k and near and math.dist(hits[k], hits[last]) < USUAL:
+            found[-1].append(k)
+        else:
+            found.append([k])
+    return found
+
+
+def forget(discs, pose, ranges):
+    """The discs that are still there, as far as the robot can see."""
+    x, y, heading = pose
     kept = []
-    for m, disc in enumerate(discs):
-        if m not in met:
-            disc.unseen += 1
-            off = disc.place - (x, y)
-            far, bearing = float(np.hypot(*off)), math.atan2(off[1], off[0]) - heading
-            bearing = math.remainder(bearing, 2.0 * math.pi)
-            ray = int(np.argmin(np.abs(FAN - bearing)))
-            in_sight = far < RANGE and ranges[ray] > far + 2.0
-            if disc.unseen > (3 if in_sight else COAST):
-                continue
-        kept.append(disc)
-    return kept + [Disc(place) for k, place in enumerate(found) if k not in taken]
+    for disc in discs:
+        off, far = disc.place - (x, y), math.dist(disc.place, (x, y))
+        bearing = math.remainder(math.atan2(off[1], off[0]) - heading, 2.0 * math.pi)
+        ray = int(np.argmin(np.abs(FAN - bearing)))
+        seen_past = far < RANGE and ranges[ray] > far + 1.0
+        if disc.unseen <= (1 if seen_past else COAST if disc.seen else 4):
+            kept.append(disc)
+    return kept
 
 
-def is_wall(chart, x, y):
-    """Whether a disc at a point would touch a wall."""
-    column, row = int((x + HALF) / CELL), int((y + HALF) / CELL)
-    if not (4 < column < SIDE - 5 and 4 < row < SIDE - 5):
-        return True
-    return bool((chart.evidence[row - 2 : row + 3, column - 2 : column + 3] > 0).any())
+def advance(discs, chart):
+    """Moves the discs to where they are expected a step later."""
+    places, rates = advanced(*motion(discs)[:2], chart)
+    for disc, place, rate in zip(discs, places, rates, strict=True):
+        disc.place, disc.rate, disc.unseen = place, rate, disc.unseen + 1
 
 
-def moved(place, velocity, seconds, chart):
-    """Place and velocity of a disc after a time; it bounces off walls."""
-    x, y = place
-    vx, vy = velocity
-    if is_wall(chart, x + vx * seconds, y + vy * seconds) and not is_wall(chart, x, y):
-        if is_wall(chart, x + vx * seconds, y):
-            vx = -vx
-        if is_wall(chart, x, y + vy * seconds):
-            vy = -vy
-    return np.array([x + vx * seconds, y + vy * seconds]), np.array([vx, vy])
+def advanced(places, rates, chart):
+    """Places and velocities after a step, shape (n, 2); walls are bounced off."""
+    there = places + rates
+    now, then = chart.beside[cells(*places.T)], chart.beside[cells(*there.T)]
+    for k in np.flatnonzero(then & ~now).tolist():
+        rates = rates.copy()
+        rates[k] = chart.bounced(there[k], rates[k])
+        there[k] = places[k] + rates[k]
+    return there, rates
+
+
+def motion(discs):
+    """Places, velocities (px per step) and radii of some discs."""
+    places = np.array([disc.place for disc in discs]).reshape(-1, 2)
+    rates = np.array([disc.rate for disc in discs]).reshape(-1, 2)
+    return places, rates, np.array([disc.radius for disc in discs])
 
 
 def futures(discs, chart):
-    """Places of the discs in each layer, shape (LAYERS + 1, n, 2), px."""
-    places = np.empty((LAYERS + 1, len(discs), 2))
-    for m, disc in enumerate(discs):
-        place, velocity = disc.place, disc.velocity
-        for layer in range(LAYERS + 1):
-            places[layer, m] = place
-            place, velocity = moved(place, velocity, LAYER * DT, chart)
+    """Places in each step, shape (LAYERS * LAYER + 1, n, 2), px."""
+    at, rates, _ = motion(discs)
+    places = np.empty((LAYERS * LAYER + 1, *at.shape))
+    for step in range(len(places)):
+        places[step] = at
+        at, rates = advanced(at, rates, chart)
     return places
 
 
@@ -329,56 +441,50 @@ class Field:
         return between(self.lengths, (x + HALF) / NODE, (y + HALF) / NODE)
 
 
-def shifted(values, row, column, fill):
-    """Values of the neighbours at an offset."""
-    out = np.full_like(values, fill)
-    height, width = values.shape
-    out[
-        max(-row, 0) : height - max(row, 0), max(-column, 0) : width - max(column, 0)
-    ] = values[
-        max(row, 0) : height + min(row, 0), max(column, 0) : width + min(column, 0)
-    ]
-    return out
+def danger(gaps, layers):
+    """Probability of a contact in a layer, by the gap that is expected then, px."""
+    # What is far ahead is not known well.
+    width = WIDTH + SPREAD * layers
+    return FADE**layers / (1.0 + np.exp(np.clip((gaps - TOUCH) / width, -30.0, 30.0)))
 
 
-def risks(places, discs, x, y):
-    """Price of each node in each layer, for being near to discs."""
-    price = np.zeros((LAYERS + 1, *COLUMNS.shape))
-    for m, disc in enumerate(discs):
-        # Nothing is known of the motion of a disc that was seen only once.
-        off = 0.0 if disc.age else 4.0
-        for layer in range(LAYERS + 1):
-            at_x, at_y = places[layer, m] - (x, y)
-            reach = RADIUS + DISC + 1.5
-            if abs(at_x) > 120.0 or abs(at_y) > 120.0:
-                continue
-            far = np.hypot(COLUMNS - at_x, ROWS - at_y) - reach
-            # What is far ahead is not known well.
-            fade = 0.93**layer
-            spread = 0.25 * layer + off
-            price[layer] += fade * np.where(
-                far < TOUCH, 400.0, np.clip(SHY + spread - far, 0.0, None) * 1.5
-            )
-    return price
+def dangers(places, discs, x, y):
+    """Probability of a contact at each node in each layer."""
+    if not discs:
+        return np.zeros((LAYERS + 1, *COLUMNS.shape))
+    reach = RADIUS + np.array([disc.radius for disc in discs], np.float32)
+    off = (places[::LAYER] - (x, y)).astype(np.float32)
+    steps = STEPS.astype(np.float32)
+    dx, dy = (steps - off[:, :, :1]) ** 2, (steps - off[:, :, 1:]) ** 2
+    far = np.sqrt(dy[:, :, :, None] + dx[:, :, None, :]) - reach[:, None, None]
+    return danger(far.min(axis=1), np.arange(LAYERS + 1)[:, None, None])
+
+
+def around(values):
+    """Values of the nodes to which MOVES lead, shape (moves, rows, columns)."""
+    padded, side = np.pad(values, 1, constant_values=LOST), 2 * WINDOW + 1
+    return np.stack(
+        [padded[1 + j : 1 + j + side, 1 + i : 1 + i + side] for j, i in MOVES]
+    )
 
 
 def values(field, chart, places, discs, x, y):
     """What is left to pay at each node in layer HELD, and the move from there."""
-    rows, columns = cells(x + COLUMNS, y + ROWS)
-    walls = np.where(chart.blocked[rows, columns], 400.0, 0.0)
     left = field.at(x + COLUMNS, y + ROWS)
+    left = np.minimum(left - left[WINDOW, WINDOW], 0.5 * LOST)
+    walls = chart.blocked[cells(x + COLUMNS, y + ROWS)]
+    risks = dangers(places, discs, x, y)
     # Whoever is early is better off than who arrives at last.
-    price = risks(places, discs, x, y) + walls + HURRY * left
-    value = left + price[LAYERS]
-    choice = np.zeros(value.shape, np.int8)
+    value = np.where(walls, LOST, left + risks[LAYERS] * (LOST - left))
     for layer in range(LAYERS - 1, HELD - 1, -1):
-        best = shifted(value, 0, 0, 1e6) + 0.6
-        choice = np.zeros(value.shape, np.int8)
-        for k, (row, column) in enumerate(MOVES[1:], 1):
-            other = shifted(value, row, column, 1e6)
-            better = other < best
-            best[better], choice[better] = other[better], k
-        value = best + price[layer]
+        options = around(value)
+        options[0] += PAUSE
+        choice = options.argmin(axis=0)
+        further = np.minimum(options.min(axis=0) + HURRY * left, LOST)
+        value = further + risks[layer] * (LOST - further)
+        value[walls] = LOST
+    # Wheel speeds are tested by themselves for walls.
+    value = np.where(walls, around(value).min(axis=0) + NODE, value)
     return value, choice
 
 
@@ -387,54 +493,60 @@ def chosen(field, chart, discs, pose):
     x, y, heading = pose
     places = futures(discs, chart)
     value, choice = values(field, chart, places, discs, x, y)
-    place = np.tile([x, y], (len(PAIRS), 1))
+    wheels = PAIRS * STEP
+    forward = 0.5 * wheels.sum(axis=1)
+    turn = (wheels[:, 0] - wheels[:, 1]) / AXLE
     facing = np.full(len(PAIRS), heading)
-    forward = 0.5 * (PAIRS[:, 0] + PAIRS[:, 1]) * FASTEST * DT
-    turn = (PAIRS[:, 0] - PAIRS[:, 1]) * FASTEST * DT / AXLE
-    cost = np.zeros(len(PAIRS))
-    now = [(disc.place, disc.velocity) for disc in discs]
-    for _ in range(HELD * LAYER):
-        middle = facing + 0.5 * turn
-        place = place + forward[:, None] * np.column_stack(
-            [np.cos(middle), np.sin(middle)]
-        )
-        facing = facing + turn
-        rows, columns = cells(*place.T)
-        cost += np.where(chart.blocked[rows, columns], 400.0, 0.0)
-        now = [moved(*each, DT, chart) for each in now]
-        for at, _velocity in now:
-            far = np.hypot(*(place - at).T) - (RADIUS + DISC + 1.5)
-            cost += np.where(far < TOUCH, 400.0, np.clip(SHY - far, 0.0, None) * 0.75)
-    u, v = ((place - (x, y)) / NODE + WINDOW).T
-    cost += between(value, u, v)
-    moves = choice[np.rint(v).astype(int), np.rint(u).astype(int)]
-    off = np.abs(
-        np.remainder(ANGLES[moves] - facing + 0.5 * math.pi, math.pi) - 0.5 * math.pi
-    )
-    cost += np.where(moves > 0, TURNING * off, 0.0)
+    px, py = np.full(len(PAIRS), x), np.full(len(PAIRS), y)
+    safe = np.ones(len(PAIRS))
+    reach = RADIUS + np.array([disc.radius for disc in discs])
+    for step in range(1, HELD * LAYER + 1):
+        for part in (0.5, 0.5):
+            middle = facing + 0.5 * part * turn
+            px = px + part * forward * np.cos(middle)
+            py = py + part * forward * np.sin(middle)
+            facing = facing + part * turn
+            safe[chart.blocked[cells(px, py)]] = 0.0
+        if discs:
+            off_x, off_y = (
+                px[:, None] - places[step, :, 0],
+                py[:, None] - places[step, :, 1],
+            )
+            gaps = (np.hypot(off_x, off_y) - reach).min(axis=1)
+            safe *= 1.0 - danger(gaps, step / LAYER)
+    cost = between(value, (px - x) / NODE + WINDOW, (py - y) / NODE + WINDOW)
+    column = np.rint((px - x) / NODE).astype(int) + WINDOW
+    row = np.rint((py - y) / NODE).astype(int) + WINDOW
+    moves = choice[row, column]
+    off = np.remainder(ANGLES[moves] - facing + 0.5 * math.pi, math.pi) - 0.5 * math.pi
+    cost += np.where(moves > 0, TURNING * np.abs(off), 0.0)
     cost += HABIT * np.abs(PAIRS - STATE["last"]).sum(axis=1)
+    cost = LOST + safe * (cost - LOST)
     return PAIRS[int(np.argmin(cost))]
 
 
 def reset(obs):
     """Starts an episode."""
-    STATE.update(chart=Map(), discs=[], field=None, step=0, last=np.zeros(2))
-    STATE["goal"] = [float(v) for v in obs["goal"]]
+    STATE.update(chart=Map(), discs=[], step=0, last=np.zeros(2))
+    STATE["field"] = Field([float(value) for value in obs["goal"]])
 
 
 def policy(obs):
     """Wheel speeds for an observation."""
-    x, y, heading = (float(v) for v in obs["pose"])
+    pose = x, y, heading = tuple(float(value) for value in obs["pose"])
     ranges = np.asarray(obs["ranges"], float)
-    chart, pose = STATE["chart"], (x, y, heading)
-    numbers, points = chart.add(x, y, heading, ranges)
-    found = [centre_of(group, x, y) for group in groups(numbers, points)]
-    STATE["discs"] = track(STATE["discs"], found, chart, pose, ranges)
-    if STATE["field"] is None:
-        STATE["field"] = Field(STATE["goal"])
+    chart, field, angles = STATE["chart"], STATE["field"], heading + FAN
+    numbers = np.flatnonzero(ranges < RANGE - 1e-3)
+    points = np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles)])
+    discs = STATE["discs"]
+    advance(discs, chart)
+    of_discs = track(discs, chart, numbers.tolist(), points[numbers], pose)
+    STATE["discs"] = forget(discs, pose, ranges)
+    rays = np.zeros(RAYS, bool)
+    rays[numbers[of_discs]] = True
+    chart.add(x, y, angles, ranges, rays)
     if STATE["step"] % REPLAN == 0:
-        STATE["field"].replan(chart, x, y)
+        field.replan(chart, x, y)
     STATE["step"] += 1
-    pair = chosen(STATE["field"], chart, STATE["discs"], pose)
-    STATE["last"] = pair
+    STATE["last"] = pair = chosen(field, chart, STATE["discs"], pose)
     return pair.astype(np.float32)

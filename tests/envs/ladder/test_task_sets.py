@@ -26,7 +26,7 @@ def set_yaml(tmp_path):
 
 
 def test_the_easiest_is_first():
-    assert set_names() == ("known", "unknown", "lost", "moving", "epuck")
+    assert set_names() == ("known", "unknown", "lost", "moving", "crowd", "epuck")
 
 
 @pytest.mark.parametrize("name", set_names())
