@@ -22,12 +22,15 @@ from tdac_envs.drawing.canvas import Image
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.ladder.dead_ends import Sensor, dead_ends
 from tdac_envs.ladder.generators.blocks import PIXEL
+from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.picture import contact_sheet, draw_world
 from tdac_envs.ladder.plate_worlds import PlatesWorld
 from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import SetFile, set_names
-from tdac_envs.ladder.task_sets import AnyWorld, TaskSet, load_set
+from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
+from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.movers.state import SPEED
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 ON_A_SHEET = 24
@@ -84,28 +87,33 @@ def show(
             raise TaskError(f"{option} must end in .png, got {path}")
     tasks, first = load_set(name), index or 0
     wanted = index is not None or png is not None
-    world = tasks.world(split, first) if wanted else None
+    shown = _world_and_task(tasks, split, first) if wanted else None
     record = _record(tasks)
-    if world is not None:
-        record["world"] = _world_record(tasks, world, split, first)
+    if shown is not None:
+        record["world"] = _world_record(tasks, *shown, split, first)
     if as_json:
         _print_json(record)
     else:
         _print_set(Console(), tasks, record)
-    if png is not None and world is not None:
-        _write(draw_world(tasks, world), png, as_json)
+    if png is not None and shown is not None:
+        _write(draw_world(tasks, *shown), png, as_json)
     if sheet is not None:
         count = tasks.count(split)
         last = first + ON_A_SHEET if count is None else min(first + ON_A_SHEET, count)
         # A number beyond the last world is an error of `world`.
         numbers = range(first, max(last, first + 1))
-        worlds = [tasks.world(split, index) for index in numbers]
+        worlds = [_world_and_task(tasks, split, index) for index in numbers]
         captions = [
-            _caption(tasks.label(split, index).split()[-1], each, index)
-            for index, each in zip(numbers, worlds, strict=True)
+            _caption(tasks.label(split, index).split()[-1], world, index)
+            for index, (world, _) in zip(numbers, worlds, strict=True)
         ]
         _write(contact_sheet(tasks, worlds, captions), sheet, as_json)
     return 0
+
+
+def _world_and_task(tasks: TaskSet, split: str, index: int) -> tuple[AnyWorld, AnyTask]:
+    world = tasks.world(split, index)
+    return world, tasks.with_movers(tasks.task_of(world), split, index)
 
 
 def _record(tasks: TaskSet) -> dict[str, Any]:
@@ -120,7 +128,7 @@ def _record(tasks: TaskSet) -> dict[str, Any]:
 
 
 def _world_record(
-    tasks: TaskSet, world: AnyWorld, split: str, index: int
+    tasks: TaskSet, world: AnyWorld, task: AnyTask, split: str, index: int
 ) -> dict[str, Any]:
     file, raster, pixel = tasks.file, world, 1.0
     if isinstance(raster, PlatesWorld):
@@ -141,7 +149,18 @@ def _world_record(
         "dead_ends": lost.depth,
         "excess": lost.excess,
         "rejected_drafts": len(world.rejected),
+        **_movers(task),
     }
+
+
+def _movers(task: AnyTask) -> dict[str, Any]:
+    """How many movers there are, and how fast, as a part of the robot's speed."""
+    movers = task.movers if isinstance(task, Map2DTask) else None
+    if movers is None:
+        return {}
+    speeds = movers.traits[:, SPEED] * task.dt / task.full_step
+    mean = float(speeds.mean()) if len(speeds) else 0.0
+    return {"movers": len(speeds), "mover_speed": round(mean, 4)}
 
 
 def _sensor(file: SetFile, pixel: float) -> Sensor:
@@ -167,6 +186,8 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
         "horizon": f"{file.horizon.factor:g} OT, {file.horizon.least} to "
         f"{file.horizon.most} steps",
     }
+    if file.movers:
+        rows["movers"] = "; ".join(_group(group) for group in file.movers)
     world = record.get("world")
     if world is not None:
         rows |= _world_rows(world, file.unit)
@@ -210,11 +231,24 @@ def _disturbed(file: SetFile) -> str:
     return ", ".join(f"{name} {value:g}" for name, value in given.items())
 
 
+def _group(group: MoversOfSet) -> str:
+    """A group of movers: kind, number, radius and speed."""
+    count, radius, speed = (
+        f"{low:g} to {high:g}" for low, high in (group.count, group.radius, group.speed)
+    )
+    kind = "people of a crowd" if group.kind == "crowd" else "bouncing discs"
+    return f"{count} {kind}, radius {radius} px, {speed} px/s"
+
+
 def _world_rows(world: dict[str, Any], unit: str) -> dict[str, str]:
     """The figures of a world, by label."""
     x, y, heading = world["start"]
     goal_x, goal_y = world["goal"]
     sides = f"{world['width']:g} x {world['height']:g} {unit}"
+    among = {}
+    if "movers" in world:
+        speed = f"{world['mover_speed']:.2f} of the robot's speed on average"
+        among["movers here"] = f"{world['movers']}, {speed}"
     return {
         f"{world['split']} {world['index']}": f"{world['generator']}, "
         f"{sides}, start ({x:g}, {y:g}), heading {heading:.3f} rad, goal "
@@ -226,6 +260,7 @@ def _world_rows(world: dict[str, Any], unit: str) -> dict[str, str]:
         "dead ends": _dead_ends(world["dead_ends"], world["excess"]),
         "in sight": f"the goal, from {world['in_sight']:.0%} of the path; "
         f"{world['density']:.0%} of the floor is occupied",
+        **among,
     }
 
 

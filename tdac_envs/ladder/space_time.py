@@ -45,16 +45,27 @@ def earliest_arrival(task: Map2DTask) -> Arrival | None:
         task: The task with its movers, which are only read.
     """
     movers = Movers.none() if task.movers is None else task.movers
-    places = np.empty((task.horizon + 1, len(movers.traits), 2))
-    terrain, own = task.terrain, movers.fresh()
-    # Arrays of a task that was pickled can be written to.
-    own = own._replace(**{key: read_only(getattr(own, key)) for key in Places._fields})
-    foresee(terrain.padded_clear, terrain.leaps, *own, task.dt, places)
+    places = foreseen(task, task.horizon)
     for steps in (2, 1):
         found = _plan(task, movers, places, steps)
         if found is not None:
             return found
     return None
+
+
+def foreseen(task: Map2DTask, steps: int) -> Array:
+    """Where the movers of a task will be, as if there were no robot.
+
+    Returns:
+        Shape (steps + 1, n, 2): x, y in each step, px.
+    """
+    movers = Movers.none() if task.movers is None else task.movers.fresh()
+    places = np.empty((steps + 1, len(movers.traits), 2))
+    # Arrays of a task that was pickled can be written to.
+    kept = {key: read_only(getattr(movers, key)) for key in Places._fields}
+    terrain, own = task.terrain, movers._replace(**kept)
+    foresee(terrain.padded_clear, terrain.leaps, *own, task.dt, places)
+    return places
 
 
 def _plan(task: Map2DTask, movers: Movers, places: Array, steps: int) -> Arrival | None:
