@@ -17,6 +17,7 @@ from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.verification.judge.set_job import movers_of
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.epuck.infrared import RANGE
@@ -29,8 +30,6 @@ from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import SetFile, set_names
 from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
-from tdac_envs.map2d.task import Map2DTask
-from tdac_envs.movers.state import SPEED
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 ON_A_SHEET = 24
@@ -149,18 +148,8 @@ def _world_record(
         "dead_ends": lost.depth,
         "excess": lost.excess,
         "rejected_drafts": len(world.rejected),
-        **_movers(task),
+        **movers_of(task),
     }
-
-
-def _movers(task: AnyTask) -> dict[str, Any]:
-    """How many movers there are, and how fast, as a part of the robot's speed."""
-    movers = task.movers if isinstance(task, Map2DTask) else None
-    if movers is None:
-        return {}
-    speeds = movers.traits[:, SPEED] * task.dt / task.full_step
-    mean = float(speeds.mean()) if len(speeds) else 0.0
-    return {"movers": len(speeds), "mover_speed": round(mean, 4)}
 
 
 def _sensor(file: SetFile, pixel: float) -> Sensor:

@@ -30,6 +30,14 @@ MOST_TOLD = 3
 """Failures whose diagnosis is reported."""
 
 
+TOUCHED = {
+    "wall": "with a wall",
+    "mover": "with a mover",
+    "mover_standing": "with a mover while standing",
+}
+"""How the failures of each contact are told apart."""
+
+
 class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -159,7 +167,7 @@ def summarise(
         by_generator=(
             {name: scores_of(group) for name, group in groups.items()} if scored else {}
         ),
-        causes=dict(Counter(str(e.cause or e.outcome) for e in failed).most_common()),
+        causes=dict(Counter(cause_of(episode) for episode in failed).most_common()),
         told=checks.failures or (tuple(texts[:MOST_TOLD]) if told else ()),
         episodes=tuple(episodes) if told else (),
         sequential=None if test is None else result_of(test, successes, len(failed)),
@@ -167,6 +175,12 @@ def summarise(
         seconds=round(seconds, 3),
         clock_dependent=clock_dependent,
     )
+
+
+def cause_of(episode: WorldEpisode) -> str:
+    """Why an episode failed, with what the robot touched."""
+    cause = str(episode.cause or episode.outcome)
+    return f"{cause} {TOUCHED[episode.contact]}" if episode.contact else cause
 
 
 def clock_dependence(

@@ -25,6 +25,7 @@ _SIDES = "ahead", "the right", "behind", "the left"
 _AWAY = 0.5
 # Below this part of full speed, a robot turns in place.
 _CREEPING = 0.02
+_FULL = 0.995
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,4 +116,5 @@ def how_it_drove(trajectory: Trajectory, *, stood: bool) -> str:
     if abs(speed) < _CREEPING:
         return "turned in place"
     way = "drove backwards" if speed < 0.0 else "drove"
-    return f"{way} at {abs(speed):.2g} of its speed"
+    part = f"{abs(speed):.2g} of its speed" if abs(speed) < _FULL else "full speed"
+    return f"{way} at {part}"

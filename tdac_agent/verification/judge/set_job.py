@@ -9,13 +9,13 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from tdac_agent.episodes.episode import Driver, Record, not_driven, run_policy
-from tdac_agent.episodes.trajectory import Outcome, Rollout
+from tdac_agent.episodes.trajectory import Contact, Outcome, Rollout
 from tdac_agent.sandbox import Child, ControllerFault, Limits, SandboxError
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
@@ -47,6 +47,8 @@ from tdac_envs.ladder.env import OnSet, make
 from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.task_sets import AnyTask
+from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.movers.state import SPEED
 
 
 class SetJob(BaseModel):
@@ -75,9 +77,10 @@ class SetJob(BaseModel):
 class WorldEpisode(PrintableRecord):
     """Figures of an episode on a world; lengths in px or m.
 
-    `length`, `gap`, `detour`, `in_sight` and `density` describe the world;
-    `least_steps` is OT. `cause` and `text` are the diagnosis of a failure; the text
-    only if it may be told.
+    `length` to `mover_speed` describe the world; `least_steps` is OT, and `mover_speed`
+    the mean speed of its movers as a part of the robot's. `cause` and `text` are the
+    diagnosis of a failure; the text only if it may be told. `contact` is what was
+    touched in a collision.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -97,6 +100,9 @@ class WorldEpisode(PrintableRecord):
     detour: float
     in_sight: float
     density: float
+    movers: int = 0
+    mover_speed: float = 0.0
+    contact: Contact | None = None
     cause: Cause | None = None
     text: str | None = None
     error: str | None = None
@@ -311,10 +317,21 @@ def figures_of(
         detour=hard.detour,
         in_sight=hard.in_sight,
         density=hard.density,
+        **movers_of(env.task),
+        contact=rollout.contact,
         error=rollout.error,
         cpu_seconds=round(cpu_seconds, 3),
         **failure,
     )
+
+
+def movers_of(task: AnyTask) -> dict[str, Any]:
+    """`movers` and `mover_speed` of a world; empty without movers."""
+    movers = task.movers if isinstance(task, Map2DTask) else None
+    if movers is None or not len(movers.traits):
+        return {}
+    speed = float(movers.traits[:, SPEED].mean()) * task.dt / task.full_step
+    return {"movers": len(movers.traits), "mover_speed": round(speed, 4)}
 
 
 def _shown(env: OnSet) -> Units:
