@@ -33,6 +33,7 @@ from benchmarks.timing import Bench, Effort, Row, duration, show, whole_from_one
 NAMES = (
     "env_step",
     "epuck_step",
+    "movers",
     "peers",
     "preprocessing",
     "planning",

@@ -45,6 +45,14 @@ obstacle:
   - {shape: {name: rectangle, length: 1.5, width: 1.2}, state: [6, 2, 0.5]}
   - {shape: {name: rectangle, length: 1.0, width: 2.0}, state: [3, 7, 0]}
 """
+IRSIM_DISCS = """
+  - number: {number}
+    distribution: {{name: random, {places}}}
+    kinematics: {{name: omni}}
+    behavior: {{name: {behavior}, wander: True, {places}}}
+    shape: {{name: circle, radius: 0.15}}
+"""
+IRSIM_PLACES = "range_low: [0.5, 0.5, -3.14], range_high: [9.5, 9.5, 3.14]"
 
 
 def benches(effort: Effort) -> list[Bench]:
@@ -62,17 +70,27 @@ def benches(effort: Effort) -> list[Bench]:
 def steppers() -> Iterator[tuple[str, Burst]]:
     """Name and burst of each installed simulator."""
     if find_spec("irsim") is not None:
-        yield "ir-sim, 18 beams", _irsim()
+        yield "ir-sim, 18 beams", irsim_burst()
     if find_spec("vmas") is not None:
         yield f"VMAS navigation, 18 rays, {BATCH} robots", _vmas()
 
 
-def _irsim() -> Burst:
+def irsim_burst(behavior: str = "dash", discs: int = 0) -> Burst:
+    """Steps of ir-sim.
+
+    Args:
+        behavior: That of moving discs: `dash` to a place, or `rvo`, which avoids
+            others.
+        discs: Number of moving discs.
+    """
     import irsim
 
+    text = IRSIM_WORLD
+    if discs:
+        text += IRSIM_DISCS.format(number=discs, behavior=behavior, places=IRSIM_PLACES)
     with tempfile.TemporaryDirectory() as name:
         world = Path(name) / "world.yaml"
-        world.write_text(IRSIM_WORLD)
+        world.write_text(text)
         env: Any = irsim.make(str(world), display=False, log_level="ERROR")
     action = np.array([[0.3], [0.2]])
 

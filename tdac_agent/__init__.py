@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from tdac_agent.evaluation.evaluation_report import Evaluation
     from tdac_agent.evaluation.policy import Policy, load_controller
     from tdac_agent.evaluation.robust import verify_robust
+    from tdac_agent.evaluation.set_verify import verify_on_set
     from tdac_agent.runs.history import Told, gather_run
     from tdac_agent.runs.run_record import Run, load_run
     from tdac_agent.synthesis.loop import synthesize
@@ -33,6 +34,7 @@ __all__ = [
     "load_task",
     "synthesize",
     "verify",
+    "verify_on_set",
     "verify_robust",
 ]
 
@@ -51,6 +53,7 @@ _MODULE_OF = {
     "load_task": "tasks.task",
     "synthesize": "synthesis.loop",
     "verify": "verification.verify",
+    "verify_on_set": "evaluation.set_verify",
     "verify_robust": "evaluation.robust",
 }
 

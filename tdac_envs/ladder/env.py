@@ -100,6 +100,8 @@ class LadderEnv(OnSet, Map2DEnv):
     - `lost`: odometry with errors and noisy ranges; wheels that slip and are not
       equally fast; neither a pose nor a map,
     - `moving`: as `unknown`, with room to pass, among discs that move,
+    - `crowd`: the map and the exact pose on it, among people who walk about; wheels
+      that are not equally fast, rays that drop out,
     - `epuck`: infra-red sensors and wheel encoders of an e-puck whose wheels slip;
       neither a pose nor a map.
 
@@ -113,10 +115,10 @@ class LadderEnv(OnSet, Map2DEnv):
 
     | key | levels | content |
     |---|---|---|
-    | `pose` | `known`, `unknown`, `moving` | x, y (px), heading (rad, in (-pi, pi]) |
+    | `pose` | all but `lost`, `epuck` | x, y (px), heading (rad, in (-pi, pi]) |
     | `goal` | all | x, y, px; on `epuck` m |
     | `wheel_speeds` | all | left, right, as last applied, fraction |
-    | `ranges` | all but `epuck` | distance to the first wall along each ray, px |
+    | `ranges` | all but `epuck` | distance to the first wall or mover of each ray, px |
     | `odometry` | `lost` | measured distance (px) and turn (rad) of the last step |
     | `ps` | `epuck` | readings of the infra-red sensors, as in TDAC-EPuck-v0 |
     | `encoders` | `epuck` | angles that the wheels have turned, rad |
