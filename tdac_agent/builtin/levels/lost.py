@@ -4,7 +4,8 @@ A Kalman filter holds the pose, the errors of the odometry and the gains of the 
 Each scan is matched with the robot's own map: cells that hold the mean of the hits in
 them. What is planned, is planned from where the robot will be when the next action
 takes effect. Arcs are tried out against the hits, and must begin in space that rays
-have found free; the less room an arc leaves for what slip may do, the dearer it is.
+have found free; the less room their way leaves, the dearer they are. Where the goal is
+missed, it is sought where the errors of the pose make it likely.
 """
 
 import json
@@ -73,9 +74,8 @@ class Filter:
     def __init__(self):
         self.state = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
         bound = GAINS / math.sqrt(3.0)
-        self.spread = np.diag(
-            [1e-6, 1e-6, 1e-8, SCALE**2, SCALE**2, bound**2, bound**2]
-        )
+        deviations = [1e-3, 1e-3, 1e-4, SCALE, SCALE, bound, bound]
+        self.spread = np.diag(np.square(deviations))
 
     def pose(self):
         """x, y and heading."""
@@ -86,10 +86,8 @@ class Filter:
         if not np.any(wheels):
             return
         state = np.concatenate([self.state, [0.0, 0.0]])
-        driven = [
-            wheel(float(c), g) for c, g in zip(wheels, state[5:7].tolist(), strict=True)
-        ]
-        (left, by_left, left_sd), (right, by_right, right_sd) = driven
+        left, by_left, left_sd = wheel(float(wheels[0]), float(state[5]))
+        right, by_right, right_sd = wheel(float(wheels[1]), float(state[6]))
         state[7], state[8] = 0.5 * (left + right), (left - right) / AXLE
         mix = np.array([[0.5, 0.5], [1.0 / AXLE, -1.0 / AXLE]])
         by_gain = mix * [by_left, by_right]
@@ -98,9 +96,7 @@ class Filter:
         spread[7:, :7] = by_gain @ self.spread[5:7]
         spread[:7, 7:] = spread[7:, :7].T
         slips = np.diag([left_sd**2 + 1e-4, right_sd**2 + 1e-4])
-        spread[7:, 7:] = (
-            by_gain @ self.spread[5:7, 5:7] @ by_gain.T + mix @ slips @ mix.T
-        )
+        spread[7:, 7:] = by_gain @ spread[5:7, 7:] + mix @ slips @ mix.T
         for factor, motion, value in (3, 7, odometry[0]), (4, 8, odometry[1]):
             row = np.zeros(9)
             row[factor], row[motion] = state[motion], state[factor]
@@ -167,11 +163,8 @@ def wheel(command, gain):
     mean = STEP - sd * (z * below + math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi))
     mean = mean if z < 6.0 else way
     slope = 0.2 if capped else below
-    return (
-        math.copysign(mean, command),
-        command * STEP * slope,
-        sd * (0.6 + 0.4 * min(z / 1.5, 1.0)),
-    )
+    sd *= 0.6 + 0.4 * min(z / 1.5, 1.0)
+    return math.copysign(mean, command), command * STEP * slope, sd
 
 
 class Surfaces:
@@ -200,17 +193,11 @@ class Surfaces:
         far = (x - places[:, :1]) ** 2 + (y - places[:, 1:]) ** 2
         weight = np.minimum(weight, 4.0) * np.exp(-far / 12.0)
         total = weight.sum(axis=1)
-        held = np.maximum(total, 1e-9)[:, None]
-        mx, my = (
-            ((weight * x).sum(axis=1) / held[:, 0]),
-            ((weight * y).sum(axis=1) / held[:, 0]),
-        )
+        weight /= np.maximum(total, 1e-9)[:, None]
+        mx, my = (weight * x).sum(axis=1), (weight * y).sum(axis=1)
         dx, dy = x - mx[:, None], y - my[:, None]
-        xx, yy = (
-            (weight * dx * dx / held).sum(axis=1),
-            (weight * dy * dy / held).sum(axis=1),
-        )
-        xy = (weight * dx * dy / held).sum(axis=1)
+        xx, yy = (weight * dx * dx).sum(axis=1), (weight * dy * dy).sum(axis=1)
+        xy = (weight * dx * dy).sum(axis=1)
         root = np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
         small, large = 0.5 * (xx + yy) - root, 0.5 * (xx + yy) + root
         angle = 0.5 * np.arctan2(2.0 * xy, xx - yy) + 0.5 * math.pi
@@ -314,11 +301,8 @@ class Maps:
         (px, py), at = self.surfaces.points(x, y, RANGE)
         dx, dy = px - x, py - y
         distance = np.hypot(dx, dy)
-        bearing = (
-            np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi)
-            - math.pi
-        )
-        place = (bearing + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
+        bearing = np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi)
+        place = (bearing - math.pi + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
         nearest = np.clip(np.rint(place).astype(int), 0, RAYS - 1)
         beside = np.abs(place - nearest) * distance * (VIEW / (RAYS - 1))
         reading = ranges[nearest]
@@ -342,9 +326,8 @@ class Maps:
                 if k * k + m * m > 40:
                     continue
                 to = at + k * side + m
-                away[to] = np.minimum(
-                    away[to], np.hypot(CELL * m - dx, CELL * k - dy) + doubt
-                )
+                far = np.hypot(CELL * m - dx, CELL * k - dy) + doubt
+                away[to] = np.minimum(away[to], far)
         away = away.reshape(side, side)
         price = 1.0 + PRICE * np.clip((ROOM - away) / (ROOM - RADIUS), 0.0, 1.0) ** 2
         price += risk(away + 0.5 - RADIUS, 0.6)
@@ -451,9 +434,8 @@ def between(field, x, y, half, half_y, scale=1.0):
     u, v = x - i, y - j
     flat, at = field.ravel(), j * width + i
     top = flat[at] * (1.0 - u) + flat[at + 1] * u
-    return (
-        top * (1.0 - v) + (flat[at + width] * (1.0 - u) + flat[at + width + 1] * u) * v
-    )
+    at += width
+    return top * (1.0 - v) + (flat[at] * (1.0 - u) + flat[at + 1] * u) * v
 
 
 class Near:
@@ -551,13 +533,9 @@ class Courses:
                 after = math.copysign(line, forward) * (TIMES - on_arc)
                 facing = turn * on_arc
                 pairs.append((left, right))
-                parts.append(
-                    (
-                        chord * np.cos(half) + after * np.cos(facing),
-                        chord * np.sin(half) + after * np.sin(facing),
-                        facing,
-                    )
-                )
+                ahead = chord * np.cos(half) + after * np.cos(facing)
+                aside = chord * np.sin(half) + after * np.sin(facing)
+                parts.append((ahead, aside, facing))
                 sizes.append((0.5 * step * (abs(left) + abs(right)), abs(forward)))
         self.pairs = np.array(pairs)
         self.ahead, self.aside, self.facing = np.array(parts).transpose(1, 0, 2)
@@ -565,11 +543,9 @@ class Courses:
         size, way = np.array(sizes).T[:, :, None] * np.sqrt(times)
         bend = SLIP * math.sqrt(2.0) / AXLE * size * way * np.sqrt(times / 3.0)
         self.spread = np.sqrt((SLIP * size) ** 2 / 2.0 + bend**2)
-        ways = np.hypot(
-            np.diff(self.ahead, prepend=0.0), np.diff(self.aside, prepend=0.0)
-        )
+        steps = np.diff([self.ahead, self.aside], prepend=0.0)
         hurry = np.abs(self.pairs).max(axis=1)[:, None]
-        self.ways = ways * (1.0 - CARE + CARE * hurry)
+        self.ways = np.hypot(*steps) * (1.0 - CARE + CARE * hurry)
         self.forward = self.pairs.sum(axis=1) > 0.0
 
 
@@ -582,10 +558,11 @@ def reset(obs):
     steps = np.arange(-9, 10) * 0.5 * TOLERANCE
     aside, along = (each.ravel() for each in np.meshgrid(steps, steps))
     away = max(float(np.hypot(*goal)), 1.0)
-    chance = (aside / (2.0 + DRIFT[0] * away)) ** 2 + (along / (2.0 + DRIFT[1] * away)) ** 2
+    chance = np.hypot(aside / (2.0 + DRIFT[0] * away), along / (2.0 + DRIFT[1] * away))
+    aside, along = aside[:, None] / away, along[:, None] / away
     STATE.update(
-        places=goal + (aside[:, None] * (-goal[1], goal[0]) + along[:, None] * goal) / away,
-        chance=np.exp(-0.5 * chance),
+        places=goal + aside * (-goal[1], goal[0]) + along * goal,
+        chance=np.exp(-0.5 * chance**2),
         maps=Maps(obs["goal"]),
         filter=Filter(),
         courses=Courses(STEP),
@@ -625,18 +602,12 @@ def best_arc(near, courses, x, y, heading, slack, unsure):
     there = fits & ready[:, None]
     there &= np.hypot(px - goal[0], py - goal[1]) <= 0.6 * TOLERANCE
     left = near.left(px, py)
-    worth = (
-        left
-        + courses.step * TIMES
-        + turns_left(near, px, py, heading + courses.facing, left)
-        + np.cumsum(danger, axis=1)
-    )
+    worth = left + courses.step * TIMES + np.cumsum(danger, axis=1)
+    worth += turns_left(near, px, py, heading + courses.facing, left)
     worth = np.where(there, worth - left - 20.0, worth)
     able = np.where(fits, worth, np.inf)
-    worth = np.minimum(
-        able[:, SOON - 1 :].min(axis=1), np.where(there, able, np.inf).min(axis=1)
-    )
-    worth += PEEK * ~ready
+    worth = np.where(there, able, np.inf).min(axis=1)
+    worth = np.minimum(able[:, SOON - 1 :].min(axis=1), worth) + PEEK * ~ready
     k = int(worth.argmin())
     unseen = None if ready[k] else (px[k, :NEXT], py[k, :NEXT])
     return float(worth[k]), courses.pairs[k], unseen
@@ -693,9 +664,8 @@ def away_from_hits(near, courses, x, y, heading):
     """Speeds of the short arc that leaves most room at its end."""
     cosine, sine = math.cos(heading), math.sin(heading)
     ahead, aside = courses.ahead[:, :NEXT], courses.aside[:, :NEXT]
-    room = near.room(
-        x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside
-    )
+    px, py = x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside
+    room = near.room(px, py)
     slow = np.abs(courses.pairs).max(axis=1) < 0.7
     value = room[:, -1] + np.minimum(room.min(axis=1) - float(room[0, 0]), 0.0)
     return courses.pairs[int(np.where(slow, value, -np.inf).argmax())]
