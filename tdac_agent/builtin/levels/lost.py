@@ -4,7 +4,8 @@ A Kalman filter holds the pose, the errors of the odometry and the gains of the 
 Each scan is matched with the robot's own map: cells that hold the mean of the hits in
 them. What is planned, is planned from where the robot will be when the next action
 takes effect. Arcs are tried out against the hits, and must begin in space that rays
-have found free; the less room an arc leaves for what slip may do, the dearer it is.
+have found free; the less room their way leaves, the dearer they are. Where the goal is
+missed, it is sought where the errors of the pose make it likely.
 """
 
 import json
@@ -29,19 +30,24 @@ RAY_NOISE = max(NOISES.get("range_noise", 0.0), 0.002)
 DELAY = int(NOISES.get("delay", 0))
 FAR = RANGE * (1.0 - 3.0 * RAY_NOISE) - 1e-3  # a ray that reads more has hit nothing
 ROUGH = 0.3  # px by which walls differ from lines
-MARGIN = 0.15  # px that are kept from hits
-WAIT, STUCK = 25, 6.0  # steps within so many px after which something else is tried
-NEARBY = 6.0 * TOLERANCE  # px to the goal
-STRICT, PATIENCE = -0.6, 200  # LOOSE for so many steps after that
-LOOSE = 0.8  # px by which the search may come too near to a hit
+MARGIN, BOLDER = 0.15, 0.04  # px kept from hits, less so by BOLDER a step of waiting
+MOVED = 4.0  # px; within less, the robot waits
+NEARBY, TRIES = 3.0 * TOLERANCE, 20  # px to the goal, and steps spent there on a place
+DRIFT = 0.03, 0.015  # deviation of the goal, aside and along, by its distance
+WAIT, PATIENCE = 30, 200  # steps of waiting, after which it is STRICT for some steps
+STRICT = -0.6
+UNSEEN = 0.2  # how much more an unseen px costs
+LOOSE = 0.5  # px by which the search may come too near to a hit
 SLIVER = 1.5  # px around hits in which unseen space is no matter
 SLACK = 0.7  # px by which the body may come too near to the centre of an unseen px
 CHORD = 5.0  # px between two hits that are taken for one borders
 ROOM = 1.5 * RADIUS  # clearance from which a px costs nothing extra
 REACH = int(ROOM) + 1
 PRICE = 0.3  # how much more a px beside a wall costs
+CARE = 0.5  # share of this that is saved by driving slowly
 PEEK = 6.0  # px that a look costs
-RISK = 60.0  # px that a contact costs
+RISK = 40.0  # how much more a px costs that is driven in contact
+DOUBT = 0.65  # share of the deviation of a hit, and px, that it is taken to be further
 UNSURE = 0.35  # px by which pose and map may be wrong
 CELL = 2  # px between the places of the search, and the size of a cell of hits
 LOOK, TURN = 6.0, 10.0  # px ahead; px that a turn by a right angle costs
@@ -51,7 +57,7 @@ TRUST = 12.0  # the most hits of 1 px that a cell holds, before it forgets
 TIMES = np.array(
     [0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0]
 )
-NEXT, RISKY, SOON = 5, 9, 11  # entries of TIMES up to one, three and four steps
+NEXT, SOON = 5, 11  # entries of TIMES up to one and four steps
 TURNS = np.arange(120) * (2.0 * math.pi / 120)  # directions of lines from the heading
 FULL_SPINS = np.remainder(TURNS + math.pi, 2.0 * math.pi) - math.pi
 LENGTHS = np.arange(1, 33) * 0.75  # px
@@ -68,9 +74,8 @@ class Filter:
     def __init__(self):
         self.state = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
         bound = GAINS / math.sqrt(3.0)
-        self.spread = np.diag(
-            [1e-6, 1e-6, 1e-8, SCALE**2, SCALE**2, bound**2, bound**2]
-        )
+        deviations = [1e-3, 1e-3, 1e-4, SCALE, SCALE, bound, bound]
+        self.spread = np.diag(np.square(deviations))
 
     def pose(self):
         """x, y and heading."""
@@ -81,10 +86,8 @@ class Filter:
         if not np.any(wheels):
             return
         state = np.concatenate([self.state, [0.0, 0.0]])
-        driven = [
-            wheel(float(c), g) for c, g in zip(wheels, state[5:7].tolist(), strict=True)
-        ]
-        (left, by_left, left_sd), (right, by_right, right_sd) = driven
+        left, by_left, left_sd = wheel(float(wheels[0]), float(state[5]))
+        right, by_right, right_sd = wheel(float(wheels[1]), float(state[6]))
         state[7], state[8] = 0.5 * (left + right), (left - right) / AXLE
         mix = np.array([[0.5, 0.5], [1.0 / AXLE, -1.0 / AXLE]])
         by_gain = mix * [by_left, by_right]
@@ -93,9 +96,7 @@ class Filter:
         spread[7:, :7] = by_gain @ self.spread[5:7]
         spread[:7, 7:] = spread[7:, :7].T
         slips = np.diag([left_sd**2 + 1e-4, right_sd**2 + 1e-4])
-        spread[7:, 7:] = (
-            by_gain @ self.spread[5:7, 5:7] @ by_gain.T + mix @ slips @ mix.T
-        )
+        spread[7:, 7:] = by_gain @ spread[5:7, 7:] + mix @ slips @ mix.T
         for factor, motion, value in (3, 7, odometry[0]), (4, 8, odometry[1]):
             row = np.zeros(9)
             row[factor], row[motion] = state[motion], state[factor]
@@ -162,11 +163,8 @@ def wheel(command, gain):
     mean = STEP - sd * (z * below + math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi))
     mean = mean if z < 6.0 else way
     slope = 0.2 if capped else below
-    return (
-        math.copysign(mean, command),
-        command * STEP * slope,
-        sd * (0.6 + 0.4 * min(z / 1.5, 1.0)),
-    )
+    sd *= 0.6 + 0.4 * min(z / 1.5, 1.0)
+    return math.copysign(mean, command), command * STEP * slope, sd
 
 
 class Surfaces:
@@ -195,17 +193,11 @@ class Surfaces:
         far = (x - places[:, :1]) ** 2 + (y - places[:, 1:]) ** 2
         weight = np.minimum(weight, 4.0) * np.exp(-far / 12.0)
         total = weight.sum(axis=1)
-        held = np.maximum(total, 1e-9)[:, None]
-        mx, my = (
-            ((weight * x).sum(axis=1) / held[:, 0]),
-            ((weight * y).sum(axis=1) / held[:, 0]),
-        )
+        weight /= np.maximum(total, 1e-9)[:, None]
+        mx, my = (weight * x).sum(axis=1), (weight * y).sum(axis=1)
         dx, dy = x - mx[:, None], y - my[:, None]
-        xx, yy = (
-            (weight * dx * dx / held).sum(axis=1),
-            (weight * dy * dy / held).sum(axis=1),
-        )
-        xy = (weight * dx * dy / held).sum(axis=1)
+        xx, yy = (weight * dx * dx).sum(axis=1), (weight * dy * dy).sum(axis=1)
+        xy = (weight * dx * dy).sum(axis=1)
         root = np.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
         small, large = 0.5 * (xx + yy) - root, 0.5 * (xx + yy) + root
         angle = 0.5 * np.arctan2(2.0 * xy, xx - yy) + 0.5 * math.pi
@@ -235,6 +227,10 @@ class Surfaces:
         at = at[self.weight[at] > 0.05]
         return self.sums[:, at] / self.weight[at], at
 
+    def doubt(self, at):
+        """How far the hits in cells may be nearer than their walls, px."""
+        return np.minimum(DOUBT * np.sqrt(0.2 / self.weight[at]), DOUBT)
+
     def drop(self, at):
         """Weakens hits that a ray has passed through."""
         self.weight[at] *= 0.6
@@ -261,7 +257,7 @@ class Maps:
         self.surfaces = Surfaces(half)
         self.free = np.zeros((self.side, self.side), bool)
         self.cost = np.full((half + 1, half + 1), np.inf)
-        self.age = 0
+        self.age, self.rest, self.stale = 0, 0, False
         self.looks = 0
 
     def square(self, x, y, reach):
@@ -305,11 +301,8 @@ class Maps:
         (px, py), at = self.surfaces.points(x, y, RANGE)
         dx, dy = px - x, py - y
         distance = np.hypot(dx, dy)
-        bearing = (
-            np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi)
-            - math.pi
-        )
-        place = (bearing + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
+        bearing = np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi)
+        place = (bearing - math.pi + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
         nearest = np.clip(np.rint(place).astype(int), 0, RAYS - 1)
         beside = np.abs(place - nearest) * distance * (VIEW / (RAYS - 1))
         reading = ranges[nearest]
@@ -322,21 +315,23 @@ class Maps:
         """Costs of the way to the goal, up to somewhat beyond the robot."""
         (px, py), at = self.surfaces.points(0.0, 0.0, self.half)
         side = self.half + 1
-        away = np.full(side * side, float(ROOM) ** 2)
+        away = np.full(side * side, ROOM)
         dx, dy = px + self.half, py + self.half
         i, j = at % side, at // side
         some = (i > 6) & (j > 6) & (i < side - 7) & (j < side - 7)
         at, dx, dy = at[some], (dx - CELL * i)[some], (dy - CELL * j)[some]
+        doubt = self.surfaces.doubt(at)
         for k in range(-6, 7):
             for m in range(-6, 7):
                 if k * k + m * m > 40:
                     continue
                 to = at + k * side + m
-                away[to] = np.minimum(
-                    away[to], (CELL * m - dx) ** 2 + (CELL * k - dy) ** 2
-                )
-        away = np.sqrt(away).reshape(side, side)
+                far = np.hypot(CELL * m - dx, CELL * k - dy) + doubt
+                away[to] = np.minimum(away[to], far)
+        away = away.reshape(side, side)
         price = 1.0 + PRICE * np.clip((ROOM - away) / (ROOM - RADIUS), 0.0, 1.0) ** 2
+        price += risk(away + 0.5 - RADIUS, 0.6)
+        price += UNSEEN * ~self.free[::CELL, ::CELL]
         passable = away >= RADIUS - slack
         passable[:3], passable[-3:], passable[:, :3], passable[:, -3:] = (False,) * 4
         around = CELL * (np.arange(side) - self.half // CELL)
@@ -439,9 +434,8 @@ def between(field, x, y, half, half_y, scale=1.0):
     u, v = x - i, y - j
     flat, at = field.ravel(), j * width + i
     top = flat[at] * (1.0 - u) + flat[at + 1] * u
-    return (
-        top * (1.0 - v) + (flat[at + width] * (1.0 - u) + flat[at + width + 1] * u) * v
-    )
+    at += width
+    return top * (1.0 - v) + (flat[at] * (1.0 - u) + flat[at + 1] * u) * v
 
 
 class Near:
@@ -463,19 +457,22 @@ class Near:
 
     def distances(self, x, y):
         """Distance to the nearest hit from each px of the window, at most REACH."""
-        points, _ = self.maps.surfaces.points(x, y, WINDOW + REACH)
+        points, at = self.maps.surfaces.points(x, y, WINDOW + REACH)
+        doubts = self.maps.surfaces.doubt(at)
         side = 2 * WINDOW + 1
         pad = 2 * REACH
-        field = np.full((side + 2 * pad, side + 2 * pad), float(REACH) ** 2)
+        field = np.full((side + 2 * pad, side + 2 * pad), float(REACH))
         span = np.arange(-REACH, REACH + 1)
-        for px, py in (points.T - [self.x0, self.y0] + pad).tolist():
+        places = points.T - [self.x0, self.y0] + pad
+        for (px, py), doubt in zip(places.tolist(), doubts.tolist(), strict=True):
             i, j = round(px), round(py)
             if not (REACH <= i < side + 3 * REACH and REACH <= j < side + 3 * REACH):
                 continue
             part = field[j - REACH : j + REACH + 1, i - REACH : i + REACH + 1]
             across, down = (span + (i - px)) ** 2, (span + (j - py)) ** 2
-            np.minimum(part, across[None, :] + down[:, None], out=part)
-        return np.sqrt(field[pad : pad + side, pad : pad + side])
+            away = np.sqrt(across[None, :] + down[:, None]) + doubt
+            np.minimum(part, away, out=part)
+        return field[pad : pad + side, pad : pad + side]
 
     def room(self, x, y):
         """Room between the body and hits, px."""
@@ -536,19 +533,19 @@ class Courses:
                 after = math.copysign(line, forward) * (TIMES - on_arc)
                 facing = turn * on_arc
                 pairs.append((left, right))
-                parts.append(
-                    (
-                        chord * np.cos(half) + after * np.cos(facing),
-                        chord * np.sin(half) + after * np.sin(facing),
-                        facing,
-                    )
-                )
+                ahead = chord * np.cos(half) + after * np.cos(facing)
+                aside = chord * np.sin(half) + after * np.sin(facing)
+                parts.append((ahead, aside, facing))
                 sizes.append((0.5 * step * (abs(left) + abs(right)), abs(forward)))
         self.pairs = np.array(pairs)
         self.ahead, self.aside, self.facing = np.array(parts).transpose(1, 0, 2)
-        size, way = np.array(sizes).T[:, :, None] * np.sqrt(TIMES)
-        bend = SLIP * math.sqrt(2.0) / AXLE * size * way * np.sqrt(TIMES / 3.0)
+        times = np.minimum(TIMES, 3.0)
+        size, way = np.array(sizes).T[:, :, None] * np.sqrt(times)
+        bend = SLIP * math.sqrt(2.0) / AXLE * size * way * np.sqrt(times / 3.0)
         self.spread = np.sqrt((SLIP * size) ** 2 / 2.0 + bend**2)
+        steps = np.diff([self.ahead, self.aside], prepend=0.0)
+        hurry = np.abs(self.pairs).max(axis=1)[:, None]
+        self.ways = np.hypot(*steps) * (1.0 - CARE + CARE * hurry)
         self.forward = self.pairs.sum(axis=1) > 0.0
 
 
@@ -557,15 +554,23 @@ STATE = {}
 
 def reset(obs):
     """Forgets everything."""
+    goal = np.asarray(obs["goal"], float)
+    steps = np.arange(-9, 10) * 0.5 * TOLERANCE
+    aside, along = (each.ravel() for each in np.meshgrid(steps, steps))
+    away = max(float(np.hypot(*goal)), 1.0)
+    chance = np.hypot(aside / (2.0 + DRIFT[0] * away), along / (2.0 + DRIFT[1] * away))
+    aside, along = aside[:, None] / away, along[:, None] / away
     STATE.update(
+        places=goal + aside * (-goal[1], goal[0]) + along * goal,
+        chance=np.exp(-0.5 * chance**2),
         maps=Maps(obs["goal"]),
         filter=Filter(),
         courses=Courses(STEP),
         queue=[(0.0, 0.0)] * DELAY,
-        goals=[],
-        goal=[float(value) for value in obs["goal"]],
-        trail=[],
+        waits=0,
         strict=0,
+        tries=0,
+        place=(0.0, 0.0),
         steps=0,
     )
 
@@ -577,7 +582,7 @@ def turns_left(near, x, y, facing, left):
 
 
 def risk(room, spread):
-    """Price of what may touch something."""
+    """How much more a px costs on which the body may touch something."""
     return RISK * np.exp(-0.5 * (np.maximum(room, 0.0) / spread) ** 2)
 
 
@@ -588,26 +593,21 @@ def best_arc(near, courses, x, y, heading, slack, unsure):
     px = x + cosine * courses.ahead - sine * courses.aside
     py = y + sine * courses.ahead + cosine * courses.aside
     room = near.room(px, py)
-    fits = np.logical_and.accumulate(room >= MARGIN, axis=1)
+    fits = np.logical_and.accumulate(room >= near.margin, axis=1)
     seen = near.seen(px, py) >= -slack
     ready = seen[:, :NEXT].all(axis=1)
     back = ~courses.forward
     fits[back] &= np.logical_and.accumulate(seen[back], axis=1)
-    danger = risk(room, np.hypot(courses.spread, unsure))[:, :RISKY].max(axis=1)
+    danger = risk(room, np.hypot(courses.spread, unsure)) * courses.ways
     there = fits & ready[:, None]
     there &= np.hypot(px - goal[0], py - goal[1]) <= 0.6 * TOLERANCE
     left = near.left(px, py)
-    worth = (
-        left
-        + courses.step * TIMES
-        + turns_left(near, px, py, heading + courses.facing, left)
-    )
-    worth = np.where(there, courses.step * TIMES - 20.0, worth)
+    worth = left + courses.step * TIMES + np.cumsum(danger, axis=1)
+    worth += turns_left(near, px, py, heading + courses.facing, left)
+    worth = np.where(there, worth - left - 20.0, worth)
     able = np.where(fits, worth, np.inf)
-    worth = np.minimum(
-        able[:, SOON - 1 :].min(axis=1), np.where(there, able, np.inf).min(axis=1)
-    )
-    worth += PEEK * ~ready + danger
+    worth = np.where(there, able, np.inf).min(axis=1)
+    worth = np.minimum(able[:, SOON - 1 :].min(axis=1), worth) + PEEK * ~ready
     k = int(worth.argmin())
     unseen = None if ready[k] else (px[k, :NEXT], py[k, :NEXT])
     return float(worth[k]), courses.pairs[k], unseen
@@ -619,8 +619,8 @@ def best_line(near, courses, x, y, heading, slack, unsure):
     px = x + np.outer(np.cos(bearings), LENGTHS)
     py = y + np.outer(np.sin(bearings), LENGTHS)
     room = near.room(px, py)
-    fits = np.logical_and.accumulate(room >= MARGIN, axis=1)
-    danger = risk(room, math.hypot(unsure, 0.2))[:, :8].max(axis=1)
+    fits = np.logical_and.accumulate(room >= near.margin, axis=1)
+    danger = np.cumsum(risk(room, math.hypot(unsure, 0.3)) * LENGTHS[0], axis=1)
     seen = near.seen(px, py) >= -slack
     left = near.left(px, py)
     spin = 2.0 * courses.step / AXLE
@@ -630,11 +630,11 @@ def best_line(near, courses, x, y, heading, slack, unsure):
         spun = courses.step * np.maximum(np.abs(spins) / spin, 1.0)
         spun[np.abs(spins) < 1e-6] = 0.0
         facing = bearings if sign > 0.0 else bearings + math.pi
-        worth = left + LENGTHS + spun[:, None]
+        worth = left + LENGTHS + spun[:, None] + danger
         worth += turns_left(near, px, py, facing[:, None], left)
         worth = np.where(able, worth, np.inf)[:, LENGTHS >= 6.0]
         ready = seen[:, courses.step >= LENGTHS].all(axis=1)
-        price = worth.min(axis=1) + PEEK * ~ready + danger
+        price = worth.min(axis=1) + PEEK * ~ready
         k = int(price.argmin())
         if price[k] < best[0]:
             share = min(max(spins[k] / spin, -1.0), 1.0)
@@ -664,47 +664,36 @@ def away_from_hits(near, courses, x, y, heading):
     """Speeds of the short arc that leaves most room at its end."""
     cosine, sine = math.cos(heading), math.sin(heading)
     ahead, aside = courses.ahead[:, :NEXT], courses.aside[:, :NEXT]
-    room = near.room(
-        x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside
-    )
+    px, py = x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside
+    room = near.room(px, py)
     slow = np.abs(courses.pairs).max(axis=1) < 0.7
     value = room[:, -1] + np.minimum(room.min(axis=1) - float(room[0, 0]), 0.0)
     return courses.pairs[int(np.where(slow, value, -np.inf).argmax())]
 
 
-def is_stuck(x, y):
-    """Whether the robot has stayed in one place."""
-    STATE["trail"] = [*STATE["trail"][-WAIT:], (x, y)]
-    if len(STATE["trail"]) <= WAIT or np.ptp(STATE["trail"], axis=0).max() > STUCK:
-        return False
-    STATE["trail"] = []
-    return True
-
-
 def search(maps, x, y):
-    """Goes around the goal in rings, if it is not where it is believed.
+    """Chooses where to drive, of the places where the goal may be.
 
-    A robot that gets no further tries the next place, or far from the goal passages
-    with more room.
+    The goal is none of the places that the robot has reached by its own belief.
     """
+    places, chance = STATE["places"], STATE["chance"]
     gap = math.hypot(x - maps.goal[0], y - maps.goal[1])
-    stuck = is_stuck(x, y)
-    if stuck and gap > NEARBY:
-        STATE["strict"] = STATE["steps"] + PATIENCE
-    if gap > 0.5 * TOLERANCE and not (stuck and gap <= NEARBY):
+    STATE["tries"] += gap < NEARBY
+    reached = np.hypot(*(places - (x, y)).T) < 0.7 * TOLERANCE
+    if STATE["tries"] > TRIES:
+        STATE["tries"] = 0
+        reached |= np.hypot(*(places - maps.goal).T) < 0.7 * TOLERANCE
+    if not reached.any():
         return
-    gx, gy = STATE["goal"]
-    if not STATE["goals"]:
-        for ring in range(1, 8):
-            count = 6 * ring
-            for k in range(count):
-                angle = 2.0 * math.pi * k / count
-                away = 1.2 * TOLERANCE * ring
-                STATE["goals"].append(
-                    (gx + away * math.cos(angle), gy + away * math.sin(angle))
-                )
-    maps.goal = list(STATE["goals"].pop(0))
-    maps.age = 99
+    chance[reached] = 0.0
+    if not chance.any():
+        chance[:] = 1.0
+    apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1))
+    worth = (apart < TOLERANCE) @ chance / (TOLERANCE + np.hypot(*(places - (x, y)).T))
+    worth[chance == 0.0] = 0.0
+    target = places[int(worth.argmax())].tolist()
+    if target != maps.goal:
+        maps.goal, maps.stale, STATE["tries"] = target, True, 0
 
 
 def expected(pose, gains, queue):
@@ -748,14 +737,20 @@ def policy(obs):
     courses = STATE["courses"]
     if abs(courses.step - best * STEP) > 0.03 * STEP:
         courses = STATE["courses"] = Courses(best * STEP)
-    search(maps, x, y)
+    if math.hypot(x - STATE["place"][0], y - STATE["place"][1]) > MOVED:
+        STATE["place"], STATE["waits"] = (x, y), 0
+    STATE["waits"] += 1
+    if STATE["waits"] > WAIT:
+        STATE["waits"], STATE["strict"] = 0, STATE["steps"] + PATIENCE
     x, y, heading, slipped = expected((x, y, heading), gains, STATE["queue"])
+    search(maps, x, y)
     maps.age += 1
-    if maps.age > 3 or STATE["steps"] < 3:
+    if maps.age > maps.rest + (0 if maps.stale or STATE["steps"] < 3 else 3):
         maps.plan(x, y, LOOSE if STATE["steps"] > STATE["strict"] else STRICT)
         if not np.isfinite(maps.cost[maps.cell(x, y)]):
             maps.plan(x, y, 2.0 * LOOSE)
-        maps.age = 0
+        maps.age, maps.stale = 0, False
+        maps.rest = int(np.isfinite(maps.cost).sum()) // 6000
     pair = chosen(maps, courses, x, y, heading, math.hypot(UNSURE, slipped))
     left, right = commands(pair, gains, best)
     STATE["queue"] = [*STATE["queue"], (left, right)][1 if DELAY else 0 :][:DELAY]
@@ -765,13 +760,14 @@ def policy(obs):
 def chosen(maps, courses, x, y, heading, unsure):
     """Speeds of the wheels, as fractions of the robot's best speed."""
     near = Near(maps, x, y)
+    near.margin = MARGIN - BOLDER * min(max(STATE["waits"] - 6, 0), 10)
     slack = SLACK + 0.4 * max(maps.looks - 2, 0)
     price, pair, unseen = best_arc(near, courses, x, y, heading, slack, unsure)
     other, line, hidden = best_line(near, courses, x, y, heading, slack, unsure)
     if other < price:
         price, pair, unseen = other, line, hidden
     if not math.isfinite(price):
-        maps.age = 99
+        maps.stale = True
         return away_from_hits(near, courses, x, y, heading)
     if unseen is not None:
         maps.looks += 1
