@@ -114,7 +114,7 @@ def test_rules_and_categories(write, solver):
     assert "Do move." in model.requests[3].prompt
     assert "`task` (this task set)" in model.requests[2].prompt
     book = json.loads((run.folder / "rules.json").read_text())
-    assert book["rules"][0]["evidence"] == ["collision"]
+    assert book["rules"][0]["evidence"] == ["collision with a wall"]
 
 
 def test_no_question_without_episodes_for_its_answer(write):

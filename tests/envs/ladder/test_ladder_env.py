@@ -19,6 +19,7 @@ KEYS = {
     "unknown": {"pose", "goal", "wheel_speeds", "ranges"},
     "lost": {"goal", "wheel_speeds", "ranges", "odometry"},
     "moving": {"pose", "goal", "wheel_speeds", "ranges"},
+    "crowd": {"pose", "goal", "wheel_speeds", "ranges"},
     "epuck": {"goal", "wheel_speeds", "ps", "encoders"},
 }
 LEVELS = sorted(KEYS)

@@ -3,12 +3,15 @@
 from dataclasses import replace
 from pathlib import Path
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from batches import actions, assert_same
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.disturbances import Disturbances
 from tdac_envs.ladder.env import LadderEnv
+from tdac_envs.ladder.orca_driver import OrcaDriver, drive_by_orca
 from tdac_envs.ladder.space_time import earliest_arrival
 from tdac_envs.ladder.task_sets import load_set
 from tdac_envs.ladder.vector import LadderVectorEnv
@@ -174,3 +177,42 @@ class TestPlanner:
         ]
         task = self.task(walls)
         assert earliest_arrival(task) is None
+
+
+class TestDriver:
+    """The privileged driver by ORCA, which admits worlds with a crowd."""
+
+    def test_it_arrives_in_each_world_of_the_level(self):
+        tasks = load_set("crowd")
+        for index in range(4):
+            task, noise = tasks.task("dev", index), tasks.noise("dev", index)
+            assert drive_by_orca(task, tasks.file.errors, noise) is not None
+
+    def test_it_drives_the_episode_of_the_environment(self):
+        """With its people and the gains of its wheels, step by step."""
+        env = gym.make("TDAC-Ladder-v0", level="crowd", split="dev").unwrapped
+        tasks = env.set
+        env.reset(options={"index": 1})
+        steps = drive_by_orca(env.task, tasks.file.errors, tasks.noise("dev", 1))
+        driver, ended, count = OrcaDriver(env), False, 0
+        while not ended:
+            _, _, terminated, truncated, info = env.step(driver.action())
+            ended, count = terminated or truncated, count + 1
+        assert info["is_success"]
+        assert count == steps
+
+    def test_nobody_in_the_way(self):
+        env = Map2DEnv(**TestPlanner.OPTIONS)
+        env.reset(seed=0)
+        steps = drive_by_orca(env.task, Disturbances(), np.random.default_rng(0))
+        assert steps == pytest.approx((160 - env.task.goal_tolerance) / 4, abs=3)
+
+    def test_where_there_is_no_way(self):
+        """It waits in front of a mover that fills the corridor."""
+        cells = np.ones((60, 200), bool)
+        cells[20:41] = False
+        post = {"kind": "route", "points": [[100, 30]], "radius": 9}
+        env = Map2DEnv(**{**TestPlanner.OPTIONS, "map": cells, "movers": [post]})
+        env.reset(seed=0)
+        noise = np.random.default_rng(0)
+        assert drive_by_orca(env.task, Disturbances(), noise) is None
