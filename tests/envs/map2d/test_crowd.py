@@ -6,6 +6,7 @@ import pytest
 from batches import actions, assert_alike
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.space_time import foreseen
 from tdac_envs.ladder.task_sets import load_set
 from tdac_envs.map2d.encounters import fits
 from tdac_envs.map2d.env import Map2DEnv
@@ -255,9 +256,9 @@ def test_segments_surround_what_is_free():
 
 @pytest.mark.slow
 def test_on_many_worlds():
-    """500 generated worlds, 10^7 steps of people: nobody is ever in a wall.
+    """500 generated worlds, 10^7 steps of people and of discs that bounce.
 
-    Liveness and overlaps are those of worlds with room for two to pass.
+    Nobody is ever in a wall.
     """
     tasks = load_set("unknown")
     for index in range(500):
@@ -268,7 +269,31 @@ def test_on_many_worlds():
             start=tuple(task.start[:2]),
             goal=task.goal,
             robot_radius=4.0,
-            movers=[{"kind": "crowd", "count": 20, "radius": 3, "speed": 20}],
+            movers=[
+                {"kind": "crowd", "count": 15, "radius": 3, "speed": 20},
+                {"kind": "bounce", "count": 5, "radius": 4, "speed": 40},
+            ],
         )
         walk = Walk(env, seed=index, steps=1000)
         assert walk.inside == 0
+
+
+@pytest.mark.slow
+def test_people_of_the_level_walk():
+    """1,000 steps in 40 worlds of the level `crowd`: the figures that are promised."""
+    tasks, speeds, deep, stood = load_set("crowd"), [], [], []
+    for index in range(40):
+        task = tasks.task("train", index)
+        own = task.movers.traits
+        at = foreseen(task, 1000)
+        steps = np.hypot(*np.moveaxis(np.diff(at, axis=0), 2, 0))
+        speeds += (steps.mean(axis=0) / (own[:, SPEED] * task.dt)).tolist()
+        reach = own[:, RADIUS] + own[:, RADIUS, None]
+        np.fill_diagonal(reach, -np.inf)
+        far = np.hypot(*np.moveaxis(at[:, :, None] - at[:, None], 3, 0))
+        deep += ((reach - far).max(axis=2) > 0.05 * own[:, RADIUS]).ravel().tolist()
+        longest = [np.ptp(at[k : k + 300], axis=0).max(1) for k in range(0, 701, 10)]
+        stood += (np.min(longest, axis=0) < own[:, RADIUS]).tolist()
+    assert np.median(speeds) >= 0.6
+    assert np.mean(deep) <= 1e-3
+    assert np.mean(stood) < 0.02
