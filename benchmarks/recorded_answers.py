@@ -18,6 +18,7 @@ scores of each level, and the pairs whose paired intervals say opposite things.
 from __future__ import annotations
 
 import argparse
+import hashlib
 from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
@@ -84,12 +85,14 @@ def _driven(
 ) -> SetReport:
     """The report of an entrant, which an interrupted run may have kept."""
     tasks = load_set(level)
+    raw = source.encode("utf-8", "surrogatepass")
     file = kept / REPORT_FILE
     if file.is_file():
         report = SetReport.model_validate_json(file.read_bytes())
-        if (report.worlds, report.provenance.set_sha256) == (worlds, tasks.sha256):
+        own = report.provenance.set_sha256, report.provenance.controller_sha256
+        same = own == (tasks.sha256, hashlib.sha256(raw).hexdigest())
+        if same and report.worlds == worlds:
             return report
-    raw = source.encode("utf-8", "surrogatepass")
     return verify_on_set(
         raw, tasks, "hidden", worlds, salt_file=salt, out=kept, judge=warm
     )
