@@ -70,7 +70,15 @@ from tdac_envs.map2d.kernels import (
     observe,
 )
 from tdac_envs.map2d.rays import LeapGrid
-from tdac_envs.movers.state import STANDING_SECONDS, TIME, hold, stop
+from tdac_envs.movers.state import (
+    MOST_ARCS,
+    MOST_PIECES,
+    N_PIECE,
+    STANDING_SECONDS,
+    TIME,
+    hold,
+    stop,
+)
 from tdac_envs.movers.walls import Cells
 
 N_ROBOT = 11
@@ -329,8 +337,16 @@ def step_rows_among(batch: Words, rows: Words) -> None:
     outcomes = plane(batch[4], np.float64)
     poses, speeds = plane(batch[5], np.float32), plane(batch[6], np.float32)
     ranges = plane(batch[7], np.float32)
+    # Motion within a step is written to the same memory for one robot after the other,
+    # so that it stays in the processor's cache.
+    most = 0
     for row in rows:
-        own, movers = arrays_at(words[row]), _movers_at(words[row])
+        most = max(most, _movers_at(words[row])[0].shape[0])
+    pieces = np.empty((most, MOST_PIECES + 2, N_PIECE))
+    path = np.empty((MOST_ARCS, N_PIECE))
+    for row in rows:
+        own, all_movers = arrays_at(words[row]), _movers_at(words[row])
+        movers: Any = all_movers[:3] + (pieces, path) + all_movers[5:]  # noqa: RUF005
         give_command(over[row], commands[row], starts[row], own[STATE], own[OUTCOME])
         if over[row]:
             _begin(own, movers)

@@ -42,13 +42,13 @@ def follow_route(
     while drives and row < MOST_PIECES - 1:
         to_x, to_y = points[first + goal, 0], points[first + goal, 1]
         off_x, off_y = to_x - x, to_y - y
-        far = math.sqrt(off_x * off_x + off_y * off_y)
+        far, rest = math.sqrt(off_x * off_x + off_y * off_y), 1.0 - time
+        scale = length / far if far > 0.0 else 0.0
+        rate_x, rate_y = scale * off_x, scale * off_y
         if far > 0.0:
-            rate_x, rate_y = length * off_x / far, length * off_y / far
             row = begin_piece(pieces, m, row, time, x, y, rate_x, rate_y, float(goal))
-        rest = (1.0 - time) * length
-        if far > rest:
-            end_pieces(pieces, m, row, x + rest * off_x / far, y + rest * off_y / far)
+        if far > rest * length:
+            end_pieces(pieces, m, row, x + rest * rate_x, y + rest * rate_y)
             return
         x, y, time = to_x, to_y, min(time + far / length, 1.0)
         goal = (goal + 1) % count
