@@ -2,9 +2,11 @@
 
 A Kalman filter adds up the angles of the wheels, and corrects the pose by the
 directions of the walls, which are all parallel or at right angles to each other. What
-the infra-red sensors hit, and where their rays and the body found nothing, is kept in a
-map of the robot's own; its way leads to the goal as if all that is unknown were free.
-The robot drives only where its rays have been: they are few, so it looks around for it.
+the infra-red sensors hit is kept in a map of the robot's own. Runs of hits along the
+walls are plates: they are taken to go on until a ray finds nothing there, and believed
+to go on up to the next plate across. A search finds the way to the goal that is
+cheapest if all else is free, and the robot drives straight to the farthest point of it
+that it can, along the arc that leads there best and leaves room.
 """
 
 import heapq
@@ -44,20 +46,33 @@ FLAT = 0.987  # length on the floor of a ray of length 1
 SEEN = 84.0  # a lower reading may be noise
 CLEAR = 0.06  # m that a ray without a hit is free
 SIDES = (2, 5)  # sensors that look to the sides
-AHEAD = (-0.31, 0.31, -0.83, 0.83)  # bearings at which sensors ahead look
 
 FINE = 0.01  # m, cells of hits and of free space
 CELL = 0.015  # m, cells of the search
 HALF = 3.2  # m from the start to the borders of the maps
-KEEP = 0.005  # m that are kept from hits in the search
-NEAR = 0.03  # m from the body in which a cell costs more
-PRICE = 1.5  # how much more
+# How much more a place costs in the search whose body would be so near to a hit, m.
+BELTS = (
+    (0.002, 300.0),
+    (0.006, 8.0),
+    (0.010, 5.0),
+    (0.015, 3.0),
+    (0.02, 1.5),
+    (0.025, 0.7),
+    (0.032, 0.3),
+)
 WIDE = 0.009  # m beside a ray that count as seen
-LOOK = 0.07  # m ahead on the path
-MARGIN = 0.006  # m that arcs keep from hits
-BEYOND = 0.02  # m that a wall is taken to go on beyond its last hit
+LOOK = 0.25  # m ahead on the path
+MARGIN = 0.009  # m that arcs keep from hits
+BEYOND = 0.02  # m that a thing is taken to go on beyond its last hit
+PLATE = 0.05  # m that a plate is taken to go on beyond its last hit
+LEAST, MOST = 0.22, 0.3  # m, widths of passages
+SIDE = 2.03  # m, longest side of the floor
+TIGHT = 1  # belt whose hits on the path call for another path
+REPLAN = 5  # steps after which a path is looked for anew
+DOUBT = 4.0  # how much more a place costs where a plate is believed to go on
+UNKNOWN = 0.3  # how much more a place costs that no ray has seen
 AGAIN = 0.02  # m that a spin back costs
-RISK, SAFE = 0.25, 0.02  # m that a contact costs; m of room in which it is a third
+RISK, SAFE = 0.06, 0.012  # m that a contact costs; m of room in which it is a third
 
 
 def wrapped(angle, turn=2.0 * math.pi):
@@ -162,7 +177,10 @@ class Maps:
         hits: Place and time of the last hit in each cell.
         passed: Cells that a ray has passed.
         free: Which cells rays and body have found free.
-        block, close: Numbers of hits that a body at a place would touch, or be near to.
+        belts: Numbers of hits that a body at a place would be nearer to than each of
+            `BELTS`.
+        plates: Pieces of plates: axis, place across, and both ends.
+        part: Rows and columns in which the last search was.
     """
 
     def __init__(self):
@@ -171,9 +189,10 @@ class Maps:
         side = int(2 * HALF / FINE)
         self.free = np.zeros((side, side), bool)
         cells = int(2 * HALF / CELL)
-        self.block = np.zeros((cells, cells), np.int16)
-        self.close = np.zeros((cells, cells), np.int16)
-        span = int((RADIUS + NEAR) / CELL) + 2
+        self.belts = np.zeros((len(BELTS), cells, cells), np.int16)
+        self.plates = []
+        self.part = slice(0, cells), slice(0, cells)
+        span = int((RADIUS + BELTS[-1][0]) / CELL) + 2
         self.span = np.arange(-span, span + 1)
         reach = int(RADIUS / FINE) + 1
         i, j = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
@@ -188,8 +207,8 @@ class Maps:
         dy = (j + 0.5) * CELL - HALF - point[1]
         far = np.hypot(dx[None, :], dy[:, None])
         part = np.ix_(j, i)
-        self.block[part] += sign * (far < RADIUS + KEEP)
-        self.close[part] += sign * (far < RADIUS + NEAR)
+        for belt, (room, _) in zip(self.belts, BELTS, strict=True):
+            belt[part] += sign * (far < RADIUS + room)
 
     def hit(self, point, now, faint=False):
         """Keeps a hit; a faint one is a guess."""
@@ -241,10 +260,11 @@ class Maps:
                 if key in self.hits:
                     self.drop(key)
 
-    def trust(self, x, y):
-        """Takes what is near for free, unless something was hit there."""
-        i, j = int((x + HALF) / FINE), int((y + HALF) / FINE)
-        self.free[j - 10 : j + 11, i - 10 : i + 11] = True
+    def forget(self, place, reach, before):
+        """Forgets the hits about a place that are older than a time."""
+        for key, ((x, y), time) in list(self.hits.items()):
+            if time < before and math.dist((x, y), place) < reach:
+                self.drop(key)
 
     def around(self, x, y, reach):
         """Hits within a square, shape (n, 2)."""
@@ -255,46 +275,113 @@ class Maps:
         ]
         return np.array(found).reshape(-1, 2)
 
-    def path(self, start, goal):
-        """Points of the cheapest way, if all unknown space is free; None if none."""
-        cells = self.block.shape[0]
-        si, sj = (int((c + HALF) / CELL) for c in start)
-        gi, gj = (int((c + HALF) / CELL) for c in goal)
-        blocked, close = self.block > 0, self.close > 0
-        best, came = {(si, sj): 0.0}, {}
-        heap = [(math.hypot(gi - si, gj - sj), si, sj)]
+    def plate(self, axis, across, low, high):
+        """Keeps a piece of a plate: its axis, its place across, and its ends."""
+        for old in self.plates:
+            same = old[0] == axis and abs(old[1] - across) < 0.025
+            if same and low < old[3] + 0.06 and high > old[2] - 0.06:
+                old[1:] = [across, min(low, old[2]), max(high, old[3])]
+                return
+        self.plates.append([axis, across, low, high])
+
+    def prices(self, grid, seen):
+        """Price of each place: hits, plates that go on, and the sides of the floor.
+
+        Args:
+            grid: Direction of the walls, rad, or None.
+            seen: Places that are surely on the floor, shape (n, 2).
+        """
+        side = self.belts.shape[1]
+        price = np.full((side, side), 1000.0)
+        hits = np.array([hit[0] for hit in self.hits.values()]).reshape(-1, 2)
+        places = np.concatenate([seen, hits])
+        low = ((places.min(axis=0) - 0.4 + HALF) / CELL).astype(int).clip(0, side)
+        high = ((places.max(axis=0) + 0.4 + HALF) / CELL).astype(int).clip(0, side)
+        part = slice(low[1], high[1]), slice(low[0], high[0])
+        self.part = part
+        rows, columns = (
+            ((np.arange(c.start, c.stop) + 0.5) * CELL / FINE).astype(int) for c in part
+        )
+        price[part] = 1.0 + UNKNOWN * ~self.free[np.ix_(rows, columns)]
+        for belt, (_, more) in zip(self.belts, BELTS, strict=True):
+            price[part] = np.maximum(price[part], (1.0 + more) * (belt[part] > 0))
+        if grid is None:
+            return price
+        ahead = np.array([math.cos(grid), math.sin(grid)])
+        across = np.array([-ahead[1], ahead[0]])
+        for x, y in self.doubtful(ahead, across):
+            i, j = int((x + HALF) / CELL), int((y + HALF) / CELL)
+            near = price[j - 2 : j + 3, i - 2 : i + 3]
+            np.maximum(near, 1.0 + DOUBT, out=near)
+        rows, columns = ((np.arange(c.start, c.stop) + 0.5) * CELL - HALF for c in part)
+        for way in ahead, across:
+            places = seen @ way
+            far = way[0] * columns[None, :] + way[1] * rows[:, None]
+            out = (far < places.max() - SIDE) | (far > places.min() + SIDE)
+            price[part] += 1000.0 * out
+        return price
+
+    def doubtful(self, ahead, across):
+        """Unseen places where plates go on, if they end at the next plate across."""
+        found = []
+        for axis, place, low, high in self.plates:
+            along, other = (across, -ahead) if axis else (ahead, across)
+            lines = [p[1] if axis else -p[1] for p in self.plates if p[0] != axis]
+            for end, sign in (low, -1.0), (high, 1.0):
+                ways = [sign * (line - end) for line in lines]
+                ways = [way for way in ways if -0.02 < way < MOST]
+                most = min(ways, default=max(0.5 * (LEAST - high + low), 0.03))
+                steps = FINE * np.arange(1, int(most / FINE) + 1)
+                points = np.outer(end + sign * steps, along) + place * other
+                i, j = ((points + HALF) / FINE).astype(int).T
+                found += points[~self.free[j, i]].tolist()
+        return found
+
+    def path(self, start, goal, price):
+        """Points of the cheapest way, if all unknown space is free; and its price."""
+        low_j, low_i = (c.start for c in self.part)
+        flat = price[self.part]
+        count, cells = flat.shape
+        flat = flat.ravel().tolist()
+        (si, sj), (gi, gj) = (
+            (int((x + HALF) / CELL) - low_i, int((y + HALF) / CELL) - low_j)
+            for x, y in (start, goal)
+        )
+        first = sj * cells + si
+        best, came = {first: 0.0}, {}
+        heap = [(math.hypot(gi - si, gj - sj), first)]
         near = TOLERANCE * 0.6 / CELL
         done = set()
+        steps = [(j * cells + i, size) for i, j, size in NEIGHBOURS]
         while heap:
-            _, i, j = heapq.heappop(heap)
-            if (i, j) in done:
+            _, at = heapq.heappop(heap)
+            if at in done:
                 continue
-            done.add((i, j))
-            if math.hypot(gi - i, gj - j) <= near and not blocked[j, i]:
-                way = [(i, j)]
+            done.add(at)
+            j, i = divmod(at, cells)
+            if math.hypot(gi - i, gj - j) <= near and flat[at] < 100.0:
+                way = [at]
                 while way[-1] in came:
                     way.append(came[way[-1]])
                 way.reverse()
-                return (np.array(way) + 0.5) * CELL - HALF
-            here = best[i, j]
-            for di, dj, size in NEIGHBOURS:
-                u, v = i + di, j + dj
-                if not (1 <= u < cells - 1 and 1 <= v < cells - 1) or (u, v) in done:
+                places = np.array(
+                    [(k % cells + low_i, k // cells + low_j) for k in way]
+                )
+                return (places + 0.5) * CELL - HALF, best[at]
+            if not (1 <= i < cells - 1 and 1 <= j < count - 1):
+                continue
+            here, mine = best[at], flat[at]
+            for step, size in steps:
+                to = at + step
+                if to in done:
                     continue
-                price = 1.0
-                if blocked[v, u]:
-                    if max(abs(u - si), abs(v - sj)) > 2:
-                        continue
-                    price = 8.0
-                elif close[v, u]:
-                    price += PRICE
-                cost = here + size * price
-                if cost < best.get((u, v), math.inf):
-                    best[u, v] = cost
-                    came[u, v] = (i, j)
-                    rest = math.hypot(gi - u, gj - v)
-                    heapq.heappush(heap, (cost + rest, u, v))
-        return None
+                cost = here + 0.5 * size * (mine + flat[to])
+                if cost < best.get(to, math.inf):
+                    best[to] = cost
+                    came[to] = at
+                    v, u = divmod(to, cells)
+                    heapq.heappush(heap, (cost + math.hypot(gi - u, gj - v), to))
+        return None, math.inf
 
 
 NEIGHBOURS = [
@@ -338,11 +425,6 @@ def courses():
 
 SPEEDS, PLACES = courses()
 SPINS = np.where(SPEEDS.prod(axis=1) < 0.0, SPEEDS[:, 1] - SPEEDS[:, 0], 0.0)
-# The rim of the body, in which nothing may be that no ray has seen.
-BEARINGS = np.linspace(-1.5, 1.5, 13)
-RINGS = np.repeat([RADIUS + 0.002, 0.7 * RADIUS], len(BEARINGS))
-RIM_X = RINGS * np.tile(np.cos(BEARINGS), 2)
-RIM_Y = RINGS * np.tile(np.sin(BEARINGS), 2)
 STATE = {}
 
 
@@ -360,9 +442,12 @@ def reset(obs):
         age=99,
         ends=[None] * 8,
         now=0,
-        looks=0,
         trail=[],
         spin=0.0,
+        runs=[[] for _ in range(8)],
+        visited=[(0.0, 0.0)],
+        price=None,
+        dropped=-99,
     )
 
 
@@ -396,7 +481,7 @@ def aim_around(x, y):
     if stuck:
         STATE["trail"] = []
         if gap > 0.3:
-            STATE["maps"].trust(x, y)
+            STATE["maps"].forget((x, y), 0.2, STATE["now"] - 10)
             return
     if not STATE["goals"]:
         gx, gy = STATE["goal"]
@@ -415,38 +500,95 @@ def plan(x, y):
     """Looks for the way to the goal, when there is need."""
     maps, path = STATE["maps"], STATE["path"]
     STATE["age"] += 1
-    if path is not None and STATE["age"] < 40:
+    if path is not None and STATE["age"] < REPLAN:
         i, j = ((path + HALF) / CELL).astype(int).T
-        gaps = np.hypot(path[:, 0] - x, path[:, 1] - y)
-        if not (maps.block[j, i][3:] > 0).any() and gaps.min() < 0.04:
-            return
-        if STATE["age"] < 2:
+        if int((maps.belts[TIGHT][j, i] > 0).sum()) <= STATE["tight"]:
             return
     STATE["age"] = 0
-    found = maps.path((x, y), STATE["aim"])
-    if found is None:
+    grid = STATE["pose"].grid
+    seen = np.array([*STATE["visited"], STATE["goal"], (x, y)])
+    price = STATE["price"] = maps.prices(grid, seen)
+    found, cost = maps.path((x, y), STATE["aim"], price)
+    if cost > 900.0 and STATE["now"] - STATE["dropped"] > 40:
+        STATE["dropped"] = STATE["now"]
         old = sorted(maps.hits, key=lambda key: maps.hits[key][1])
         for key in old[: max(len(old) // 4, 1)] if old else []:
             maps.drop(key)
+        maps.plates = []
         if STATE["goals"]:
             STATE["aim"] = STATE["goals"].pop(0)
-        found = maps.path((x, y), STATE["aim"])
     STATE["path"] = found
+    if found is not None:
+        i, j = ((found + HALF) / CELL).astype(int).T
+        STATE["tight"] = int((maps.belts[TIGHT][j, i] > 0).sum())
 
 
 def target(x, y):
-    """The point of the path that is aimed at."""
-    path = STATE["path"]
+    """The farthest point of the path that a straight drive reaches as cheaply."""
+    path, price = STATE["path"], STATE["price"]
     if path is None or len(path) < 2:
         return STATE["aim"]
     gaps = np.hypot(path[:, 0] - x, path[:, 1] - y)
-    first = int(gaps.argmin())
-    ahead = first
-    while ahead + 1 < len(path) and gaps[ahead] < LOOK:
-        ahead += 1
-    if ahead + 1 == len(path):
+    first = int(gaps[:20].argmin())
+    i, j = ((path + HALF) / CELL).astype(int).T
+    sizes = np.hypot(*np.diff(path[first:], axis=0).T)
+    costs = price[j, i][first:]
+    sums = np.concatenate([[0.0], np.cumsum(sizes * 0.5 * (costs[1:] + costs[:-1]))])
+    last = min(len(path) - 1, first + int(LOOK / CELL))
+    for k in range(last, first + 2, -2):
+        far = math.hypot(path[k, 0] - x, path[k, 1] - y)
+        if far > LOOK:
+            continue
+        share = np.linspace(0.0, 1.0, max(int(far / 0.01), 2))
+        i = ((x + share * (path[k, 0] - x) + HALF) / CELL).astype(int)
+        j = ((y + share * (path[k, 1] - y) + HALF) / CELL).astype(int)
+        if price[j, i].mean() * far <= sums[k - first] * 1.1 + 0.015:
+            break
+    else:
+        k = min(first + 3, len(path) - 1)
+    if k == len(path) - 1:
         return STATE["aim"]
-    return path[ahead].tolist()
+    return path[k].tolist()
+
+
+def plates(ends, hit):
+    """Takes runs of hits along the walls for plates, which go on for a little."""
+    maps, grid = STATE["maps"], STATE["pose"].grid
+    for k in range(8):
+        run = STATE["runs"][k]
+        if not hit[k]:
+            run.clear()
+            continue
+        here = ends[k].tolist()
+        gap = math.dist(here, run[-1]) if run else 1.0
+        if gap > 0.025:
+            run.clear()
+        if gap > 0.003:
+            run.append(here)
+        del run[:-8]
+        if grid is None or len(run) < 4 or math.dist(run[-1], run[0]) < 0.03:
+            continue
+        at = np.array(run)
+        off = at - at.mean(axis=0)
+        angle = 0.5 * math.atan2(
+            2.0 * float(off[:, 0] @ off[:, 1]),
+            float(off[:, 0] @ off[:, 0] - off[:, 1] @ off[:, 1]),
+        )
+        if abs(wrapped(angle - grid, 0.5 * math.pi)) > 0.15:
+            continue
+        axis = round((angle - grid) / (0.5 * math.pi)) % 2
+        way = grid + axis * 0.5 * math.pi
+        cosine, sine = math.cos(way), math.sin(way)
+        across = at @ np.array([-sine, cosine])
+        if across.std() > 0.003:
+            continue
+        along = at @ np.array([cosine, sine])
+        low, high, middle = float(along.min()), float(along.max()), float(across.mean())
+        maps.plate(axis, middle, low, high)
+        for n in range(1, int(PLATE / FINE) + 1):
+            for u in low - n * FINE, high + n * FINE:
+                x, y = u * cosine - middle * sine, u * sine + middle * cosine
+                maps.hit((x, y), STATE["now"] - 4, faint=True)
 
 
 def policy(obs):
@@ -482,7 +624,10 @@ def policy(obs):
             dx, dy = (BEYOND / gap * (a - b) for a, b in zip(here, last, strict=True))
             for place in (here[0] + dx, here[1] + dy), (last[0] - dx, last[1] - dy):
                 maps.hit(place, STATE["now"] - 4, faint=True)
+    plates(ends, hit)
     x, y, heading = pose.pose
+    if STATE["now"] % 8 == 0:
+        STATE["visited"].append((x, y))
     aim_around(x, y)
     plan(x, y)
     return chosen(x, y, heading)
@@ -508,57 +653,18 @@ def chosen(x, y, heading):
     tx, ty = target(x, y)
     gap = np.hypot(tx - px, ty - py)
     bearing = np.abs(np.angle(np.exp(1j * (np.arctan2(ty - py, tx - px) - facing))))
-    worth = gap + 0.012 * bearing + 0.004 * TIMES / 7.0
+    worth = gap + 0.004 * bearing + 0.004 * TIMES / 7.0
     worth = np.where(fits, worth, np.inf)
     price = worth[:, 3:].min(axis=1)
     price = price + RISK * np.exp(-np.maximum(room[:, :4].min(axis=1), 0.0) / SAFE)
     back = SPEEDS.sum(axis=1) < -0.1
     price = price + 0.05 * back + AGAIN * (SPINS * STATE["spin"] < 0.0)
-    rx, ry, unseen = swept(px[:, :2], py[:, :2], facing[:, :2], back)
-    hidden = unseen.any(axis=(1, 2))
-    price = price + 0.03 * hidden
     k = int(price.argmin())
     if not math.isfinite(price[k]):
         STATE["path"] = None
         return escape(room)
-    if hidden[k]:
-        at_x, at_y = rx[k][unseen[k]][0], ry[k][unseen[k]][0]
-        return look(math.atan2(at_y - y, at_x - x) - heading, rx[k], ry[k])
-    if SPEEDS[k].sum() > 0.1:
-        STATE["looks"] = 0
     STATE["spin"] = float(SPINS[k])
     return float(SPEEDS[k, 0]), float(SPEEDS[k, 1])
-
-
-def swept(px, py, facing, back):
-    """The front of the body in the next steps: places, and which no ray has seen."""
-    ahead = facing + np.where(back, math.pi, 0.0)[:, None]
-    cos, sin = np.cos(ahead)[..., None], np.sin(ahead)[..., None]
-    rx = px[..., None] + cos * RIM_X - sin * RIM_Y
-    ry = py[..., None] + sin * RIM_X + cos * RIM_Y
-    i, j = ((rx + HALF) / FINE).astype(int), ((ry + HALF) / FINE).astype(int)
-    moves = np.abs(SPEEDS.sum(axis=1)) >= 0.05
-    return rx, ry, ~STATE["maps"].free[j, i] & moves[:, None, None]
-
-
-def look(place, rx, ry):
-    """Speeds of a turn that points a sensor at an unseen place.
-
-    Args:
-        place: Its bearing, rad.
-        rx: x of all that is wanted to be seen; it is taken for free after some looks.
-        ry: y of it.
-    """
-    STATE["looks"] += 1
-    if STATE["looks"] > 5:
-        i, j = ((rx + HALF) / FINE).astype(int), ((ry + HALF) / FINE).astype(int)
-        STATE["maps"].free[j, i] = True
-        STATE["looks"] = 2
-    turn = min((wrapped(place - azimuth) for azimuth in AHEAD), key=abs)
-    share = min(max(turn * AXLE / (2.0 * STEP), -1.0), 1.0)
-    if abs(share) < 0.05:
-        share = math.copysign(0.05, share)
-    return -share, share
 
 
 def escape(room):
