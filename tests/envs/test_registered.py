@@ -49,6 +49,7 @@ VARIANTS = [
             ],
         },
     ),
+    ("TDAC-Map2D-v0", {"map": "office", "movers": "crowd:6"}),
     (
         "TDAC-EPuck-v0",
         {
@@ -68,6 +69,7 @@ VARIANTS = [
     ("TDAC-EPuck-v0", {"world": "maze", "variation": "mixed"}),
     ("TDAC-Ladder-v0", {"level": "known", "split": "test"}),
     ("TDAC-Ladder-v0", {"level": "lost", "split": "dev"}),
+    ("TDAC-Ladder-v0", {"level": "crowd", "split": "dev"}),
 ]
 variants = pytest.mark.parametrize(("name", "options"), VARIANTS)
 every_env = pytest.mark.parametrize("name", IDS)
