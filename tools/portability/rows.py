@@ -50,6 +50,7 @@ ROWS = {
     "qemu-haswell": Row(emulated.haswell, "rollout on an emulated Haswell"),
     "qemu-aarch64": Row(emulated.aarch64, "rollout on an emulated aarch64"),
     "nojit": Row(suites.nojit, "kernel tests with NUMBA_DISABLE_JIT=1"),
+    "bounds": Row(suites.bounds, "kernel tests with NUMBA_BOUNDSCHECK=1"),
     "busy": Row(suites.busy, "make test beside four busy loops", False),
 }
 

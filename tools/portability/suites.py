@@ -14,6 +14,12 @@ from walls import hidden
 BUSY_LOOPS = 4
 # Only some tests of each kind of compiled function, because plain Python is slow.
 KERNELS = "tests/envs/map2d/test_kernels.py"
+MOVERS = (
+    "tests/envs/map2d/test_movers.py",
+    "tests/envs/map2d/test_crowd.py",
+    "tests/envs/map2d/test_encounters.py",
+    "tests/envs/ladder/test_moving.py",
+)
 
 
 def temporary(place: Place) -> str:
@@ -40,6 +46,14 @@ def busy_loops(number: int) -> Iterator[None]:
         for loop in loops:
             loop.kill()
             loop.wait()
+
+
+def bounds(place: Place) -> str:
+    """Tests of kernels and movers, compiled so that each index is checked."""
+    tests = [place.python, "-m", "pytest", "-q", "-m", "not slow", KERNELS, *MOVERS]
+    return counted(
+        run(tests, cwd=place.tree, env=own_environment(NUMBA_BOUNDSCHECK="1"))
+    )
 
 
 def nojit(place: Place) -> str:
