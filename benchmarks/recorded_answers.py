@@ -5,7 +5,7 @@
 
 `judge` reads ANSWERS/LEVEL/NAME/reply.md, extracts each file as `tdac synth` does, and
 drives it and `builtin` on the first N hidden worlds of a salt, which it draws and keeps
-in OUT/sealed. Among movers, it also drives our controller of a level without movers. A
+in OUT/sealed. Among movers, it also drives `builtin` without what it sees of them. A
 program that no model wrote is ANSWERS/LEVEL/NAME/controller.py. After an interruption,
 the same command continues. At the end the salt is revealed: OUT has `salt.hex`,
 `results.csv` with a row for each file, and `worlds.csv` with a row for each episode.
@@ -41,8 +41,9 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.ladder.task_sets import load_set
 
 BUILTIN = "builtin"
-STATIC = {"moving": "unknown", "crowd": "known"}
-"""Levels whose controllers know nothing of movers: they drive there, too."""
+BLIND = "builtin, blind to movers"
+SEEN = {"moving": 'STATE["discs"], pose)', "crowd": 'STATE["people"], pose)'}
+"""What `builtin` knows of movers when it chooses an action."""
 RESULTS, WORLDS, SALT = "results.csv", "worlds.csv", "salt.hex"
 FIGURES = ("index", "generator", "outcome", "steps", "time_score", "path_score")
 
@@ -50,9 +51,10 @@ FIGURES = ("index", "generator", "outcome", "steps", "time_score", "path_score")
 def sources(answers: Path, level: str) -> Iterator[tuple[str, str | None]]:
     """Name and source of each entrant of a level; None for an answer without a file."""
     yield BUILTIN, (LEVELS / f"{level}.py").read_text(encoding="utf-8")
-    if level in STATIC:
-        still = STATIC[level]
-        yield f"{BUILTIN} of {still}", (LEVELS / f"{still}.py").read_text("utf-8")
+    if level in SEEN:
+        sighted = (LEVELS / f"{level}.py").read_text(encoding="utf-8")
+        assert SEEN[level] in sighted
+        yield BLIND, sighted.replace(SEEN[level], "[], pose)")
     for file in sorted((answers / level).glob("*/controller.py")):
         yield file.parent.name, file.read_text(encoding="utf-8")
     for reply in sorted((answers / level).glob("*/reply.md")):
