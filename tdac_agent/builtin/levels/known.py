@@ -1,11 +1,11 @@
 """Drives on a map it is given, close to the least time.
 
-The map becomes exact clearances, and these the costs of the way to the goal from every
-pixel. In each step, arcs are tried out: those that touch nothing are ranked by the way
-that is left at their end.
+Turning by a rad takes as long as driving HALF px. At first, the costs of the way to the
+goal, its length and turns, are found: coarsely everywhere, finely near the best way. In
+each step, courses are tried out: of those that touch nothing, the one is driven whose
+costs, and those of the way from its end, are least.
 """
 
-import heapq
 import json
 import math
 
@@ -15,208 +15,286 @@ with open("params.json") as file:
     PARAMS = json.load(file)
 ROBOT = PARAMS["robot"]
 RADIUS, AXLE = ROBOT["radius"], ROBOT["axle_length"]
-DT, TOLERANCE = PARAMS["dt"], PARAMS["goal_tolerance"]
-STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
-MARGIN = 0.06  # px that are kept from walls
-ROOM = 2.0 * RADIUS  # clearance from which a pixel costs nothing extra
-REACH = int(ROOM) + 2
-LOOK, TURN = 6.0, 10.0  # px ahead; px that a turn by a right angle costs
-PRICE = 0.15  # how much more a px beside a wall costs
-# Steps after which an arc is looked at: often in the first ones, which will be driven.
-TIMES = np.array(
-    [0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 5.0, 6.0, 7.0, 8.0]
-)
-SOON = 11  # entries of TIMES up to four steps
-SPIN = 2.0 * STEP / AXLE  # rad of a step on the spot
-# Directions of lines from the heading; the spins into them, forwards or backwards.
-TURNS = np.arange(120) * (2.0 * math.pi / 120)
-SPINS = np.array([(k + 30) % 60 - 30 for k in range(120)]) * (2.0 * math.pi / 120)
-SPIN_PRICES = np.where(SPINS == 0.0, 0.0, STEP * np.maximum(np.abs(SPINS) / SPIN, 1.0))
-LENGTHS = np.arange(1, 33) * 0.75  # px
+HALF = AXLE / 2.0  # px that a turn by a rad costs
+TOLERANCE = 0.998 * PARAMS["goal_tolerance"]
+STEP = ROBOT["max_wheel_speed"] * PARAMS["dt"]  # px at full speed
+MARGIN = 0.02  # px that are kept from walls; also for errors of interpolation
+EDGE = 6  # occupied pixels that are added around the map
+REACH = int(RADIUS) + 4  # px up to which clearances are known
+NEARBY = 2500  # pixels about the way that are searched finely
+BESIDE = 1.5  # px that costs beside the nodes are higher
+FAR = np.float32(1e5)  # costs where there is no way, px
+STEPS, PARTS = 12, 4  # steps of a course, and parts of a step that are looked at
+VARIED = 150  # variations of a course that are tried at a time
 
 
 def clearances(cells):
-    """Distance from each pixel's centre to the nearest obstacle, at most REACH px."""
-    padded = np.pad(cells, REACH, constant_values=True)
-    height, width = cells.shape
-    away = np.full(padded.shape, float(REACH))
-    for k in range(REACH + 1):
-        gap = max(k - 0.5, 0.0)
-        for sign in (-1, 1):
-            away = np.where(
-                np.roll(padded, sign * k, axis=1), np.minimum(away, gap), away
-            )
-    best = np.full((height, width), float(REACH))
-    for k in range(-REACH, REACH + 1):
-        rows = away[REACH + k : REACH + k + height, REACH : REACH + width]
-        best = np.minimum(best, np.hypot(rows, max(abs(k) - 0.5, 0.0)))
-    return best
+    """Distances to the nearest obstacle, at most REACH px, at every half pixel.
+
+    Entry [2 j + 1, 2 i + 1] is that of the centre of pixel (i, j).
+    """
+    far = np.float32(REACH**2)
+    found = np.where(np.pad(cells, REACH, constant_values=True), np.float32(0.0), far)
+    for _ in range(2):  # first along the rows, then along the columns
+        width = found.shape[1] - 2 * REACH
+        best = np.full((found.shape[0], 2 * width + 1), far)
+        for d in range(1 - REACH, REACH):
+            for odd, gap in ((1, max(abs(d) - 0.5, 0.0)), (0, d if d >= 0 else -d - 1)):
+                seen = found[:, REACH + d : REACH + d + width + 1 - odd] + gap * gap
+                np.minimum(best[:, odd::2], seen, out=best[:, odd::2])
+        found = np.ascontiguousarray(best.T)
+    return np.sqrt(found)
 
 
-def passed(dx, dy, width):
-    """Shifts of the pixels that a longer move passes between its ends."""
-    count = max(abs(dx), abs(dy))
-    if count == 1:
-        return ()
-    found = set()
-    for k in range(1, 2 * count):
-        x, y = dx * k / (2 * count), dy * k / (2 * count)
-        for i in (math.floor(x), math.ceil(x)):
-            for j in (math.floor(y), math.ceil(y)):
-                found.add(j * width + i)
-    return tuple(found - {0, dy * width + dx})
+def moves_up_to(longest, apart):
+    """Moves (dx, dy) by heading in [0, pi), with at least `apart` rad between them."""
+    kept = []
+    for _, heading, dx, dy in sorted(
+        (math.hypot(dx, dy), math.atan2(dy, dx), dx, dy)
+        for dx in range(-longest, longest + 1)
+        for dy in range(longest + 1)
+        if math.gcd(dx, dy) == 1 and (dy > 0 or dx > 0)
+    ):
+        if all(apart <= abs(heading - h) <= math.pi - apart for h, _, _ in kept):
+            kept.append((heading, dx, dy))
+    return np.array([(dx, dy) for _, dx, dy in sorted(kept)])
 
 
-def costs_to(goal, clear):
-    """Cost of the way from each pixel to the goal; inf where the body does not fit."""
-    height, width = clear.shape
-    price = 1.0 + PRICE * np.clip((ROOM - clear) / (ROOM - RADIUS), 0.0, 1.0) ** 2
-    free = (clear >= RADIUS + 0.02).ravel().tolist()
-    price, cost = price.ravel().tolist(), [math.inf] * (height * width)
-    start = int(goal[1] + 0.5) * width + int(goal[0] + 0.5)
-    moves = [
-        (dx, dy, dy * width + dx, math.hypot(dx, dy), passed(dx, dy, width))
-        for dx in range(-3, 4)
-        for dy in range(-3, 4)
-        if math.gcd(dx, dy) == 1
-    ]
-    cost[start], queue = 0.0, [(0.0, start)]
-    while queue:
-        so_far, at = heapq.heappop(queue)
-        if so_far > cost[at]:
-            continue
-        y, x = divmod(at, width)
-        # The border is never free, but longer moves could cross it.
-        for dx, dy, shift, length, over in moves:
-            if not (0 <= x + dx < width and 0 <= y + dy < height):
-                continue
-            to = at + shift
-            if not free[to]:
-                continue
-            further = so_far + length * 0.5 * (price[at] + price[to])
-            if further < cost[to] and all(free[at + each] for each in over):
-                cost[to] = further
-                heapq.heappush(queue, (further, to))
-    return np.array(cost).reshape(height, width)
+def headings_of(moves):
+    """The headings of moves, and the angle from each to the next one."""
+    headings = np.arctan2(moves[:, 1], moves[:, 0])
+    return headings, np.diff(headings, append=math.pi)
 
 
-def extended(cost):
-    """The costs, also of pixels a little beyond, so that one can interpolate."""
-    for _ in range(4):
-        padded = np.pad(cost, 1, constant_values=np.inf)
-        height, width = cost.shape
-        around = [
-            padded[j : j + height, i : i + width] + math.hypot(i - 1, j - 1)
-            for i in range(3)
-            for j in range(3)
-        ]
-        cost = np.where(np.isfinite(cost), cost, np.min(around, axis=0))
-    return np.where(np.isfinite(cost), cost, 1e6)
+COARSE, FINE = 2 * moves_up_to(4, 0.1), moves_up_to(12, 0.022)  # in half pixels
+HEADINGS, GAPS = headings_of(FINE)
+TABLE = np.linspace(0.0, math.pi, 2049)  # headings whose neighbours are looked up
+BELOW = np.searchsorted(HEADINGS, TABLE, "right") - 1
+WITHIN = (TABLE - HEADINGS[BELOW]) / GAPS[BELOW]
+
+
+def corners(x, y, width):
+    """The four entries around points in a grid, and the share of each."""
+    i, j = x.astype(np.int32), y.astype(np.int32)
+    u, v, at = x - i, y - j, j * width + i
+    shares = (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v
+    return (at, at + 1, at + width, at + width + 1), shares
 
 
 def between(field, x, y):
-    """The field between pixel centres, by bilinear interpolation."""
-    height, width = field.shape
-    x, y = np.clip(x, 0.0, width - 1.001), np.clip(y, 0.0, height - 1.001)
-    i, j = x.astype(int), y.astype(int)
-    u, v = x - i, y - j
-    top = field[j, i] * (1.0 - u) + field[j, i + 1] * u
-    return top * (1.0 - v) + (field[j + 1, i] * (1.0 - u) + field[j + 1, i + 1] * u) * v
+    """The field between its entries, by bilinear interpolation."""
+    around = zip(*corners(x, y, field.shape[1]), strict=True)
+    return sum(field.ravel()[at] * share for at, share in around)
 
 
-def wheel_pairs():
-    """Actions to try: one wheel at full speed, forward or back, or both slower."""
-    ends = np.concatenate([np.linspace(-1.0, 0.6, 9), np.linspace(0.7, 1.0, 13)])
-    pairs = [(1.0, e) for e in ends] + [(e, 1.0) for e in ends]
-    pairs += [(-a, -b) for a, b in pairs]
-    pairs += [(0.5 * a, 0.5 * b) for a, b in pairs[::4]]
-    return np.array(pairs)
+def links(clear, nodes, numbers, moves):
+    """The nodes after each move from each node, and before it; itself if none."""
+    y, x = np.divmod(nodes, clear.shape[1])
+    room = clear.ravel()[nodes] - RADIUS - MARGIN
+    after = np.tile(np.arange(len(nodes), dtype=np.int32), (len(moves), 1))
+    before = after.copy()
+    for k, (dx, dy) in enumerate(moves):
+        to, length = numbers[nodes + dy * clear.shape[1] + dx], math.hypot(dx, dy) / 2.0
+        fits, count = to >= 0, math.ceil(length / 0.6)
+        tight = np.flatnonzero(fits & (room < length))
+        for n in range(1, count):
+            i, j = x[tight] + dx * n / count, y[tight] + dy * n / count
+            fits[tight] &= between(clear, i, j) >= RADIUS + MARGIN
+        good = np.flatnonzero(fits)
+        after[k, good], before[k, to[good]] = to[good], good
+    return after.ravel(), before.ravel()
 
 
-CLEAR = clearances(np.load("occupancy.npy"))
-COST = np.zeros_like(CLEAR)
+def costs_from(clear, nodes, moves, first, target):
+    """Costs of the ways between a place and all nodes, px.
+
+    The nodes are entries of `clear`. The first costs are those at the place, inf
+    elsewhere: shape (moves or 1, entries). The search ends when the surroundings of
+    the entry `target` are done. Returns the costs for each heading and node, and the
+    numbers of the nodes of all entries, -1 where there is none.
+    """
+    size, count, numbers = len(nodes), len(moves), np.full(clear.size, -1, np.int32)
+    numbers[nodes] = np.arange(size)
+    after, before = links(clear, nodes, numbers, moves)
+    lengths = (0.5 * np.hypot(*moves.T)).astype(np.float32)
+    up = (HALF * headings_of(moves)[1]).astype(np.float32)
+    costs = np.broadcast_to(first[:, nodes], (count, size)).astype(np.float32).ravel()
+    expanded, mark = np.full_like(costs, np.inf), np.zeros(len(costs), np.int32)
+    here = numbers[target] + size * np.arange(count)
+    # What waits is in buckets of a px of costs; the same may be there twice.
+    waiting, level, end = {0: [np.flatnonzero(np.isfinite(costs))]}, 0, math.inf
+    while waiting and level < end:
+        while level in waiting:
+            at = np.concatenate(waiting.pop(level))
+            at = at[costs[at] < expanded[at]]
+            mark[at] = np.arange(len(at))
+            at = at[mark[at] == np.arange(len(at))]
+            cost = expanded[at] = costs[at]
+            k, base = at // size, at // size * size
+            for to, price in (
+                (np.where(k == count - 1, at - base, at + size), up[k]),
+                (np.where(k == 0, at + (count - 1) * size, at - size), up[k - 1]),
+                (after[at] + base, lengths[k]),
+                (before[at] + base, lengths[k]),
+            ):
+                further = cost + price
+                better = further < costs[to]
+                found, further = to[better], further[better]
+                costs[found] = further
+                bucket = further.astype(np.int32)
+                for b in np.flatnonzero(np.bincount(bucket)):
+                    waiting.setdefault(int(b), []).append(found[bucket == b])
+        level += 1
+        if end == math.inf and np.isfinite(costs[here]).any():
+            end = costs[here].min() + HALF * math.pi / 2.0 + 6.0
+    return costs.reshape(count, size), numbers
+
+
+def turn_between(one, other):
+    """Angle between headings, forwards or backwards, rad."""
+    return np.abs((one - other + math.pi / 2.0) % math.pi - math.pi / 2.0)
+
+
+class Way:
+    """The costs of the way to the goal, and the course that is driven."""
+
+    def __init__(self, obs):
+        """Finds the costs, coarsely and then finely about the way."""
+        cells = np.load("occupancy.npy")
+        self.clear = clear = clearances(np.pad(cells, EDGE, constant_values=True))
+        free = (clear >= RADIUS + MARGIN).ravel()
+        y, x = np.indices(clear.shape) * 0.5 - 0.5 - EDGE
+        to_goal = np.hypot(x - obs["goal"][0], y - obs["goal"][1]).ravel()
+        to_start = np.hypot(x - obs["pose"][0], y - obs["pose"][1]).ravel()
+        odd = (np.indices(clear.shape) % 2 == 1).all(axis=0).ravel()
+        pixels = np.flatnonzero(free & odd)
+        start, goal = (pixels[to[pixels].argmin()] for to in (to_start, to_goal))
+        at_goal = np.maximum(to_goal - TOLERANCE, 0.0)[None]
+        at_goal[at_goal > 1.0] = np.inf
+        at_start = np.full((len(COARSE), clear.size), np.inf)
+        ways = headings_of(COARSE)[0]
+        at_start[:, start] = HALF * turn_between(ways, obs["pose"][2])
+        whole, _ = costs_from(clear, pixels, COARSE, at_goal, start)
+        whole += costs_from(clear, pixels, COARSE, at_start, goal)[0]
+        whole = whole.min(axis=0) - whole.min()
+        limit = np.clip(np.sort(whole)[: NEARBY + 1][-1], 2.0, 20.0)
+        inside = np.zeros(clear.size, bool)
+        for k in range(25):
+            shift = (k // 5 - 2) * clear.shape[1] + k % 5 - 2
+            inside[pixels[whole <= limit] + shift] = True
+        nodes = np.flatnonzero(inside & free)
+        start = nodes[to_start[nodes].argmin()]
+        costs, numbers = costs_from(clear, nodes, FINE, at_goal, start)
+        # The last column is for all entries that are no nodes.
+        self.costs = np.minimum(np.insert(costs, len(nodes), FAR, axis=1), FAR)
+        self.numbers = np.where(numbers < 0, len(nodes), numbers)
+        self.course, self.random = COURSES[0], np.random.default_rng(0)
+
+    def on_grid(self, x, y):
+        """Columns and rows of points among the clearances."""
+        height, width = self.clear.shape
+        x = np.clip(2.0 * (x + EDGE) + 1.0, 0.0, width - 1.001)
+        return x, np.clip(2.0 * (y + EDGE) + 1.0, 0.0, height - 1.001)
+
+    def costs_left(self, x, y, heading):
+        """Costs of the way from poses to the goal, px, interpolated."""
+        entry = np.rint(np.mod(heading, math.pi) / TABLE[1]).astype(np.int32)
+        k, weight = BELOW[entry], WITHIN[entry]
+        around, shares = corners(*self.on_grid(x, y), self.clear.shape[1])
+        around, shares = self.numbers[np.stack(around)], np.stack(shares)
+        found = 0.0
+        for layer, part in ((k, 1.0 - weight), ((k + 1) % len(HEADINGS), weight)):
+            costs = self.costs[layer, around]
+            costs = np.minimum(costs, costs.min(axis=0) + BESIDE)
+            found = found + part * (shares * costs).sum(axis=0)
+        return found
+
+    def learn(self, pose, price):
+        """Raises costs about a pose to its price, so that nothing is tried for ever."""
+        lack = price - float(self.costs_left(*pose[:, None])[0])
+        if lack > 0.3:
+            around, _ = corners(*self.on_grid(*pose[:2]), self.clear.shape[1])
+            k = np.flatnonzero(turn_between(HEADINGS, pose[2]) < 0.1)
+            self.costs[k[:, None], self.numbers[list(around)]] += np.float32(lack)
+
+    def best(self, pose, goal, courses, ways, margin):
+        """The course with the least price: steps to the goal. Returns price, course."""
+        cosine, sine = math.cos(pose[2]), math.sin(pose[2])
+        x = pose[0] + cosine * ways[0] - sine * ways[1]
+        y = pose[1] + sine * ways[0] + cosine * ways[1]
+        fits = between(self.clear, *self.on_grid(x, y)) >= RADIUS + margin
+        fits = np.logical_and.accumulate(fits.reshape(len(x), -1), axis=1)
+        left = self.costs_left(x[..., -1], y[..., -1], pose[2] + ways[2][..., -1])
+        left = left / STEP + np.arange(1, STEPS + 1)
+        left = np.where(fits[:, PARTS - 1 :: PARTS], left, np.inf).min(axis=1)
+        away = np.hypot(x - goal[0], y - goal[1]).reshape(fits.shape) - TOLERANCE
+        time = np.arange(1, STEPS * PARTS + 1) / PARTS + away / STEP
+        time = np.where(fits & (away <= 0.0), time, np.inf).min(axis=1)
+        price = np.minimum(left, time)
+        k = int(price.argmin())
+        return float(price[k]), courses[k]
+
+    def varied(self, course):
+        """Courses that differ from one in some successive steps, at full speed."""
+        start = self.random.integers(0, STEPS, VARIED)[:, None]
+        stop = start + self.random.integers(1, 7, VARIED)[:, None]
+        changed = (np.arange(STEPS) >= start) & (np.arange(STEPS) < stop)
+        size = 10.0 ** self.random.uniform(-3.0, 0.0, (VARIED, 1, 1))
+        many = course + size * self.random.normal(size=(VARIED, 1, 2))
+        many /= np.maximum(np.abs(many).max(axis=2, keepdims=True), 1e-6)
+        return np.where(changed[..., None], many, course)
+
+
+def courses_to_try():
+    """Courses of an arc, or a turn on the spot, and then a straight line."""
+    ends = np.concatenate([np.linspace(-1.0, 0.4, 8), np.linspace(0.5, 1.0, 11)])
+    tries = [(1.0, e, n) for e in ends for n in (1, 2, 3, 4, 6, 9, 12)]
+    tries += [(right, left, n) for left, right, n in tries]
+    tries += [(e, -e, n) for e in np.arange(-1.0, 1.01, 0.125) for n in (1, 2)]
+    found = np.ones((len(tries), STEPS, 2))
+    for course, (left, right, steps) in zip(found, tries, strict=True):
+        course[:steps] = left, right
+    return np.unique(np.concatenate([found, -found]), axis=0)
+
+
+def driven(courses):
+    """x, y and heading after each part of each step, from a pose at the origin."""
+    turn = STEP / AXLE * (courses[..., :1] - courses[..., 1:])
+    forward = 0.5 * STEP * courses.sum(axis=2, keepdims=True)
+    facing = np.cumsum(turn, axis=1) - turn
+    shares = np.arange(1, PARTS + 1) / PARTS
+    half = 0.5 * turn * shares
+    chord = forward * shares * np.sinc(half / math.pi)
+    x, y = chord * np.cos(facing + half), chord * np.sin(facing + half)
+    x[:, 1:] += np.cumsum(x[:, :-1, -1:], axis=1)
+    y[:, 1:] += np.cumsum(y[:, :-1, -1:], axis=1)
+    return x, y, facing + 2.0 * half
+
+
+COURSES, STATE = courses_to_try(), {}
+DRIVEN = driven(COURSES)
 
 
 def reset(obs):
-    """Plans the way from everywhere to the goal."""
-    COST[:] = extended(costs_to(obs["goal"], CLEAR))
-
-
-def courses():
-    """An arc of one, two, four or all steps and then a straight line, at TIMES.
-
-    Returns the action of each course, and x, y, heading from a pose at the origin.
-    """
-    pairs, parts = [], []
-    for left, right in wheel_pairs():
-        forward, turn = 0.5 * STEP * (left + right), STEP * (left - right) / AXLE
-        for steps in (1.0, 2.0, 4.0, TIMES[-1]):
-            on_arc = np.minimum(TIMES, steps)
-            half = 0.5 * turn * on_arc
-            chord = forward * on_arc * np.sinc(half / math.pi)
-            after = math.copysign(STEP, forward) * (TIMES - on_arc)
-            facing = turn * on_arc
-            pairs.append((left, right))
-            parts.append(
-                (
-                    chord * np.cos(half) + after * np.cos(facing),
-                    chord * np.sin(half) + after * np.sin(facing),
-                    facing,
-                )
-            )
-    x, y, facing = np.array(parts).transpose(1, 0, 2)
-    return np.array(pairs), x, y, facing
-
-
-PAIRS, AHEAD, ASIDE, FACING = courses()
-
-
-def best_arc(x, y, heading, goal):
-    """The best course that begins with an arc, as its price and its action."""
-    cosine, sine = math.cos(heading), math.sin(heading)
-    px, py = x + cosine * AHEAD - sine * ASIDE, y + sine * AHEAD + cosine * ASIDE
-    facing = heading + FACING
-    fits = np.logical_and.accumulate(between(CLEAR, px, py) - RADIUS >= MARGIN, axis=1)
-    there = fits & (np.hypot(px - goal[0], py - goal[1]) <= 0.97 * TOLERANCE)
-    if there.any():
-        first = np.where(there.any(axis=1), there.argmax(axis=1), len(TIMES))
-        return -1.0, PAIRS[int(first.argmin())]
-    worth = between(COST, px, py) + STEP * TIMES + turns_left(px, py, facing)
-    worth = np.where(fits, worth, np.inf)[:, SOON - 1 :].min(axis=1)
-    return float(worth.min()), PAIRS[int(worth.argmin())]
-
-
-def turns_left(x, y, facing):
-    """Price of the turn into the way that is still to come, forwards or backwards."""
-    left = between(COST, x, y)
-    dx, dy = LOOK * np.cos(facing), LOOK * np.sin(facing)
-    ahead = np.minimum(between(COST, x + dx, y + dy), between(COST, x - dx, y - dy))
-    return TURN * np.clip((ahead - left) / LOOK + 1.0, 0.0, 1.5)
-
-
-def best_line(x, y, heading):
-    """The best turn on the spot with a straight line, as its price and its action."""
-    bearings = heading + TURNS
-    px = x + np.outer(np.cos(bearings), LENGTHS)
-    py = y + np.outer(np.sin(bearings), LENGTHS)
-    fits = np.logical_and.accumulate(between(CLEAR, px, py) - RADIUS >= MARGIN, axis=1)
-    worth = between(COST, px, py) + LENGTHS + SPIN_PRICES[:, None]
-    worth += turns_left(px, py, bearings[:, None])
-    worth = np.where(fits, worth, np.inf)[:, LENGTHS >= 6.0]
-    k = int(worth.min(axis=1).argmin())
-    share = min(max(SPINS[k] / SPIN, -1.0), 1.0)
-    pair = share, -share
-    if SPINS[k] == 0.0:
-        pair = (1.0, 1.0) if k == 0 else (-1.0, -1.0)
-    return float(worth[k].min()), np.array(pair)
+    """Plans the way to the goal."""
+    STATE["way"] = Way(obs)
 
 
 def policy(obs):
     """Wheel speeds (left, right)."""
-    x, y, heading = (float(value) for value in obs["pose"])
-    price, pair = best_arc(x, y, heading, obs["goal"])
-    if price >= 0.0:
-        other, line = best_line(x, y, heading)
+    way, goal = STATE["way"], obs["goal"].astype(float)
+    pose = obs["pose"].astype(float)
+    room = float(between(way.clear, *way.on_grid(*pose[:2, None]))[0]) - RADIUS
+    margin = min(max(room - 0.004, 0.002), MARGIN)
+    price, course = way.best(pose, goal, COURSES, DRIVEN, margin)
+    for k, old in enumerate((way.course, way.course, None, None)):
+        many = way.varied(course if old is None else old) if k > 0 else old[None]
+        # What was planned is kept also if rounding brings it nearer to a wall.
+        limit = min(margin, MARGIN - 0.004) if k == 0 else margin
+        other, changed = way.best(pose, goal, many, driven(many), limit)
         if other < price:
-            pair = line
-    return tuple(pair.tolist())
+            price, course = other, changed
+    way.learn(pose, STEP * price)
+    way.course = np.roll(course, -1, axis=0)
+    way.course[-1] = 1.0 if course[-1].sum() >= 0.0 else -1.0
+    return tuple(np.clip(course[0], -1.0, 1.0).tolist())
