@@ -19,7 +19,6 @@ scores of each level, and the pairs whose paired intervals say opposite things.
 from __future__ import annotations
 
 import argparse
-import hashlib
 from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
@@ -37,6 +36,7 @@ from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.set_synthesis.hidden import drawn_salt
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.ladder.task_sets import load_set
 
@@ -50,11 +50,11 @@ FIGURES = ("index", "generator", "outcome", "steps", "time_score", "path_score")
 
 def sources(answers: Path, level: str) -> Iterator[tuple[str, str | None]]:
     """Name and source of each entrant of a level; None for an answer without a file."""
-    yield BUILTIN, (LEVELS / f"{level}.py").read_text(encoding="utf-8")
+    own = (LEVELS / f"{level}.py").read_text(encoding="utf-8")
+    yield BUILTIN, own
     if level in SEEN:
-        sighted = (LEVELS / f"{level}.py").read_text(encoding="utf-8")
-        assert SEEN[level] in sighted
-        yield BLIND, sighted.replace(SEEN[level], "[], pose)")
+        assert SEEN[level] in own
+        yield BLIND, own.replace(SEEN[level], "[], pose)")
     for file in sorted((answers / level).glob("*/controller.py")):
         yield file.parent.name, file.read_text(encoding="utf-8")
     for reply in sorted((answers / level).glob("*/reply.md")):
@@ -98,7 +98,7 @@ def _driven(
     if file.is_file():
         report = SetReport.model_validate_json(file.read_bytes())
         own = report.provenance.set_sha256, report.provenance.controller_sha256
-        same = own == (tasks.sha256, hashlib.sha256(raw).hexdigest())
+        same = own == (tasks.sha256, sha256_of(raw))
         if same and report.worlds == worlds:
             return report
     return verify_on_set(

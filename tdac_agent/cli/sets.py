@@ -86,7 +86,7 @@ def show(
             raise TaskError(f"{option} must end in .png, got {path}")
     tasks, first = load_set(name), index or 0
     wanted = index is not None or png is not None
-    shown = _world_and_task(tasks, split, first) if wanted else None
+    shown = tasks.world_and_task(split, first) if wanted else None
     record = _record(tasks)
     if shown is not None:
         record["world"] = _world_record(tasks, *shown, split, first)
@@ -101,18 +101,13 @@ def show(
         last = first + ON_A_SHEET if count is None else min(first + ON_A_SHEET, count)
         # A number beyond the last world is an error of `world`.
         numbers = range(first, max(last, first + 1))
-        worlds = [_world_and_task(tasks, split, index) for index in numbers]
+        worlds = [tasks.world_and_task(split, index) for index in numbers]
         captions = [
             _caption(tasks.label(split, index).split()[-1], world, index)
             for index, (world, _) in zip(numbers, worlds, strict=True)
         ]
         _write(contact_sheet(tasks, worlds, captions), sheet, as_json)
     return 0
-
-
-def _world_and_task(tasks: TaskSet, split: str, index: int) -> tuple[AnyWorld, AnyTask]:
-    world = tasks.world(split, index)
-    return world, tasks.with_movers(tasks.task_of(world), split, index)
 
 
 def _record(tasks: TaskSet) -> dict[str, Any]:

@@ -28,8 +28,6 @@ from tdac_envs.ladder.set_file import CpuSpec
 
 MOST_TOLD = 3
 """Failures whose diagnosis is reported."""
-
-
 TOUCHED = {
     "wall": "with a wall",
     "mover": "with a mover",

@@ -27,17 +27,12 @@ from tdac_envs.map2d.contact import arc_contact
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.setup import Setup
 from tdac_envs.map2d.task import Map2DTask
-from tdac_envs.movers.orca import (
-    N_PLANE,
-    add_plane,
-    chosen_velocity,
-    neighbour_plane,
-)
+from tdac_envs.movers.crowd import next_node
+from tdac_envs.movers.orca import N_PLANE, add_neighbour, chosen_velocity
 from tdac_envs.movers.state import RADIUS, VX, VY, X, Y
 from tdac_envs.movers.walls import MOST_WALLS, Cells, cells_of, segments_of, wall_planes
 
 Array = NDArray[np.float64]
-Field = NDArray[np.float32]
 
 HORIZON = 2.0
 """The courses of movers are avoided for this time, s."""
@@ -71,7 +66,7 @@ class OrcaDriver:
         reach = robot.radius + WALL_HORIZON * fastest + 1.0
         first, listed = cells_of(walls, cells.shape, reach)
         self._env, self._last = env, env.pose()
-        maps = walls, first, listed, task.field, task.terrain.padded_clear
+        maps = walls, first, listed, task.field[None], task.terrain.padded_clear
         self._map = tuple(read_only(array) for array in maps)
         self._goal = np.array(task.goal)
 
@@ -80,9 +75,9 @@ class OrcaDriver:
         env, pose, out = self._env, self._env.pose(), np.zeros(2)
         velocity = (pose[:2] - self._last[:2]) / env.task.dt
         self._last = pose
-        movers, (walls, first, listed, field, clear) = env.movers, self._map
+        movers, (walls, first, listed, fields, clear) = env.movers, self._map
         _choose(
-            walls, first, listed, field, clear, movers.traits, movers.now,
+            walls, first, listed, fields, clear, movers.traits, movers.now,
             env.robot.constants, pose, velocity, self._goal, out,
         )  # fmt: skip
         return out.astype(np.float32)
@@ -124,22 +119,18 @@ def drive_by_orca(
 
 
 @subkernel
-def _way(field: Field, x: float, y: float, goal: Array) -> tuple[float, float]:
+def _way(fields: FloatGrid, x: float, y: float, goal: Array) -> tuple[float, float]:
     """The place on the way to the goal for which to head, px."""
-    rows, columns = field.shape
+    rows, columns = fields.shape[1:]
     row, column = int(y + 0.5), int(x + 0.5)
     least, i, j = math.inf, column, row
     for b in range(max(row - _BESIDE, 0), min(row + _BESIDE + 1, rows)):
         for a in range(max(column - _BESIDE, 0), min(column + _BESIDE + 1, columns)):
-            length = field[b, a] + math.hypot(a - x, b - y)
+            length = fields[0, b, a] + math.hypot(a - x, b - y)
             if length < least:
                 least, i, j = length, a, b
     for _ in range(LOOK):
-        best, next_i, next_j = field[j, i], i, j
-        for b in range(max(j - 1, 0), min(j + 2, rows)):
-            for a in range(max(i - 1, 0), min(i + 2, columns)):
-                if field[b, a] < best:
-                    best, next_i, next_j = field[b, a], a, b
+        next_i, next_j = next_node(fields, 0, i, j)
         if next_i == i and next_j == j:
             return goal[0], goal[1]
         i, j = next_i, next_j
@@ -148,7 +139,7 @@ def _way(field: Field, x: float, y: float, goal: Array) -> tuple[float, float]:
 
 @kernel
 def _choose(
-    walls: Array, first: Cells, listed: Cells, field: Field, clear: FloatGrid,
+    walls: Array, first: Cells, listed: Cells, fields: FloatGrid, clear: FloatGrid,
     traits: Array, now: Array, constants: Array, pose: Array, velocity: Array,
     goal: Array, out: Array,
 ) -> None:  # fmt: skip
@@ -158,7 +149,7 @@ def _choose(
         walls: From `walls.segments_of`.
         first: From `walls.cells_of`.
         listed: From `walls.cells_of`.
-        field: `Map2DTask.field`.
+        fields: `Map2DTask.field` as the field of the only place; see `Places`.
         clear: `Terrain.padded_clear`.
         traits: `Movers.traits`.
         now: `Movers.now`.
@@ -176,14 +167,12 @@ def _choose(
     )
     count = number
     for m in range(traits.shape[0]):
-        more_x, more_y, along_x, along_y = neighbour_plane(
-            now[m, X] - x, now[m, Y] - y, velocity[0] - now[m, VX],
-            velocity[1] - now[m, VY], radius + traits[m, RADIUS] + MARGIN, HORIZON, dt,
+        count = add_neighbour(
+            planes, count, now[m, X] - x, now[m, Y] - y, velocity[0], velocity[1],
+            now[m, VX], now[m, VY], radius + traits[m, RADIUS] + MARGIN, 1.0, HORIZON,
+            dt,
         )  # fmt: skip
-        count = add_plane(
-            planes, count, velocity[0] + more_x, velocity[1] + more_y, along_x, along_y
-        )
-    to_x, to_y = _way(field, x, y, goal)
+    to_x, to_y = _way(fields, x, y, goal)
     off = math.hypot(to_x - x, to_y - y)
     want = fastest / off if off > 0.0 else 0.0
     vx, vy = chosen_velocity(

@@ -315,13 +315,11 @@ def _placed(values: dict[Any, Any], path: Path) -> dict[Any, Any]:
 
 BUILT_IN = Path(__file__).parent / "sets"
 """Folder of the sets that come with the package."""
-LEVELS = "known", "unknown", "lost", "moving", "crowd", "epuck"
-"""Names of these sets, the easiest first."""
 
 
 def set_names() -> tuple[str, ...]:
     """Names of the sets that come with the package, the easiest first."""
-    return LEVELS
+    return "known", "unknown", "lost", "moving", "crowd", "epuck"
 
 
 def find_set_file(name: str | Path) -> SetFile:

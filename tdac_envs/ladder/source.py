@@ -69,10 +69,8 @@ class SetSource:
 
     def _made(self, index: int) -> tuple[int, AnyWorld, AnyTask]:
         if self._last is None or self._last[0] != index:
-            world = self._set.world(self._split, index, self._salt)
-            task = self._set.task_of(world)
-            task = self._set.with_movers(task, self._split, index, self._salt)
-            self._last = index, world, task
+            made = self._set.world_and_task(self._split, index, self._salt)
+            self._last = index, *made
         return self._last
 
     def draw(

@@ -144,10 +144,20 @@ class TaskSet:
         Raises:
             TaskError: As `world` does.
         """
-        task = self.task_of(self.world(split, index, salt))
-        return self.with_movers(task, split, index, salt)
+        return self.world_and_task(split, index, salt)[1]
 
-    def with_movers(
+    def world_and_task(
+        self, split: str, index: int, salt: bytes | None = None
+    ) -> tuple[AnyWorld, AnyTask]:
+        """A world, and its task with the movers.
+
+        Raises:
+            TaskError: As `world` does.
+        """
+        world = self.world(split, index, salt)
+        return world, self._with_movers(self.task_of(world), split, index, salt)
+
+    def _with_movers(
         self, task: TaskType, split: str, index: int, salt: bytes | None = None
     ) -> TaskType:
         """The task of a world with its movers, if the set has any."""

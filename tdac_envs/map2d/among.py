@@ -341,7 +341,7 @@ def step_rows_among(batch: Words, rows: Words) -> None:
     # so that it stays in the processor's cache.
     most = 0
     for row in rows:
-        most = max(most, _movers_at(words[row])[0].shape[0])
+        most = max(most, plane(words[row][N_ROBOT], np.float64).shape[0])
     pieces = np.empty((most, MOST_PIECES + 2, N_PIECE))
     path = np.empty((MOST_ARCS, N_PIECE))
     for row in rows:

@@ -18,9 +18,8 @@ from tdac_envs.grid.grid import FloatGrid
 from tdac_envs.movers.motion import GAP
 from tdac_envs.movers.orca import (
     Array,
-    add_plane,
+    add_neighbour,
     chosen_velocity,
-    neighbour_plane,
 )
 from tdac_envs.movers.state import (
     CROWD,
@@ -123,7 +122,7 @@ def _nearest_node(
 
 
 @subkernel
-def _next_node(fields: FloatGrid, goal: int, i: int, j: int) -> tuple[int, int]:
+def next_node(fields: FloatGrid, goal: int, i: int, j: int) -> tuple[int, int]:
     """The neighbour of a node that is nearest to a place, or itself at the place."""
     least, next_i, next_j = fields[goal, j, i], i, j
     for b in range(max(j - 1, 0), min(j + 2, fields.shape[1])):
@@ -170,13 +169,9 @@ def _choose(
             else:
                 rate_x = pieces[other, 0, RATE_X] / dt
                 rate_y = pieces[other, 0, RATE_Y] / dt
-        more_x, more_y, along_x, along_y = neighbour_plane(
-            off_x - at_x, off_y - at_y, now[m, VX] - rate_x, now[m, VY] - rate_y,
-            reach + traits[m, RADIUS], HORIZON, dt,
-        )  # fmt: skip
-        count = add_plane(
-            planes, count, now[m, VX] + share * more_x, now[m, VY] + share * more_y,
-            along_x, along_y,
+        count = add_neighbour(
+            planes, count, off_x - at_x, off_y - at_y, now[m, VX], now[m, VY],
+            rate_x, rate_y, reach + traits[m, RADIUS], share, HORIZON, dt,
         )  # fmt: skip
     people[m, NEXT_VX], people[m, NEXT_VY] = chosen_velocity(
         planes, walls, count, speed, want_x, want_y
@@ -268,7 +263,7 @@ def crowding(advance_straight: Any, find_normal: Any, sees: Any) -> Any:
             return 0.0, 0.0, 0.0
         to_x, to_y = i * spacing, j * spacing
         for hop in range(_HOPS):
-            next_i, next_j = _next_node(fields, goal, i, j)
+            next_i, next_j = next_node(fields, goal, i, j)
             if next_i == i and next_j == j:
                 break
             i, j = next_i, next_j

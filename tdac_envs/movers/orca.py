@@ -80,6 +80,35 @@ def add_plane(
 
 
 @subkernel
+def add_neighbour(
+    planes: Array, count: int, off_x: float, off_y: float, rate_x: float,
+    rate_y: float, other_x: float, other_y: float, reach: float, share: float,
+    horizon: float, dt: float,
+) -> int:  # fmt: skip
+    """Writes the half-plane of another disc; returns the number of rows then in use.
+
+    Args:
+        planes: The half-planes.
+        count: The row to write.
+        off_x: Place of the other disc, seen from this one, px.
+        off_y: px.
+        rate_x: Velocity of this disc, px/s.
+        rate_y: px/s.
+        other_x: Velocity of the other disc, px/s.
+        other_y: px/s.
+        reach: Sum of the radii, px.
+        share: Part of the change that this disc takes.
+        horizon: As for `neighbour_plane`.
+        dt: As for `neighbour_plane`.
+    """
+    more_x, more_y, along_x, along_y = neighbour_plane(
+        off_x, off_y, rate_x - other_x, rate_y - other_y, reach, horizon, dt
+    )
+    x, y = rate_x + share * more_x, rate_y + share * more_y
+    return add_plane(planes, count, x, y, along_x, along_y)
+
+
+@subkernel
 def _outside(planes: Array, k: int, x: float, y: float) -> float:
     """Distance by which a velocity is in the forbidden half; negative if permitted."""
     off_x, off_y = planes[k, POINT_X] - x, planes[k, POINT_Y] - y
@@ -252,13 +281,9 @@ def velocity_among(
     x, y, rate_x, rate_y, radius = discs[0]
     count = 0
     for k in range(1, len(discs)):
-        more_x, more_y, along_x, along_y = neighbour_plane(
-            discs[k, 0] - x, discs[k, 1] - y, rate_x - discs[k, 2],
-            rate_y - discs[k, 3], radius + discs[k, 4], horizon, dt,
-        )  # fmt: skip
-        count = add_plane(
-            planes, count, rate_x + 0.5 * more_x, rate_y + 0.5 * more_y,
-            along_x, along_y,
+        count = add_neighbour(
+            planes, count, discs[k, 0] - x, discs[k, 1] - y, rate_x, rate_y,
+            discs[k, 2], discs[k, 3], radius + discs[k, 4], 0.5, horizon, dt,
         )  # fmt: skip
     out[0], out[1] = chosen_velocity(
         planes, 0, count, limit, preferred[0], preferred[1]

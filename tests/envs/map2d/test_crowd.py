@@ -55,9 +55,7 @@ class Walk:
         env.reset(seed=seed)
         traits = env.movers.traits
         radii, clear = traits[:, RADIUS], env.task.terrain.padded_clear
-        reach = radii[:, None] + radii
-        np.fill_diagonal(reach, -np.inf)
-        places, speeds, deep, self.inside = [], [], [], 0
+        places, speeds, self.inside = [], [], 0
         for _ in range(steps):
             env.step(STILL)
             now = env.movers.now
@@ -67,18 +65,25 @@ class Walk:
             self.inside += sum(
                 not fits(clear, x, y, r) for (x, y), r in zip(at, radii, strict=True)
             )
-            far = np.hypot(*np.moveaxis(at[:, None] - at, 2, 0))
-            deep.append((reach - far).max(axis=1) > 0.05 * radii)
         self.places, self.speeds = np.array(places), np.array(speeds)
-        self.deep = np.array(deep)
+        self.deep = deep(self.places, radii)
 
-    def standing(self, steps, radius):
-        """Which people stayed within a radius for as many steps."""
-        stood = np.zeros(self.places.shape[1], bool)
-        for begin in range(0, len(self.places) - steps + 1, 10):
-            extent = np.ptp(self.places[begin : begin + steps], axis=0).max(axis=1)
-            stood |= extent < radius
-        return stood
+
+def deep(places, radii):
+    """Who was more than 5 % of a radius inside of another one, shape (steps, n)."""
+    reach = radii[:, None] + radii
+    np.fill_diagonal(reach, -np.inf)
+    far = np.hypot(*np.moveaxis(places[:, :, None] - places[:, None], 3, 0))
+    return (reach - far).max(axis=2) > 0.05 * radii
+
+
+def standing(places, steps, radii):
+    """Which people stayed within a radius for as many steps."""
+    stood = np.zeros(places.shape[1], bool)
+    for begin in range(0, len(places) - steps + 1, 10):
+        extent = np.ptp(places[begin : begin + steps], axis=0).max(axis=1)
+        stood |= extent < radii
+    return stood
 
 
 def test_people_walk_to_their_places():
@@ -87,7 +92,7 @@ def test_people_walk_to_their_places():
     assert walk.inside == 0
     assert np.median(walk.speeds.mean(axis=0)) >= 0.6
     assert walk.deep.mean() <= 1e-3
-    assert walk.standing(300, 6.0).sum() == 0
+    assert standing(walk.places, 300, 6.0).sum() == 0
 
 
 def test_people_arrive():
@@ -281,19 +286,15 @@ def test_on_many_worlds():
 @pytest.mark.slow
 def test_people_of_the_level_walk():
     """1,000 steps in 40 worlds of the level `crowd`: the figures that are promised."""
-    tasks, speeds, deep, stood = load_set("crowd"), [], [], []
+    tasks, speeds, inside, stood = load_set("crowd"), [], [], []
     for index in range(40):
         task = tasks.task("train", index)
         own = task.movers.traits
         at = foreseen(task, 1000)
         steps = np.hypot(*np.moveaxis(np.diff(at, axis=0), 2, 0))
         speeds += (steps.mean(axis=0) / (own[:, SPEED] * task.dt)).tolist()
-        reach = own[:, RADIUS] + own[:, RADIUS, None]
-        np.fill_diagonal(reach, -np.inf)
-        far = np.hypot(*np.moveaxis(at[:, :, None] - at[:, None], 3, 0))
-        deep += ((reach - far).max(axis=2) > 0.05 * own[:, RADIUS]).ravel().tolist()
-        longest = [np.ptp(at[k : k + 300], axis=0).max(1) for k in range(0, 701, 10)]
-        stood += (np.min(longest, axis=0) < own[:, RADIUS]).tolist()
+        inside += deep(at, own[:, RADIUS]).ravel().tolist()
+        stood += standing(at, 300, own[:, RADIUS]).tolist()
     assert np.median(speeds) >= 0.6
-    assert np.mean(deep) <= 1e-3
+    assert np.mean(inside) <= 1e-3
     assert np.mean(stood) < 0.02
