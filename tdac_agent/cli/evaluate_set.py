@@ -104,8 +104,8 @@ def run(
 
 def show(found: SetEvaluation, console: Console) -> None:
     """Prints the scores, those by generator, failures, and pairs."""
-    which = "public worlds" if found.split == "test" else f"{found.split} worlds"
-    title = f"{found.set} {found.set_sha256[:8]}: {found.worlds} {which} each"
+    worlds = f"worlds 0 to {found.worlds - 1} of {found.split}"
+    title = f"{found.set} {found.set_sha256[:8]}: {worlds}"
     console.print(_scores(found, title))
     console.print()
     for row in found.rows:

@@ -17,6 +17,7 @@ from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.verification.judge.sequential import MARGIN
 from tdac_agent.verification.judge.set_job import movers_of
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
@@ -24,7 +25,7 @@ from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.ladder.dead_ends import Sensor, dead_ends
 from tdac_envs.ladder.generators.blocks import PIXEL
 from tdac_envs.ladder.moving import MoversOfSet
-from tdac_envs.ladder.picture import contact_sheet, draw_world
+from tdac_envs.ladder.picture import AHEAD, contact_sheet, draw_world
 from tdac_envs.ladder.plate_worlds import PlatesWorld
 from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import SetFile, set_names
@@ -107,7 +108,17 @@ def show(
             for index, (world, _) in zip(numbers, worlds, strict=True)
         ]
         _write(contact_sheet(tasks, worlds, captions), sheet, as_json)
+    if not as_json and (png or sheet):
+        Console().print(_legend(tasks), style="dim", highlight=False)
     return 0
+
+
+def _legend(tasks: TaskSet) -> str:
+    """What the marks of a picture are."""
+    text = "blue: robot at its start; green: goal; dashed: shortest path"
+    if tasks.file.movers:
+        text += f"; red: movers, and where they go in the first {AHEAD:g} s"
+    return text
 
 
 def _record(tasks: TaskSet) -> dict[str, Any]:
@@ -169,6 +180,8 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
         "disturbed": _disturbed(file) or "nothing",
         "horizon": f"{file.horizon.factor:g} OT, {file.horizon.least} to "
         f"{file.horizon.most} steps",
+        "verified": f"if {file.bar:g} fits the success rate much better than "
+        f"{file.bar - MARGIN:g} (sequential test)",
     }
     if file.movers:
         rows["movers"] = "; ".join(_group(group) for group in file.movers)
@@ -202,7 +215,8 @@ def _robot(file: SetFile) -> str:
     if isinstance(robot, EPuckParams):
         return f"e-puck, radius {robot.radius:g} m, {speed}"
     return (
-        f"radius {robot.radius:g} px, {speed}, {robot.n_rays} rays over "
+        f"radius {robot.radius:g} px, axle {robot.axle_length:g} px, {speed}, "
+        f"{robot.n_rays} rays over "
         f"{robot.field_of_view_deg:g}° up to {robot.range_max:g} px"
     )
 

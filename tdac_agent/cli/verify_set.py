@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import shlex
 import sys
 from functools import partial
 from pathlib import Path
@@ -19,6 +20,7 @@ from tdac_agent.cli.robust_view import decision_text, error_rates, rate_text
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.set_flags import SetFlags
 from tdac_agent.cli.verify import check_folder, controller_file
+from tdac_agent.evaluation.kept_sets import REPORT_FILE, TRAJECTORIES
 from tdac_agent.evaluation.set_report import HiddenCount, Scores, SetReport
 from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
 from tdac_agent.verification.judge.child_pool import ChildPool
@@ -84,7 +86,9 @@ def run(
     if as_json:
         sys.stdout.write(report.model_dump_json(indent=2) + "\n")
     else:
-        show(report, Console())
+        console = Console()
+        show(report, console)
+        _say_how_to_go_on(report, flags.name, controller, out, console)
     return 0 if report.passed else 1
 
 
@@ -95,10 +99,9 @@ def show(report: SetReport, console: Console) -> None:
     if report.refused:
         _say_refused(report, console)
         return
-    which = "public worlds" if about.split == "test" else f"{about.split} worlds"
     say(
-        f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}, {report.worlds} "
-        f"{which}: {report.successes} reached, "
+        f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}, worlds 0 to "
+        f"{report.worlds - 1} of {about.split}: {report.successes} reached, "
         f"{report.worlds - report.successes} failed; {report.seconds:.0f} s"
     )
     if report.scores is not None and report.interval is not None:
@@ -123,8 +126,27 @@ def show(report: SetReport, console: Console) -> None:
             f"{report.worlds} of at most {result.test.limit} worlds"
         )
         say(error_rates(result))
+    else:
+        say("no verdict: -n asks for scores; leave it out for a verdict")
     if report.hidden is not None:
         say(_counted(report.hidden, about.set))
+
+
+def _say_how_to_go_on(
+    report: SetReport, name: str, controller: str, out: Path | None, console: Console
+) -> None:
+    """Prints how to see the first failure, and where the files are."""
+    failed = [episode.index for episode in report.episodes if not episode.success]
+    if failed:
+        play = ["tdac", "play", controller, "--set", name]
+        play += ["--split", report.provenance.split, "--index", str(failed[0])]
+        # Not wrapped, so that it can be copied.
+        line = f"watch the first failure: [bold]{escape(shlex.join(play))}[/]"
+        console.print(line, soft_wrap=True, highlight=False)
+    if out is not None and not report.refused:
+        kept = f", {TRAJECTORIES}/" if report.episodes else ""
+        line = escape(f"wrote {REPORT_FILE}{kept} to {out}")
+        console.print(line, soft_wrap=True, highlight=False)
 
 
 def _say_refused(report: SetReport, console: Console) -> None:

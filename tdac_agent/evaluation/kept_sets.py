@@ -11,6 +11,7 @@ from tdac_agent.verification.judge.set_job import WorldEpisode
 
 REPORT_FILE = "set.json"
 SEALED, ROWS_FILE = "sealed", "episodes.jsonl"
+TRAJECTORIES = "trajectories"
 
 
 def keep_report(report: SetReport, out: Path) -> None:
@@ -23,7 +24,7 @@ def keep_trajectories(trajectories: Path | None, out: Path) -> None:
     """Copies the trajectories of public worlds to `trajectories/`."""
     if trajectories is None or not trajectories.is_dir():
         return
-    kept = out / "trajectories"
+    kept = out / TRAJECTORIES
     kept.mkdir(exist_ok=True)
     for path in sorted(trajectories.iterdir()):
         write_atomic(kept / path.name, path.read_bytes())

@@ -31,7 +31,7 @@ MOST_TOLD = 3
 TOUCHED = {
     "wall": "with a wall",
     "mover": "with a mover",
-    "mover_standing": "with a mover while standing",
+    "mover_standing": "with a mover while the robot stood",
 }
 """How the failures of each contact are told apart."""
 

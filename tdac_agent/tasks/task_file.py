@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
-from tdac_envs.core.arguments import MOST_STEPS
+from tdac_envs.core.arguments import MOST_STEPS, in_radians
 from tdac_envs.core.errors import TaskError, first_problem, hint
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.mapping.params import MOST_RAYS, Length, Place
@@ -46,8 +46,8 @@ def _movers_of(given: Any) -> tuple[AnySpec, ...]:
     try:
         return read_specs(given)
     except TaskError as error:
-        # The key is named already: `movers: [0]: ...`.
-        raise ValueError(str(error).removeprefix("movers")) from None
+        # The validation error names the key.
+        raise ValueError(str(error).removeprefix("movers: ")) from None
 
 
 class _Strict(BaseModel):
@@ -74,6 +74,12 @@ class ProgressSpec(_Strict):
     distance: Literal["geodesic", "euclidean"] = "geodesic"
 
 
+def _faces(start: tuple[float, ...] | None) -> tuple[float, ...] | None:
+    for heading in (start or ())[2:]:
+        in_radians(heading)
+    return start
+
+
 class TaskFile(_Strict):
     """Contents of `task.yaml`, schema 1."""
 
@@ -91,7 +97,11 @@ class TaskFile(_Strict):
         (), description="Nodes that were ignored when this world file was written."
     )
     robot: RobotSpec = RobotSpec()
-    start: Annotated[tuple[Place, ...] | None, Field(min_length=2, max_length=3)] = None
+    start: Annotated[
+        tuple[Place, ...] | None,
+        Field(min_length=2, max_length=3),
+        AfterValidator(_faces),
+    ] = Field(None, description="x, y and, if given, the heading in rad.")
     goal: tuple[Place, Place] | None = None
     snap: bool = Field(False, description="Move start and goal to free places.")
     metres: bool = Field(

@@ -76,6 +76,17 @@ def positive(name: str, value: float) -> float:
     return number
 
 
+def in_radians(angle: float) -> float:
+    """The angle, for the models of files.
+
+    Raises:
+        ValueError: It is more than a whole turn, so it may well be in degrees.
+    """
+    if abs(angle) > math.tau:
+        raise ValueError(f"expected rad, from -2 pi to 2 pi, got {angle:g}")
+    return angle
+
+
 def non_negative(name: str, value: float) -> float:
     """The value as a float.
 

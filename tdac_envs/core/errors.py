@@ -72,10 +72,26 @@ def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
     unknown = (p for p in problems if p["type"] == "extra_forbidden")
     first = next(unknown, problems[0])
     place = ".".join(map(str, first["loc"]))[:MAX_QUOTED]
-    reason = _REASONS.get(first["type"], first["msg"].removeprefix("Value error, "))
+    reason = _reason(first)
     if first["type"] == "extra_forbidden":
         reason += hint(place, known)
     return f"{place}: {reason}" if place else reason
+
+
+def _reason(problem: Any) -> str:
+    """What is wrong, in the words of the other errors."""
+    kind, limits = problem["type"], problem.get("ctx", {})
+    if kind in _REASONS:
+        return _REASONS[kind]
+    if kind in _LIMITS:
+        key, text = _LIMITS[kind]
+        if key == "ge" and 0.0 < limits[key] < 1e-6:
+            text, limits = "more than", {key: 0}
+        return f"expected {text} {limits[key]:g}, got {problem['input']!r:.100}"
+    if kind in _LENGTHS:
+        key, text = _LENGTHS[kind]
+        return f"expected {text} {limits[key]} of them, got {limits['actual_length']}"
+    return str(problem["msg"]).removeprefix("Value error, ")
 
 
 def one_line_reason(error: Exception) -> str:
@@ -105,4 +121,14 @@ _REASONS = {
     "extra_forbidden": "unknown key",
     "missing": "is missing",
     "model_type": "expected a mapping",
+}
+_LIMITS = {
+    "greater_than_equal": ("ge", "at least"),
+    "greater_than": ("gt", "more than"),
+    "less_than_equal": ("le", "at most"),
+    "less_than": ("lt", "less than"),
+}
+_LENGTHS = {
+    "too_short": ("min_length", "at least"),
+    "too_long": ("max_length", "at most"),
 }

@@ -31,6 +31,7 @@ LARGEST = 1200
 ENLARGE_TO = 900
 NARROWEST = 320
 TEXT_SIZE = 0.45
+_HALF_DIGIT = 5  # Half the height of a digit, frame px.
 _SHIFT = 4
 # Points beyond are drawn here: OpenCV's coordinates are 32-bit integers.
 _FARTHEST = 1 << 28
@@ -192,6 +193,14 @@ class Canvas:
     def text(self, x: int, baseline: int, text: str, colour: Colour) -> int:
         """Writes ASCII text at frame coordinates; returns the x at its end."""
         return write_text(self.image, x, baseline, text, colour)
+
+    def label(self, centre: ArrayLike, text: str, colour: Colour) -> None:
+        """Writes ASCII text around a point of the map, if there is room for it."""
+        (x, y), width = self.to_frame(centre)[0].tolist(), self.text_width(text)
+        left, baseline = round(x - width / 2), round(y) + _HALF_DIGIT
+        fits = 0 <= left <= self.image.shape[1] - width
+        if fits and 3 * _HALF_DIGIT <= baseline <= self.strip_top - _HALF_DIGIT:
+            self.text(left, baseline, text, colour)
 
     def _lines(
         self,

@@ -16,6 +16,7 @@ from tdac_envs.drawing.canvas import (
     FREE,
     GREEN,
     GREY,
+    INK,
     MOVER,
     ORANGE,
     RED,
@@ -31,6 +32,8 @@ GHOST_SECONDS = 1.0
 """Trails of movers show where they were in this time."""
 # Layers of a trail, each shorter than the one below it, and their opacity.
 _FADES, _LAYER = 6, 0.15
+# Radius of a disc with room for its number, frame px.
+_LEGIBLE = 11.0
 
 
 def load_sprite(file: Path, radius: float) -> Sprite | None:
@@ -108,6 +111,8 @@ def draw_rays(
 def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:
     """Draws moving discs as they are now, with a fading trail of where they were.
 
+    Discs that are large enough bear their numbers.
+
     Args:
         canvas: Where to draw.
         steps: Discs in the last steps, oldest first, each of shape (m, 3): x, y and
@@ -123,6 +128,8 @@ def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:
             canvas.line(places[first:, m], MOVER, 2, _LAYER)
         canvas.disc((x, y), radius * canvas.scale, MOVER, 0.55)
         canvas.disc((x, y), radius * canvas.scale, MOVER, width=1)
+        if radius * canvas.scale >= _LEGIBLE:
+            canvas.label((x, y), str(m), INK)
 
 
 def draw_disc(canvas: Canvas, pose: tuple[float, float, float], radius: float) -> None:

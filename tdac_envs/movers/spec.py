@@ -8,9 +8,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
-from tdac_envs.core.arguments import LARGEST, SMALLEST
+from tdac_envs.core.arguments import LARGEST, SMALLEST, in_radians
 from tdac_envs.core.errors import TaskError, first_problem, hint
 
 MOST_MOVERS = 256
@@ -22,6 +29,7 @@ MOST_POINTS = 1000
 
 Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Point = tuple[Coordinate, Coordinate]
+Heading = Annotated[float, AfterValidator(in_radians)]
 Length = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
 Speed = Annotated[float, Field(ge=0.0, le=LARGEST)]
 
@@ -79,7 +87,7 @@ class BounceSpec(_Strict):
     start: Point | None = Field(
         None, description="Where it starts, px. Default: drawn at each reset."
     )
-    heading: Coordinate | None = Field(
+    heading: Heading | None = Field(
         None, description="Its direction at first, rad. Default: drawn at each reset."
     )
 
@@ -141,21 +149,21 @@ def read_specs(given: MoversOption) -> tuple[AnySpec, ...]:
     if isinstance(given, str):
         given = [_from_text(given)]
     if not isinstance(given, list | tuple):
-        raise TaskError(f"expected movers such as {_EXAMPLE}, got {given!r:.100}")
+        raise TaskError(f"movers: expected {_EXAMPLE}, got {given!r:.100}")
     _check_number(len(given))
-    specs = tuple(_checked(each, f"movers[{i}]") for i, each in enumerate(given))
+    specs = tuple(_checked(each, f"movers: entry {i}") for i, each in enumerate(given))
     _check_number(sum(spec.number for spec in specs))
     people = sum(spec.number for spec in specs if isinstance(spec, CrowdSpec))
     if people > MOST_PEOPLE:
         raise TaskError(
-            f"expected crowds of at most {MOST_PEOPLE} people, got {people}"
+            f"movers: expected crowds of at most {MOST_PEOPLE} people, got {people}"
         )
     return specs
 
 
 def _check_number(count: int) -> None:
     if count > MOST_MOVERS:
-        raise TaskError(f"expected at most {MOST_MOVERS} movers, got {count}")
+        raise TaskError(f"movers: expected at most {MOST_MOVERS}, got {count}")
 
 
 def _from_text(text: str) -> dict[str, Any]:
@@ -163,15 +171,19 @@ def _from_text(text: str) -> dict[str, Any]:
     kind, _, count = text.partition(":")
     if kind not in KINDS:
         raise TaskError(
-            f"unknown kind of movers {kind!r}{hint(kind, KINDS)}; expected {_EXAMPLE}"
+            f"movers: unknown kind {kind!r}{hint(kind, KINDS)}; expected one of "
+            f"{', '.join(KINDS)}, such as {_EXAMPLE}"
         )
     if "count" not in KINDS[kind].model_fields:
         raise TaskError(
-            f"movers of kind {kind!r} need more than a number; expected a list such as "
+            f"movers: a {kind} needs more than a number; expected a list such as "
             "[{'kind': 'route', 'points': [[40, 40], [90, 40]], 'speed': 30}]"
         )
     if not count.isascii() or not count.isdigit() or len(count) > 12:
-        raise TaskError(f"expected movers such as '{kind}:5', got {text!r:.100}")
+        raise TaskError(
+            "movers: expected a kind and how many there are, such as "
+            f"'{kind}:5', got {text!r:.100}"
+        )
     _check_number(int(count))
     return {"kind": kind, "count": int(count)}
 
@@ -181,10 +193,8 @@ def _checked(entry: Any, name: str) -> AnySpec:
         raise TaskError(f"{name}: expected a dict, got {entry!r:.100}")
     kind = entry.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
-        raise TaskError(
-            f"{name}: expected kind to be one of {', '.join(map(repr, KINDS))}, got "
-            f"{kind!r:.100}{hint(str(kind), KINDS)}"
-        )
+        got = f", got {kind!r:.100}{hint(str(kind), KINDS)}" if kind else ""
+        raise TaskError(f"{name}: kind: expected one of {', '.join(KINDS)}{got}")
     count = entry.get("count")
     if isinstance(count, int):
         _check_number(count)

@@ -22,6 +22,8 @@ from tdac_envs.map2d.terrain import path_entry
 
 Point = tuple[float, float]
 
+_PARTS = 0.0, -0.95, 0.95, -0.5, 0.5
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapSurroundings:
@@ -71,15 +73,25 @@ class MapSurroundings:
         )
 
     def in_sight(self, pose: Pose, place: Point, radius: float) -> bool:
-        """See `Surroundings`; the disc's edge is within the range of the rays."""
+        """See `Surroundings`: whether a ray of a dense fan would end at the disc."""
         robot, (x, y) = self.task.robot, place
-        if math.dist(pose[:2], place) - radius > robot.range_max:
-            return False
-        bearing = math.atan2(y - pose.y, x - pose.x) - pose.heading
-        off = abs(math.remainder(bearing, math.tau))
-        if off > math.radians(robot.field_of_view_deg) / 2.0:
-            return False
-        return bool(sees(self.task.terrain.leaps, pose.x, pose.y, x, y))
+        far, towards = math.dist(pose[:2], place), math.atan2(y - pose.y, x - pose.x)
+        if far <= radius:
+            return True
+        for part in _PARTS:
+            # The ray passes the disc's centre at this distance.
+            aside = part * radius
+            angle = towards + math.asin(aside / far)
+            reach = math.sqrt(far**2 - aside**2) - math.sqrt(radius**2 - aside**2)
+            off = abs(math.remainder(angle - pose.heading, math.tau))
+            end = pose.x + reach * math.cos(angle), pose.y + reach * math.sin(angle)
+            if (
+                reach <= robot.range_max
+                and off <= math.radians(robot.field_of_view_deg) / 2.0
+                and sees(self.task.terrain.leaps, pose.x, pose.y, *end)
+            ):
+                return True
+        return False
 
     def path_from(self, pose: Pose) -> Path:
         """Returns the shortest grid path to the goal."""

@@ -15,6 +15,7 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.verification.diagnosis.motion import forward, wheels_turn
 from tdac_agent.verification.diagnosis.surroundings import Surroundings
 from tdac_envs.drive.task import Pose
+from tdac_envs.movers.state import STANDING_SECONDS
 
 Point = tuple[float, float]
 
@@ -110,8 +111,10 @@ def time_in_sight(around: Surroundings, trajectory: Trajectory, number: int) -> 
 
 def how_it_drove(trajectory: Trajectory, *, stood: bool) -> str:
     """Says what the robot did in its last step: `drove at 0.6 of its speed`."""
-    if stood or not wheels_turn(trajectory)[-1]:
+    if not wheels_turn(trajectory)[-1]:
         return "stood"
+    if stood:
+        return f"had hardly moved for {STANDING_SECONDS:g} s"
     speed = float(forward(trajectory)[-1])
     if abs(speed) < _CREEPING:
         return "turned in place"

@@ -64,9 +64,9 @@ def test_a_training_has_them(moving, tmp_path):
 @pytest.mark.parametrize(
     ("movers", "words"),
     [
-        ("crwd:3", "movers: unknown kind of movers 'crwd' (did you mean 'crowd'?)"),
-        ([{"kind": "bounce", "cuont": 2}], "movers: [0]: cuont: unknown key"),
-        ({"kind": "bounce"}, "movers: expected movers such as"),
+        ("crwd:3", "movers: unknown kind 'crwd' (did you mean 'crowd'?)"),
+        ([{"kind": "bounce", "cuont": 2}], "movers: entry 0: cuont: unknown key"),
+        ({"kind": "bounce"}, "movers: expected 'bounce:5' or"),
         ([POST | {"points": [[73, 40]]}], "mover 0: "),
         ([POST | {"points": [[30, 35]]}], "mover 0 starts on the robot"),
     ],
@@ -96,7 +96,7 @@ def test_the_flag(tdac):
     """It is the key of a task on a map, and does not change one that is given."""
     code, _, err = tdac("synth", "--map", "maze", "--movers", "crwd:3")
     assert code == 2
-    assert "--movers: unknown kind of movers 'crwd'" in err
+    assert "--movers: unknown kind 'crwd'" in err
     code, _, err = tdac("synth", "--task", "maze", "--movers", "crowd:3")
     assert code == 2
     assert "--task already defines the task: leave out --movers" in err

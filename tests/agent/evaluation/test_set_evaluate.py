@@ -146,7 +146,7 @@ def test_the_command(tdac, level, files):
     words = ("evaluate", *files, "--set", level, "--split", "dev", "-n", "4")
     code, out, _ = tdac(*words)
     assert code == 0
-    for said in ("4 dev worlds each", "SCT", "BARN", "0/4", "aisles", "clutter"):
+    for said in ("worlds 0 to 3 of dev", "SCT", "BARN", "0/4", "aisles", "clutter"):
         assert said in out
     assert "still.py, failures: 4 " in out
     assert "broken.py, not driven: " in out

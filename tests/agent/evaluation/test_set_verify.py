@@ -435,7 +435,7 @@ def test_the_command(tdac, tmp_path):
     words = ("verify", str(KNOWN), "--set", "known", "--split", "dev", "-n", "2")
     code, out, err = tdac(*words)
     assert (code, err) == (0, "")
-    assert "2 dev worlds: 2 reached, 0 failed" in out
+    assert "worlds 0 to 1 of dev: 2 reached, 0 failed" in out
     assert "BARN score" in out
     code, out, _ = tdac(*words, "--json")
     assert code == 0

@@ -9,6 +9,8 @@ import pytest
 from driving import drive
 
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
+from tdac_agent.verification.diagnosis.surroundings import surroundings_of
+from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.env import Map2DEnv
 
 FULL = 75.59
@@ -86,6 +88,18 @@ def test_walls_hide_movers():
         _, found = judged(env, 0.8)
         times.append(float(re.search(r"in sight for ([\d.]+) s", found.text)[1]))
     assert times[1] < times[0] - 0.2
+
+
+def test_a_part_of_a_mover_is_in_sight():
+    """Not its centre decides, but whether any of it can be seen."""
+    seen = []
+    for half in (2, 6, 10):
+        walls = [(130, y) for y in range(60 - half, 61 + half, 2)]
+        around = surroundings_of(room(walls=walls, range_max=200.0).nominal)
+        seen.append(around.in_sight(Pose(60.0, 60.0, 0.0), (200.0, 60.0), 8.0))
+        assert not around.in_sight(Pose(60.0, 60.0, 0.0), (200.0, 60.0), 1.0)
+        assert not around.in_sight(Pose(60.0, 60.0, 2.0), (200.0, 60.0), 8.0)
+    assert seen == [True, False, False]
 
 
 def test_one_from_behind_is_never_seen():
