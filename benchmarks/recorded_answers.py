@@ -30,11 +30,11 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tdac_agent.builtin.level import LEVELS
-from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE, SEALED
+from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE
+from tdac_agent.evaluation.salt import SEALED, drawn_salt
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.prompting.extract import extract_source
-from tdac_agent.set_synthesis.hidden import drawn_salt
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.judge.warm import WarmJudge

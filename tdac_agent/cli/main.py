@@ -1,4 +1,4 @@
-"""The command line: `tdac map | world | synth | verify | play | evaluate | …`.
+"""The command line: `tdac map | world | synth | verify | play | evaluate | bench | …`.
 
 Exit codes: 0 success, 1 not verified, 2 usage or infeasible task, 3 infrastructure,
 4 budget exhausted, 130 interrupted.
@@ -20,6 +20,7 @@ import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
 
 from tdac_agent.cli import (
+    bench_flags,
     campaign_flags,
     check_suite_flags,
     doctor_flags,
@@ -37,6 +38,9 @@ from tdac_agent.cli.mistakes import explain, fail
 from tdac_agent.cli.places import with_places
 from tdac_agent.cli.terminal import filter_streams
 
+FOR_HELP = frozenset(["-h", "--help"])
+DEFAULT = "run"
+
 
 class _Command(TyperCommand):
     def get_params(self, ctx: Any) -> list[Any]:
@@ -44,6 +48,14 @@ class _Command(TyperCommand):
 
 
 class _Group(TyperGroup):
+    """A group; its command `run`, if it has one, may be left out."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        words = {*self.commands, *FOR_HELP}
+        if DEFAULT in self.commands and args and args[0] not in words:
+            args = [DEFAULT, *args]
+        return list(super().parse_args(ctx, args))
+
     def get_params(self, ctx: Any) -> list[Any]:
         return _without_types(super().get_params(ctx))
 
@@ -89,6 +101,7 @@ PARTS = (
     verify_flags.app,
     play_flags.app,
     evaluate_flags.app,
+    bench_flags.app,
     train_flags.app,
     campaign_flags.app,
     check_suite_flags.app,
@@ -97,7 +110,6 @@ PARTS = (
     webots_flags.app,
     doctor_flags.app,
 )
-FOR_HELP = frozenset(["-h", "--help"])
 
 
 @app.callback(invoke_without_command=True)

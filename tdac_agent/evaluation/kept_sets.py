@@ -5,19 +5,53 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_envs.core.intake import read_file
 
 REPORT_FILE = "set.json"
-SEALED, ROWS_FILE = "sealed", "episodes.jsonl"
+ROWS_FILE = "episodes.jsonl"
 TRAJECTORIES = "trajectories"
+_MOST_BYTES = 512 << 20
 
 
 def keep_report(report: SetReport, out: Path) -> None:
     """Writes `set.json`."""
     out.mkdir(parents=True, exist_ok=True)
     write_atomic(out / REPORT_FILE, report.model_dump_json(indent=2) + "\n")
+
+
+def kept_report(
+    folder: Path,
+    sha256: str,
+    set_sha256: str,
+    split: str,
+    worlds: int,
+    salt_sha256: str | None = None,
+) -> SetReport | None:
+    """The report in a folder, if it is the wanted one, by these versions of packages.
+
+    Args:
+        folder: The folder.
+        sha256: Hash of the policy's file.
+        set_sha256: Hash of the set.
+        split: Split of the worlds.
+        worlds: Their number.
+        salt_sha256: Hash of the salt of hidden worlds.
+    """
+    try:
+        data = read_file(folder / REPORT_FILE, _MOST_BYTES)
+        report = SetReport.model_validate_json(data)
+    except (OSError, ValueError):
+        return None
+    own, now = report.provenance, dict(versions())
+    found = own.controller_sha256, own.set_sha256, own.split, own.salt_sha256
+    if (*found, own.versions) != (sha256, set_sha256, split, salt_sha256, now):
+        return None
+    return report if report.refused or report.worlds == worlds else None
 
 
 def keep_trajectories(trajectories: Path | None, out: Path) -> None:

@@ -9,7 +9,7 @@ that is in the ledger is answered from it.
 from __future__ import annotations
 
 import secrets
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -159,6 +159,27 @@ def user_ledger() -> Ledger:
             "set XDG_STATE_HOME to a folder"
         )
     return Ledger(folder / "tdac" / "hidden-evaluations.jsonl")
+
+
+def on_record(
+    about: HiddenEvaluation, lineage: str | None, drive: Callable[[], SetReport]
+) -> SetReport:
+    """The report of a hidden evaluation, which is recorded before it is driven.
+
+    Args:
+        about: What is evaluated. If it is recorded already, nothing is driven.
+        lineage: Id of the run that wrote the controller, if one did.
+        drive: Drives it.
+
+    Raises:
+        TaskError: The ledger cannot be used.
+    """
+    ledger = user_ledger()
+    report = ledger.recorded(about)
+    if report is None:
+        number = ledger.begin(about, lineage)
+        report = ledger.end(number, about, drive())
+    return report
 
 
 def _count(

@@ -11,7 +11,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.evaluation.entrants import Entrant
 from tdac_agent.evaluation.evaluate import EPISODES
 from tdac_agent.evaluation.finished import EPISODE_TABLE, RESULTS
-from tdac_agent.evaluation.kept_sets import REPORT_FILE
+from tdac_agent.evaluation.kept_sets import kept_report
 from tdac_agent.evaluation.set_entrants import set_entrants
 from tdac_agent.evaluation.set_evaluation import (
     SetEvaluation,
@@ -106,7 +106,12 @@ def evaluate_on_set(
         reports = []
         for entrant in entrants:
             folder = None if out is None else out / POLICIES / _folder_of(entrant)
-            report = _kept(folder, entrant, about)
+            assert entrant.sha256 is not None
+            report = None
+            if folder is not None:
+                report = kept_report(
+                    folder, entrant.sha256, tasks.sha256, split, worlds
+                )
             if report is None:
                 runs = learned.get(entrant.name)
                 seen = _watch_of(entrant.name, watch)
@@ -202,21 +207,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, tuple):
         return [each.model_dump(mode="json") for each in value]
     return value
-
-
-def _kept(
-    folder: Path | None, entrant: Entrant, about: dict[str, Any]
-) -> SetReport | None:
-    """The report of a policy that has finished already; None if there is none."""
-    if folder is None or not (folder / REPORT_FILE).is_file():
-        return None
-    try:
-        data = read_file(folder / REPORT_FILE, _MOST_BYTES)
-        report = SetReport.model_validate_json(data)
-    except (OSError, ValueError):
-        return None
-    own = report.provenance
-    wanted = (about["set_sha256"], about["split"], entrant.sha256, about["versions"])
-    if (own.set_sha256, own.split, own.controller_sha256, own.versions) != wanted:
-        return None
-    return report if report.refused or report.worlds == about["worlds"] else None

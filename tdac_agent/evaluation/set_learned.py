@@ -14,14 +14,16 @@ from tdac_agent.episodes.learned import Learned
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.entrants import Entrant
-from tdac_agent.evaluation.kept_sets import keep_report
+from tdac_agent.evaluation.kept_sets import TRAJECTORIES, keep_report, keep_sealed
+from tdac_agent.evaluation.ledger import HiddenEvaluation, on_record
 from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
 from tdac_agent.evaluation.set_verify import write_set
 from tdac_agent.sandbox import ControllerFault
-from tdac_agent.tasks.provenance import versions
+from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.verification.judge.driving import FOREVER
 from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of
 from tdac_envs.ladder.env import OnSet, make
+from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet
 
 
@@ -32,17 +34,25 @@ class LearnedRuns:
     Attributes:
         entrant: The policy.
         tasks: The task set.
-        split: `dev` or `test`.
+        split: `dev`, `test` or `hidden`.
+        salt: The salt of the split `hidden`.
         env: The judge's environment; the policy gets its observations alone.
     """
 
     entrant: Entrant
     tasks: TaskSet
     split: str
+    salt: bytes | None
     env: OnSet
 
     @classmethod
-    def of(cls, entrant: Entrant, tasks: TaskSet, split: str) -> LearnedRuns:
+    def of(
+        cls,
+        entrant: Entrant,
+        tasks: TaskSet,
+        split: str,
+        salt_file: Path | None = None,
+    ) -> LearnedRuns:
         """Prepares the episodes.
 
         Raises:
@@ -50,8 +60,9 @@ class LearnedRuns:
         """
         with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
             level = write_set(tasks, Path(name) / "set.yaml")
-            env = make(level, split=split, privileged=True)
-        runs = cls(entrant, tasks, split, env)
+            env = make(level, split=split, salt_file=salt_file, privileged=True)
+        salt = None if salt_file is None else read_salt(salt_file)
+        runs = cls(entrant, tasks, split, salt, env)
         try:
             runs._driver()
         except ControllerFault as fault:
@@ -66,11 +77,38 @@ class LearnedRuns:
     ) -> SetReport:
         """Drives on the first worlds of the split.
 
+        An evaluation on hidden worlds is recorded as `verify_on_set` records it.
+
         Args:
             worlds: Number of worlds.
-            out: Folder for `set.json` and `trajectories/`.
+            out: Folder for `set.json` and `trajectories/`; of hidden worlds, for
+                `set.json` and `sealed/`.
             watch: Called with the numbers of episodes and successes so far.
+
+        Raises:
+            TaskError: The ledger of hidden evaluations cannot be used.
         """
+        assert self.entrant.sha256 is not None
+        if self.salt is None:
+            return self._driven(worlds, out, watch)
+        about = HiddenEvaluation(
+            entrant=self.entrant.sha256,
+            set=self.tasks.name,
+            set_sha256=self.tasks.sha256,
+            worlds=worlds,
+            salt_sha256=sha256_of(self.salt),
+        )
+        report = on_record(about, None, lambda: self._driven(worlds, out, watch))
+        if out is not None:
+            keep_report(report, out)
+        return report
+
+    def _driven(
+        self,
+        worlds: int,
+        out: Path | None,
+        watch: Callable[[int, int], None] | None,
+    ) -> SetReport:
         began, episodes = time.monotonic(), []
         for episode in self._episodes(worlds, out):
             episodes.append(episode)
@@ -81,20 +119,24 @@ class LearnedRuns:
             set=self.tasks.name,
             set_sha256=self.tasks.sha256,
             split=self.split,
-            salt_sha256=None,
+            salt_sha256=None if self.salt is None else sha256_of(self.salt),
             controller_sha256=self.entrant.sha256,
             sandbox="none",
             limits={},
             versions=dict(versions()),
         )
         seconds = time.monotonic() - began
-        report = summarise(provenance, episodes, None, seconds, told=True)
-        if out is not None:
+        told = self.salt is None
+        report = summarise(provenance, episodes, None, seconds, told=told)
+        if out is not None and told:
             keep_report(report, out)
+        elif out is not None:
+            keep_sealed(episodes, out)
         return report
 
     def _episodes(self, worlds: int, out: Path | None) -> Iterator[WorldEpisode]:
-        kept = None if out is None else out / "trajectories"
+        told = self.salt is None
+        kept = None if out is None or not told else out / TRAJECTORIES
         if kept is not None:
             kept.mkdir(parents=True, exist_ok=True)
         for index in range(worlds):
@@ -103,7 +145,7 @@ class LearnedRuns:
             cpu = time.process_time() - before
             if kept is not None:
                 rollout.trajectory.save(kept / f"{index}.npz")
-            yield figures_of(self.env, self.split, index, rollout, cpu, told=True)
+            yield figures_of(self.env, self.split, index, rollout, cpu, told=told)
 
     def drive(self, index: int) -> Rollout:
         """Drives the episode of a world."""

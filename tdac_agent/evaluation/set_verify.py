@@ -18,7 +18,7 @@ from tdac_agent.evaluation.kept_sets import (
     keep_sealed,
     keep_trajectories,
 )
-from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, user_ledger
+from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, on_record
 from tdac_agent.evaluation.seeded_run import run_job
 from tdac_agent.evaluation.set_report import (
     SetProvenance,
@@ -117,12 +117,11 @@ def verify_on_set(
         worlds=SEQUENTIAL if worlds is None else worlds,
         salt_sha256=request.secret_sha256,
     )
-    ledger = user_ledger()
-    report = ledger.recorded(about)
-    if report is None:
-        number = ledger.begin(about, lineage or written_by(controller))
-        report = _driven(request, out, judge, watch)
-        report = ledger.end(number, about, report)
+    report = on_record(
+        about,
+        lineage or written_by(controller),
+        lambda: _driven(request, out, judge, watch),
+    )
     if out is not None:
         keep_report(report, out)
     return report

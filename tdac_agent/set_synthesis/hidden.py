@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import secrets
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from tdac_agent.evaluation.salt import SEALED, drawn_salt
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.runs.recorder import Recorder
@@ -17,10 +16,6 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet
 
-SEALED = "sealed"
-"""Subfolder of a run that only its user can read: the salt of the hidden worlds."""
-SALT_FILE = "salt"
-SALT_BYTES = 32
 HIDDEN_REPORT = "hidden.json"
 
 
@@ -60,27 +55,6 @@ def verify_hidden(
         write_atomic(folder / HIDDEN_REPORT, report.model_dump_json(indent=2) + "\n")
     recorder.event("hidden.end", passed=report.passed, worlds=report.worlds, **about)
     return report
-
-
-def drawn_salt(folder: Path, *, reuse: bool) -> Path:
-    """The file with the salt of a run, 0600 in a folder 0700.
-
-    Args:
-        folder: Its folder, which is made.
-        reuse: Whether a salt that an interrupted process drew is used.
-    """
-    folder.mkdir(mode=0o700, exist_ok=True)
-    folder.chmod(0o700)
-    path = folder / SALT_FILE
-    if not (reuse and path.exists()):
-        unfinished = folder / f"{SALT_FILE}.new"
-        handle = os.open(unfinished, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with os.fdopen(handle, "wb") as file:
-            file.write(secrets.token_bytes(SALT_BYTES))
-            file.flush()
-            os.fsync(handle)
-        unfinished.rename(path)
-    return path
 
 
 def _recorded(path: Path, about: dict[str, str]) -> SetReport | None:

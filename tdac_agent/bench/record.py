@@ -1,0 +1,131 @@
+"""`bench.json`: what came out for all entrants on all sets."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import ConfigDict, Field
+
+from tdac_agent.metrics.paired import Estimate
+from tdac_agent.storage.printable_record import PrintableRecord
+
+
+class _Record(PrintableRecord):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Interval(_Record):
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, found: Estimate) -> Interval:
+        """The same as a record."""
+        return cls(value=found.value, low=found.low, high=found.high)
+
+
+class BenchSet(_Record):
+    """The worlds of a set, the same for all entrants."""
+
+    name: str
+    sha256: str
+    split: str
+    worlds: int
+    salt_sha256: str | None = Field(description="Of hidden worlds.")
+
+
+class BenchFile(_Record):
+    """A file of an entrant: one, or one for each seed of a training."""
+
+    sha256: str
+    hidden: int | None = Field(
+        None, description="Hidden evaluations of this file on the set so far."
+    )
+
+
+class BenchRow(_Record):
+    """An entrant on a set. Figures are None if it did not drive."""
+
+    set: str
+    entrant: str
+    kind: Literal["program", "learned"] | None = None
+    knows: str | None = Field(None, description="What it may use.")
+    tuned: bool | None = Field(
+        None, description="Whether its constants were tuned for this level."
+    )
+    steps: int | None = Field(None, description="Training steps of all its seeds.")
+    files: tuple[BenchFile, ...] = ()
+    problem: str | None = Field(None, description="Why it did not drive.")
+    worlds: int = 0
+    success: Interval | None = Field(
+        None,
+        description="Share of episodes that reached the goal; exact interval (Clopper "
+        "and Pearson), with several seeds a bootstrap.",
+    )
+    time: Interval | None = Field(None, description="Mean time score (SCT), bootstrap.")
+    path: float | None = Field(None, description="Mean path score (SPL).")
+    barn: float | None = Field(None, description="Mean score of BARN, at most 0.5.")
+    contacts: dict[str, int] = Field({}, description="Contacts by what was touched.")
+    late: int = Field(0, description="Episodes that ended at the horizon.")
+    errors: int = Field(0, description="Its own errors, too much CPU time included.")
+    clock_dependent: str | None = None
+
+
+class BenchOverall(_Record):
+    """An entrant over all sets, each with equal weight; only if it drove on all."""
+
+    entrant: str
+    time: Interval
+    middle: float = Field(description="Interquartile mean of the time score.")
+    success: float
+
+
+class BenchPair(_Record):
+    """Two entrants on the same worlds of a set, or over all sets."""
+
+    set: str | None = Field(description="None: over all sets.")
+    one: str
+    other: str
+    ahead: Interval = Field(description="Mean time score of one minus that of other.")
+    p: float = Field(description="Of the time score, by bootstrap.")
+    p_holm: float = Field(description="Adjusted for all pairs of the table, by Holm.")
+    better: float | None = Field(
+        None, description="Share of worlds on which one scores more; a tie is half."
+    )
+    only_one: int | None = Field(None, description="Worlds that only one reached.")
+    only_other: int | None = None
+    p_success: float | None = Field(
+        None, description="McNemar's exact test; None with several seeds."
+    )
+
+
+class Bench(_Record):
+    """Entrants on the same worlds of task sets, by the same judge."""
+
+    schema_version: Literal[1] = 1
+    versions: dict[str, str]
+    sets: tuple[BenchSet, ...]
+    entrants: tuple[str, ...]
+    rows: tuple[BenchRow, ...]
+    overall: tuple[BenchOverall, ...] = ()
+    pairs: tuple[BenchPair, ...] = ()
+
+    def of_set(self, name: str) -> tuple[BenchRow, ...]:
+        """The rows of a set, the best time score first; at the end what did not drive.
+
+        Args:
+            name: Name of the set.
+        """
+        rows = [row for row in self.rows if row.set == name]
+        best = sorted(
+            (row for row in rows if row.time), key=lambda row: -_value(row.time)
+        )
+        return (*best, *(row for row in rows if not row.time))
+
+
+def _value(interval: Interval | None) -> float:
+    assert interval is not None
+    return interval.value

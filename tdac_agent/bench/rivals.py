@@ -1,0 +1,91 @@
+"""Classical local planners as rivals: a controller file for each task set."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tdac_agent.builtin.level import level_of
+from tdac_envs.core.errors import TaskError
+from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
+from tdac_envs.ladder.task_sets import TaskSet
+
+FOLDER = Path(__file__).with_name("planners")
+"""Folder of their files."""
+
+
+class _Rival(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    title: str
+    paper: str
+    levels: tuple[str, ...] = Field(description="Levels whose observations it uses.")
+    ranges: dict[str, tuple[float, float]] = Field(
+        {}, description="Constants of the file that are tuned, with their bounds."
+    )
+    tuned: dict[str, dict[str, float]] = Field(
+        {}, description="Chosen values, by level; those of the file elsewhere."
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """A planner as it drives on a set.
+
+    Attributes:
+        source: Its file, with the values that were chosen for the level.
+        tuned: Whether values were chosen for the level; None if it has none.
+    """
+
+    source: str
+    tuned: bool | None
+
+
+def rival_names() -> tuple[str, ...]:
+    """The names of all rivals."""
+    return tuple(_known())
+
+
+def rival_on(name: str, tasks: TaskSet) -> Rival:
+    """A rival as it drives on a set.
+
+    Raises:
+        TaskError: It does not drive by what is observed there.
+    """
+    rival, level = _known()[name], level_of(tasks)
+    if level not in rival.levels:
+        known = ", ".join(rival.levels)
+        raise TaskError(f"{name} drives by what is observed in {known}")
+    values = rival.tuned.get(level, {})
+    tuned = bool(values) if rival.ranges else None
+    return Rival(with_values(source_of(name), values), tuned)
+
+
+def source_of(name: str) -> str:
+    """The file of a rival, with its own values."""
+    file = FOLDER / f"{name.replace('-', '_')}.py"
+    return file.read_text(encoding="utf-8")
+
+
+def with_values(source: str, values: dict[str, float]) -> str:
+    """A file with other values of constants, each of them on a line `NAME = number`.
+
+    Raises:
+        ValueError: There is no such line.
+    """
+    for name, value in values.items():
+        line = re.compile(rf"^{name} = .*$", re.MULTILINE)
+        source, count = line.subn(f"{name} = {value!r}", source)
+        if count != 1:
+            raise ValueError(f"expected one line '{name} = ...', got {count}")
+    return source
+
+
+@cache
+def _known() -> dict[str, _Rival]:
+    data = parse_yaml(read_file(FOLDER / "rivals.yaml", TEXT_BYTES))
+    return {name: _Rival.model_validate(each) for name, each in data.items()}

@@ -1,0 +1,144 @@
+"""Results of benches: read, put together, and revealed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from tdac_agent.bench.bench import (
+    RESULTS,
+    WORLD_TABLE,
+    folder_of,
+    publish,
+    sealed_episodes,
+    world_rows,
+)
+from tdac_agent.bench.compared import Driven, overall_of, pairs_of
+from tdac_agent.bench.record import Bench, BenchRow, BenchSet
+from tdac_agent.errors import RunError
+from tdac_agent.evaluation.salt import SEALED
+from tdac_agent.tasks.provenance import sha256_of
+from tdac_envs.core.errors import TaskError, one_line_reason
+from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.ladder.source import read_salt
+
+
+def merged(folders: Sequence[Path]) -> Bench:
+    """The results in folders as one bench, with pairs of all entrants.
+
+    Raises:
+        RunError: A folder has no results, or two have different worlds of a set, or
+            different files under one name.
+    """
+    found = [read(folder) for folder in folders]
+    if len(found) == 1:
+        return found[0]
+    sets = _same_sets(folders, found)
+    rows: dict[tuple[str, str], BenchRow] = {}
+    driven: dict[str, dict[str, Driven]] = {name: {} for name in sets}
+    for folder, each in zip(folders, found, strict=True):
+        table = _table(folder)
+        for row in each.rows:
+            key = row.set, row.entrant
+            if key in rows and rows[key].files != row.files:
+                raise RunError(
+                    f"{folder / RESULTS}: another {row.entrant!r} on {row.set} than in "
+                    "the folders before; rename one (NAME=FILE)"
+                )
+            rows[key] = row
+            if row.time is not None:
+                driven[row.set][row.entrant] = _driven(table, row)
+    both = {name: list(each.values()) for name, each in driven.items()}
+    return Bench(
+        versions=found[0].versions,
+        sets=tuple(sets.values()),
+        entrants=tuple(dict.fromkeys(row.entrant for row in rows.values())),
+        rows=tuple(rows.values()),
+        overall=overall_of(both) if len(both) > 1 else (),
+        pairs=pairs_of(both),
+    )
+
+
+def read(folder: Path) -> Bench:
+    """The results in a folder.
+
+    Raises:
+        RunError: There are none, or they cannot be read.
+    """
+    try:
+        return Bench.model_validate_json(read_file(folder / RESULTS, RECORD_BYTES))
+    except (OSError, ValueError) as error:
+        raise RunError(f"{folder / RESULTS}: {one_line_reason(error)}") from error
+
+
+def _same_sets(folders: Sequence[Path], found: Sequence[Bench]) -> dict[str, BenchSet]:
+    """The sets of all benches, by name.
+
+    Raises:
+        RunError: Worlds differ.
+    """
+    sets: dict[str, BenchSet] = {}
+    for folder, each in zip(folders, found, strict=True):
+        for own in each.sets:
+            before = sets.setdefault(own.name, own)
+            if before != own:
+                what = "version" if before.sha256 != own.sha256 else "worlds"
+                raise RunError(
+                    f"{folder / RESULTS}: other {what} of the set {own.name} than in "
+                    "the folders before; show them one at a time"
+                )
+    return sets
+
+
+def _table(folder: Path) -> pd.DataFrame:
+    try:
+        return pd.read_csv(folder / WORLD_TABLE)
+    except OSError as error:
+        raise RunError(
+            f"{folder / WORLD_TABLE}: {one_line_reason(error)}; results on sealed "
+            "worlds cannot be compared with others (tdac bench reveal)"
+        ) from error
+
+
+def _driven(table: pd.DataFrame, row: BenchRow) -> Driven:
+    own = table[(table["set"] == row.set) & (table["entrant"] == row.entrant)]
+    time, success = (
+        own.pivot_table(index="file", columns="index", values=name).to_numpy(np.float64)
+        for name in ("time_score", "success")
+    )
+    return Driven(row.entrant, time, success)
+
+
+def reveal(folder: Path, salt_file: Path) -> None:
+    """Publishes the hidden worlds of a bench: their salt, and all episodes.
+
+    Raises:
+        RunError: There are no results, they are not of hidden worlds, or episodes are
+            missing.
+        TaskError: The salt is no salt, or another one.
+    """
+    found, sha256 = read(folder), sha256_of(read_salt(salt_file))
+    for own in found.sets:
+        if own.salt_sha256 is None:
+            raise RunError(f"{folder / RESULTS}: the worlds of {own.name} are public")
+        if own.salt_sha256 != sha256:
+            raise TaskError(f"{salt_file} is not the salt of {folder / RESULTS}")
+    rows = [
+        line
+        for row in found.rows
+        if row.time is not None
+        for line in world_rows(
+            row.set,
+            row.entrant,
+            [
+                sealed_episodes(
+                    folder_of(folder / SEALED, row.set, file.sha256), file.sha256
+                )
+                for file in row.files
+            ],
+        )
+    ]
+    publish(folder, rows, salt_file)

@@ -1,0 +1,259 @@
+"""`tdac bench`: who is better where, on the same unseen worlds."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.table import Table
+
+from tdac_agent.bench.bench import RESULTS, SALT, TIMING, WORLD_TABLE, bench
+from tdac_agent.bench.record import Bench, BenchPair, BenchRow, BenchSet, Interval
+from tdac_agent.bench.shown import merged
+from tdac_agent.bench.shown import reveal as reveal_folder
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.flags import check_tier
+from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.synth import next_folder
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.warm import WarmJudge
+
+NONE = "–"
+# Widest name of an entrant, so that a table fits into 80 columns.
+WIDEST = 12
+LEGEND = (
+    "time: mean of success x OT / T (SCT), with a 95 % interval by bootstrap over "
+    "worlds (and seeds). reached: with the exact 95 % interval; by bootstrap if there "
+    "are several seeds. path: mean of success x L / driven (SPL). contacts: with a "
+    "wall / a mover while driving / a mover while standing. late: at the horizon; "
+    "error: its own, or too much CPU time."
+)
+
+
+def run(
+    entrants: list[str],
+    sets: str,
+    split: str,
+    worlds: int,
+    out: Path | None,
+    salt_file: Path | None,
+    tier: str,
+    as_json: bool,
+) -> int:
+    """Drives the entrants and prints the results; returns the exit code."""
+    check_tier(tier)
+    folder = out or next_folder("bench")
+    console = Console(stderr=as_json)
+    columns = (
+        TextColumn("{task.fields[doing]}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[successes]} reached"),
+    )
+    bar = Progress(
+        *columns,
+        console=console,
+        transient=True,
+        auto_refresh=False,
+        disable=not console.is_terminal,
+    )
+    row = bar.add_task("", total=worlds, successes=0, doing="preparing")
+
+    def watch(name: str, entrant: str, episodes: int, successes: int) -> None:
+        doing = escape(f"{name}: {entrant}")
+        bar.update(
+            row, completed=episodes, successes=successes, doing=doing, refresh=True
+        )
+
+    with ChildPool() as child_pool, WarmJudge(child_pool) as judge, bar:
+        found = bench(
+            entrants,
+            [name for name in sets.split(",") if name],
+            split,
+            worlds,
+            out=folder,
+            salt_file=salt_file,
+            tier=tier,
+            judge=judge,
+            watch=watch,
+        )
+    if as_json:
+        sys.stdout.write(found.model_dump_json(indent=2) + "\n")
+    else:
+        show(found, console)
+        _say_where(folder, salt_file, console)
+    return 0 if any(each.time for each in found.rows) else 1
+
+
+def _say_where(folder: Path, salt_file: Path | None, console: Console) -> None:
+    """Prints which files there are, and how to reveal sealed worlds."""
+    names = [
+        each
+        for each in (RESULTS, WORLD_TABLE, TIMING, SALT)
+        if (folder / each).exists()
+    ]
+    console.print(escape(f"wrote {', '.join(names)} to {folder}"), soft_wrap=True)
+    if salt_file is not None and not (folder / SALT).exists():
+        words = ["tdac", "bench", "reveal", str(folder), "--salt-file", str(salt_file)]
+        line = f"the worlds are sealed until [bold]{escape(shlex.join(words))}[/]"
+        console.print(line, soft_wrap=True, highlight=False)
+
+
+def show_folders(folders: Sequence[Path], as_json: bool) -> int:
+    """Prints results again; returns 0."""
+    found = merged(folders)
+    if as_json:
+        sys.stdout.write(found.model_dump_json(indent=2) + "\n")
+    else:
+        show(found, Console())
+    return 0
+
+
+def reveal(folder: Path, salt_file: Path) -> int:
+    """Publishes the hidden worlds of a bench; returns 0."""
+    reveal_folder(folder, salt_file)
+    text = f"wrote {WORLD_TABLE}, {SALT} to {folder}: its worlds are public now"
+    Console().print(escape(text), soft_wrap=True)
+    return 0
+
+
+def show(found: Bench, console: Console) -> None:
+    """Prints a table for each set, one over all, and how far the first is ahead."""
+    for own in found.sets:
+        rows = found.of_set(own.name)
+        knows_map = any(row.knows == "+ map" for row in rows)
+        console.print(_table(own, rows))
+        console.print()
+        for row in rows:
+            for note in _notes(row, knows_map):
+                print_sentences(console, note, indent=2)
+    if found.overall:
+        console.print(_overall(found))
+        console.print()
+    print_sentences(console, LEGEND)
+    first = found.entrants[0]
+    pairs = [pair for pair in found.pairs if first in (pair.one, pair.other)]
+    if pairs:
+        console.print()
+        console.print(_pairs(first, pairs))
+        text = (
+            "on the same worlds; p by bootstrap, adjusted for all pairs of a set "
+            f"(Holm). All pairs are in {RESULTS}."
+        )
+        print_sentences(console, text)
+
+
+def _table(own: BenchSet, rows: Sequence[BenchRow]) -> Table:
+    table = Table(
+        title=escape(
+            f"{own.name} {own.sha256[:8]}: worlds 0 to {own.worlds - 1} of {own.split}"
+        ),
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        show_edge=False,
+    )
+    longest = max(len(row.entrant) for row in rows)
+    table.add_column("entrant", overflow="fold", width=min(longest, WIDEST))
+    for name in ("time (95 %)", "reached, %", "path", "contacts", "late", "error"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in rows:
+        table.add_row(escape(row.entrant), *_cells(row))
+    return table
+
+
+def _cells(row: BenchRow) -> list[str]:
+    if row.time is None or row.success is None or row.path is None:
+        return [NONE] * 6
+    kinds = ("wall", "mover", "mover_standing")
+    time, share = row.time, row.success
+    return [
+        f"{time.value:.3f} ({time.low:.2f}–{time.high:.2f})",
+        f"{100 * share.value:.1f} ({100 * share.low:.0f}–{100 * share.high:.0f})",
+        f"{row.path:.3f}",
+        "/".join(str(row.contacts.get(kind, 0)) for kind in kinds),
+        str(row.late),
+        str(row.errors),
+    ]
+
+
+def _notes(row: BenchRow, knows_map: bool) -> list[str]:
+    notes = []
+    if row.problem is not None:
+        notes.append(f"{row.entrant} did not drive: {row.problem}")
+    if row.knows == "sensors" and knows_map:
+        notes.append(f"{row.entrant} does not get the map")
+    if row.tuned is False:
+        notes.append(f"{row.entrant} was not tuned for this level")
+    if row.kind == "learned" and len(row.files) == 1:
+        notes.append(f"{row.entrant}: a single seed")
+    if row.clock_dependent is not None:
+        notes.append(f"{row.entrant} is clock-dependent: {row.clock_dependent}")
+    counts = [each.hidden for each in row.files if each.hidden and each.hidden > 1]
+    if counts:
+        notes.append(
+            f"{row.entrant}: hidden evaluation {max(counts)} of its file; the "
+            "first one counts"
+        )
+    return notes
+
+
+def _overall(found: Bench) -> Table:
+    table = Table(
+        title=f"all {len(found.sets)} sets, equal weights",
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        show_edge=False,
+    )
+    table.add_column("entrant", overflow="fold")
+    for name in ("time", "95 %", "middle half", "reached"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for each in found.overall:
+        table.add_row(
+            escape(each.entrant),
+            f"{each.time.value:.3f}",
+            f"{each.time.low:.3f}–{each.time.high:.3f}",
+            f"{each.middle:.3f}",
+            f"{100 * each.success:.1f} %",
+        )
+    return table
+
+
+def _pairs(first: str, pairs: Sequence[BenchPair]) -> Table:
+    """By how much the first entrant is ahead of each other one."""
+    table = Table(
+        title=escape(f"time score of {first}, minus that of"),
+        title_justify="left",
+        title_style="bold",
+        box=SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        show_edge=False,
+    )
+    table.add_column("entrant", overflow="fold")
+    table.add_column("set")
+    for name in ("difference", "95 %", "p"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for pair in pairs:
+        ahead = pair.ahead if pair.one == first else _negative(pair.ahead)
+        other = pair.other if pair.one == first else pair.one
+        colour = "green" if ahead.low > 0 else "red" if ahead.high < 0 else "yellow"
+        table.add_row(
+            escape(other),
+            escape(pair.set or "all"),
+            f"[{colour}]{ahead.value:+.3f}[/]",
+            f"{ahead.low:+.3f} to {ahead.high:+.3f}",
+            f"{pair.p_holm:.2g}",
+        )
+    return table
+
+
+def _negative(found: Interval) -> Interval:
+    return Interval(value=-found.value, low=-found.high, high=-found.low)

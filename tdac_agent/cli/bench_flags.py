@@ -1,0 +1,105 @@
+"""The commands `tdac bench`, `tdac bench show` and `tdac bench reveal`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Optional
+
+import typer
+
+from tdac_agent.cli.options import Json, Tier, dir_flag, file_flag, number_flag
+
+bench_app = typer.Typer(
+    help="Drive programs and learned policies on the same unseen worlds.",
+    no_args_is_help=True,
+)
+app = typer.Typer()
+app.add_typer(bench_app, name="bench")
+
+
+@bench_app.command(
+    "run",
+    epilog="Examples: `tdac bench builtin dwa mine.py --set unknown`; `tdac bench "
+    "builtin ppo=a.zip,b.zip --set known,crowd --split hidden -n 400 --out arena`",
+)
+def run_command(
+    entrants: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="ENTRANT...",
+            help="Controller files, run folders, .zip files of stable-baselines3, "
+            "`builtin`, or a classical planner: `go-to-goal`, `tangent-bug`, "
+            "`follow-the-gap`, `dwa`, `mppi`, `orca`. NAME=FILE gives it a name; "
+            "NAME=FILE,FILE are seeds of one training.",
+        ),
+    ],
+    sets: Annotated[
+        str,
+        typer.Option(
+            "--set",
+            metavar="NAME,…",
+            help="Task sets (`tdac sets`) or set.yaml files, with commas between them.",
+        ),
+    ],
+    split: Annotated[
+        str, typer.Option(metavar="NAME", help="dev, test or hidden.")
+    ] = "test",
+    worlds: Annotated[
+        int,
+        number_flag("-n", "--worlds", min=1, help="Number of worlds of each set."),
+    ] = 100,
+    out: Annotated[
+        Optional[Path],  # noqa: UP045 - typer reads it at run time
+        dir_flag(
+            "--out",
+            help="Folder for the results; the same command goes on after an "
+            "interruption, and drives only what is new.  [default: bench-1, …]",
+        ),
+    ] = None,
+    salt_file: Annotated[
+        Optional[Path],  # noqa: UP045
+        file_flag(
+            "--salt-file",
+            help="Salt of hidden worlds, which then stay sealed.  [default: drawn, and "
+            "revealed at the end]",
+        ),
+    ] = None,
+    tier: Tier = "auto",
+    as_json: Json = False,
+) -> None:
+    """Drive entrants on the same worlds (`run` may be left out)."""
+    from tdac_agent.cli import bench
+
+    raise typer.Exit(
+        bench.run(entrants, sets, split, worlds, out, salt_file, tier, as_json)
+    )
+
+
+@bench_app.command(
+    "show", epilog="Examples: `tdac bench show bench-1`; `tdac bench show mine theirs`"
+)
+def show_command(
+    folders: Annotated[
+        list[Path], typer.Argument(metavar="DIR...", help="Folders with results.")
+    ],
+    as_json: Json = False,
+) -> None:
+    """Show results again, or those of several folders together."""
+    from tdac_agent.cli import bench
+
+    raise typer.Exit(bench.show_folders(folders, as_json))
+
+
+@bench_app.command(
+    "reveal", epilog="Example: `tdac bench reveal bench-1 --salt-file my.salt`"
+)
+def reveal_command(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with results.")],
+    salt_file: Annotated[
+        Path, file_flag("--salt-file", help="The salt of its hidden worlds.")
+    ],
+) -> None:
+    """Publish the hidden worlds of a bench: their salt and all episodes."""
+    from tdac_agent.cli import bench
+
+    raise typer.Exit(bench.reveal(folder, salt_file))

@@ -1,0 +1,252 @@
+"""Entrants on the same worlds: rows, resumption, hidden worlds, folders together."""
+
+import json
+import stat
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from tdac_agent.bench.bench import bench
+from tdac_agent.bench.record import Bench
+from tdac_agent.bench.shown import merged, read, reveal
+from tdac_agent.errors import ControllerFileError, RunError
+from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs import load_set
+from tdac_envs.core.errors import TaskError
+
+STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+AHEAD = "def policy(obs):\n    return 1.0, 1.0\n"
+RAISES = "def policy(obs):\n    raise ValueError('no')\n"
+
+
+@pytest.fixture(scope="module")
+def judge():
+    with WarmJudge() as warm:
+        yield warm
+
+
+@pytest.fixture
+def level(tmp_path):
+    """A set of short episodes."""
+    short = {"factor": 1.0, "least": 40, "most": 40}
+    path = tmp_path / "few.yaml"
+    values = {"name": "few", "worlds": [{"name": "clutter"}], "horizon": short}
+    path.write_text(yaml.safe_dump(values))
+    return path
+
+
+@pytest.fixture
+def files(tmp_path):
+    """Controllers: one stands, one drives ahead, one raises."""
+    sources = {"still": STILL, "ahead": AHEAD, "raises": RAISES}
+    for name, source in sources.items():
+        (tmp_path / f"{name}.py").write_text(source)
+    return [f"{name}={tmp_path / f'{name}.py'}" for name in sources]
+
+
+def test_rows_are_what_verify_says(judge, tmp_path, files):
+    """Scores, contacts and intervals; a broken entrant is a row with its reason."""
+    out = tmp_path / "out"
+    found = bench(["builtin", *files], ["known"], "dev", 3, out=out, judge=judge)
+    own, still, ahead, broken = found.rows
+    alone = verify_on_set(
+        files[1].partition("=")[2], load_set("known"), "dev", 3, judge=judge
+    )
+    assert ahead.time.value == pytest.approx(alone.scores.time)
+    assert ahead.path == pytest.approx(alone.scores.path)
+    assert (ahead.success.low, ahead.success.high) == (
+        alone.interval.low, alone.interval.high,
+    )  # fmt: skip
+    assert (own.success.value, own.kind, own.knows) == (1.0, "program", "+ map")
+    assert (still.late, still.errors, still.contacts) == (3, 0, {})
+    assert ahead.contacts == {"wall": 3}
+    assert (broken.time, broken.worlds) == (None, 0)
+    assert "ValueError" in broken.problem
+    assert found.of_set("known")[0].entrant == "builtin"
+    assert {(pair.one, pair.other) for pair in found.pairs} == {
+        ("builtin", "still"), ("builtin", "ahead"), ("still", "ahead"),
+    }  # fmt: skip
+    first = found.pairs[0]
+    assert first.ahead.value == pytest.approx(own.time.value)
+    assert (first.only_one, first.only_other, first.better) == (3, 0, 1.0)
+    assert first.p_holm >= first.p
+    assert read(out) == found
+    table = pd.read_csv(out / "worlds.csv")
+    assert len(table) == 9
+    mean = table[table.entrant == "builtin"].time_score.mean()
+    assert mean == pytest.approx(own.time.value)
+
+
+def test_several_sets_have_equal_weight(judge, tmp_path, level, files):
+    """An entrant that does not drive on all of them is in no row over all."""
+    found = bench(
+        [*files, "builtin"],
+        ["known", level],
+        "dev",
+        2,
+        out=tmp_path / "out",
+        judge=judge,
+    )
+    assert {row.entrant for row in found.overall} == {"still", "ahead", "builtin"}
+    for row in found.overall:
+        own = [each.time.value for each in found.rows if each.entrant == row.entrant]
+        assert row.time.value == pytest.approx(np.mean(own))
+    values = [row.time.value for row in found.overall]
+    assert values == sorted(values, reverse=True)
+    assert {pair.set for pair in found.pairs} == {"known", "few", None}
+
+
+def test_it_goes_on_after_an_interruption(judge, tmp_path, level, files):
+    """What has been driven is not driven again, and the results are the same."""
+    out, driven = tmp_path / "out", []
+
+    def interrupt(name, entrant, episodes, successes):
+        if entrant == "ahead":
+            raise KeyboardInterrupt
+
+    def note(name, entrant, episodes, successes):
+        driven.append(entrant)
+
+    given = {"split": "dev", "worlds": 2, "judge": judge}
+    with pytest.raises(KeyboardInterrupt):
+        bench(files, [level], out=out, watch=interrupt, **given)
+    first = bench(files, [level], out=out, watch=note, **given)
+    assert set(driven) == {"ahead", "raises"}
+    driven.clear()
+    assert bench(files, [level], out=out, watch=note, **given) == first
+    assert driven == []
+    assert bench(files, [level], out=tmp_path / "other", **given) == first
+
+
+def test_hidden_worlds(judge, tmp_path, level, files, monkeypatch):
+    """A salt is drawn when the entrants are on record, and revealed at the end."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    out, given = tmp_path / "out", {"split": "hidden", "worlds": 2, "judge": judge}
+
+    def recorded(name, entrant, episodes, successes):
+        entries = json.loads((out / "entrants.json").read_text())
+        assert [entry["entrant"] for entry in entries] == ["still", "ahead"]
+
+    found = bench(files[:2], [level], out=out, watch=recorded, **given)
+    salt = bytes.fromhex((out / "salt.hex").read_text())
+    assert len(salt) == 32
+    assert len(pd.read_csv(out / "worlds.csv")) == 4
+    assert found.sets[0].salt_sha256 is not None
+    assert [file.hidden for row in found.rows for file in row.files] == [1, 1]
+    with pytest.raises(RunError, match="a salt that was drawn for other entrants"):
+        bench(files, [level], out=out, **given)
+    assert bench(files[:2], [level], out=out, **given) == found
+
+
+def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
+    """With a salt of one's own, no row of a world is shown until it is revealed."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    salt, out = tmp_path / "salt", tmp_path / "out"
+    salt.write_bytes(bytes(range(32)))
+    given = {"split": "hidden", "worlds": 2, "judge": judge, "salt_file": salt}
+    found = bench(files[:2], [level], out=out, **given)
+    names = {path.name for path in out.iterdir()} - {"lock"}
+    assert names - {".lock"} <= {"bench.json", "timing.csv", "sealed"}
+    assert stat.S_IMODE((out / "sealed").stat().st_mode) == 0o700
+    other = tmp_path / "other"
+    with pytest.raises(RunError, match="was driven on these hidden worlds before"):
+        bench(files[:1], [level], out=other, **given)
+    (tmp_path / "wrong").write_bytes(bytes(32))
+    with pytest.raises(TaskError, match="is not the salt of"):
+        reveal(out, tmp_path / "wrong")
+    reveal(out, salt)
+    assert bytes.fromhex((out / "salt.hex").read_text()) == salt.read_bytes()
+    table = pd.read_csv(out / "worlds.csv")
+    for row in found.rows:
+        own = table[table.entrant == row.entrant]
+        assert own.time_score.mean() == pytest.approx(row.time.value)
+
+
+def test_folders_together(judge, tmp_path, level, files):
+    """Two benches on the same worlds are one; on others they are refused."""
+    given = {"split": "dev", "judge": judge}
+    both = bench(files[:2], [level], worlds=3, out=tmp_path / "both", **given)
+    for number in (0, 1):
+        folder = tmp_path / str(number)
+        bench(files[number : number + 1], [level], worlds=3, out=folder, **given)
+    assert merged([tmp_path / "0", tmp_path / "1"]) == both
+    bench(files[1:2], [level], worlds=2, out=tmp_path / "2", **given)
+    with pytest.raises(RunError, match="other worlds of the set few"):
+        merged([tmp_path / "0", tmp_path / "2"])
+    text = level.read_text().replace("clutter", "aisles")
+    level.write_text(text)
+    bench(files[1:2], [level], worlds=3, out=tmp_path / "3", **given)
+    with pytest.raises(RunError, match="other version of the set few"):
+        merged([tmp_path / "0", tmp_path / "3"])
+
+
+def test_seeds_of_a_training(judge, tmp_path, level, files):
+    """Several files under one name are one entrant, resampled by file and world."""
+    paths = [file.partition("=")[2] for file in files[:2]]
+    found = bench(
+        [f"both={','.join(paths)}", files[0]],
+        [level],
+        "dev",
+        3,
+        out=tmp_path / "out",
+        judge=judge,
+    )
+    both, still = found.rows
+    assert len(both.files) == 2
+    assert both.late + sum(both.contacts.values()) + both.errors == 6
+    assert found.pairs[0].p_success is None
+    assert still.files[0] in both.files
+
+
+@pytest.mark.parametrize(
+    ("entrants", "sets", "split", "error", "message"),
+    [
+        ([], ["known"], "test", TaskError, "at least one entrant"),
+        (
+            ["no.py"],
+            ["known"],
+            "test",
+            ControllerFileError,
+            r"no entrant 'no\.py'.*builtin",
+        ),
+        (["a=builtin", "a=dwa"], ["known"], "test", TaskError, "'a' is given twice"),
+        (["builtin"], ["known", "known"], "test", TaskError, "'known' is given twice"),
+        (["builtin"], [], "test", TaskError, "at least one task set"),
+        (["builtin"], ["knwon"], "test", TaskError, "did you mean 'known'"),
+        (["builtin"], ["known"], "train", TaskError, "expected split to be one of"),
+    ],
+)
+def test_what_is_refused(tmp_path, entrants, sets, split, error, message):
+    with pytest.raises(error, match=message):
+        bench(entrants, sets, split, out=tmp_path / "out")
+    assert not (tmp_path / "out" / "bench.json").exists()
+
+
+def test_the_command(tdac, tmp_path, level, files):
+    """`run` may be left out; `show` prints the same again."""
+    out = tmp_path / "out"
+    words = (*files, "--set", level, "--split", "dev", "-n", "2", "--out", out)
+    code, said, _ = tdac("bench", *words)
+    assert code == 0
+    for text in ("worlds 0 to 1 of dev", "raises did not drive", "wrote bench.json"):
+        assert text in said
+    assert tdac("bench", "run", *words)[1] == said
+    code, again, _ = tdac("bench", "show", out)
+    assert code == 0
+    assert said.startswith(again.rstrip())
+    record = Bench.model_validate_json(tdac("bench", *words, "--json")[1])
+    assert record == read(out)
+    assert all(len(line) <= 80 for line in said.splitlines() if "0.000 (" in line)
+
+
+def test_nobody_drives(tdac, tmp_path, level, files):
+    """Exit code 1, and no traceback."""
+    code, said, _ = tdac(
+        "bench", files[2], "--set", level, "-n", "1", "--out", tmp_path / "out"
+    )
+    assert (code, "did not drive" in said) == (1, True)
+    code, _, err = tdac("bench", "show", tmp_path)
+    assert (code, len(err.strip().splitlines())) == (2, 1)
