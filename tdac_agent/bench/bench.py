@@ -21,6 +21,7 @@ from tdac_agent.bench.entrants import (
     member_of,
     named,
 )
+from tdac_agent.bench.figures import draw_figures
 from tdac_agent.bench.record import Bench, BenchFile, BenchRow, BenchSet
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.kept_sets import ROWS_FILE, kept_report
@@ -109,9 +110,9 @@ def bench(
         sets: Names of task sets, or paths of set files.
         split: `dev`, `test` or `hidden`.
         worlds: Number of worlds of each set.
-        out: Folder for `bench.json`, `timing.csv`, `worlds.csv` and `driven/`. Of
-            hidden worlds, single episodes are in `sealed/`, which only this user can
-            read.
+        out: Folder for `bench.json`, `timing.csv`, `worlds.csv`, figures and
+            `driven/`. Of hidden worlds, single episodes are in `sealed/`, which only
+            this user can read.
         salt_file: File with the salt of hidden worlds, which stay sealed. By default a
             salt is drawn when all entrants are on record, and revealed at the end.
         tier: Sandbox tier.
@@ -150,9 +151,11 @@ def bench(
             overall=overall_of(arena.driven) if len(tasks) > 1 else (),
             pairs=pairs_of(arena.driven),
         )
-        if split != "hidden" or drawn:
+        public = split != "hidden" or drawn
+        if public:
             publish(out, arena.rows, salt_file)
         write_atomic(out / TIMING, pd.DataFrame(arena.timing).to_csv(index=False))
+        draw_figures(found, pd.DataFrame(arena.rows) if public else None, out)
         write_atomic(out / RESULTS, found.model_dump_json(indent=2) + "\n")
     return found
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
+from tdac_agent.bench.record import Kind
 from tdac_agent.bench.rivals import rival_names, rival_on
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.entrants import BUILTIN, Entrant
@@ -61,6 +61,8 @@ class Member:
     """A file that drives on a set.
 
     Attributes:
+        kind: `builtin`, a classical `planner`, any other `controller`, or `learned`
+            with stable-baselines3.
         sha256: Its hash.
         source: The file, if it is a program.
         lineage: Id of the run that wrote the program, if one did.
@@ -68,16 +70,12 @@ class Member:
         tuned: Whether its constants were tuned for the level; None if it has none.
     """
 
+    kind: Kind
     sha256: str
     source: bytes | None = None
     lineage: str | None = None
     learned: Entrant | None = None
     tuned: bool | None = None
-
-    @property
-    def kind(self) -> Literal["program", "learned"]:
-        """What it is."""
-        return "program" if self.learned is None else "learned"
 
     @property
     def steps(self) -> int | None:
@@ -144,14 +142,15 @@ def member_of(word: str, tasks: TaskSet) -> Member:
     if word in rival_names():
         rival = rival_on(word, tasks)
         source = rival.source.encode()
-        return Member(sha256_of(source), source, tuned=rival.tuned)
+        return Member("planner", sha256_of(source), source, tuned=rival.tuned)
     (entrant,) = set_entrants((word,), tasks)
     file, sha256 = entrant.policy.file, entrant.sha256
     assert file is not None
     assert sha256 is not None
     if entrant.policy.kind == "sb3":
-        return Member(sha256, learned=entrant)
-    return Member(sha256, read_source(file), written_by(file))
+        return Member("learned", sha256, learned=entrant)
+    kind: Kind = "builtin" if word == BUILTIN else "controller"
+    return Member(kind, sha256, read_source(file), written_by(file))
 
 
 def drive(
@@ -192,4 +191,4 @@ def drive(
 
 def knows(member: Member, tasks: TaskSet) -> str:
     """What a file may use."""
-    return "+ map" if tasks.file.map and member.kind == "program" else "sensors"
+    return "+ map" if tasks.file.map and member.kind != "learned" else "sensors"

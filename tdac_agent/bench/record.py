@@ -9,6 +9,9 @@ from pydantic import ConfigDict, Field
 from tdac_agent.metrics.paired import Estimate
 from tdac_agent.storage.printable_record import PrintableRecord
 
+Kind = Literal["builtin", "planner", "controller", "learned"]
+"""What an entrant is."""
+
 
 class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -51,7 +54,7 @@ class BenchRow(_Record):
 
     set: str
     entrant: str
-    kind: Literal["program", "learned"] | None = None
+    kind: Kind | None = None
     knows: str | None = Field(None, description="What it may use.")
     tuned: bool | None = Field(
         None, description="Whether its constants were tuned for this level."

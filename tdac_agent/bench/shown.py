@@ -17,6 +17,7 @@ from tdac_agent.bench.bench import (
     world_rows,
 )
 from tdac_agent.bench.compared import Driven, overall_of, pairs_of
+from tdac_agent.bench.figures import draw_figures
 from tdac_agent.bench.record import Bench, BenchRow, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.salt import SEALED
@@ -142,3 +143,4 @@ def reveal(folder: Path, salt_file: Path) -> None:
         )
     ]
     publish(folder, rows, salt_file)
+    draw_figures(found, pd.DataFrame(rows), folder)

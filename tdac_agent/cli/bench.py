@@ -92,11 +92,9 @@ def run(
 
 def _say_where(folder: Path, salt_file: Path | None, console: Console) -> None:
     """Prints which files there are, and how to reveal sealed worlds."""
-    names = [
-        each
-        for each in (RESULTS, WORLD_TABLE, TIMING, SALT)
-        if (folder / each).exists()
-    ]
+    files = RESULTS, WORLD_TABLE, TIMING, SALT
+    names = [name for name in files if (folder / name).exists()]
+    names += sorted(path.name for path in folder.glob("*.svg"))
     console.print(escape(f"wrote {', '.join(names)} to {folder}"), soft_wrap=True)
     if salt_file is not None and not (folder / SALT).exists():
         words = ["tdac", "bench", "reveal", str(folder), "--salt-file", str(salt_file)]

@@ -60,7 +60,7 @@ def test_rows_are_what_verify_says(judge, tmp_path, files):
     assert (ahead.success.low, ahead.success.high) == (
         alone.interval.low, alone.interval.high,
     )  # fmt: skip
-    assert (own.success.value, own.kind, own.knows) == (1.0, "program", "+ map")
+    assert (own.success.value, own.kind, own.knows) == (1.0, "builtin", "+ map")
     assert (still.late, still.errors, still.contacts) == (3, 0, {})
     assert ahead.contacts == {"wall": 3}
     assert (broken.time, broken.worlds) == (None, 0)
@@ -76,6 +76,8 @@ def test_rows_are_what_verify_says(judge, tmp_path, files):
     assert read(out) == found
     table = pd.read_csv(out / "worlds.csv")
     assert len(table) == 9
+    for name in ("scores", "difficulty-known"):
+        assert (out / f"{name}.svg").read_text().rstrip().endswith("</svg>")
     mean = table[table.entrant == "builtin"].time_score.mean()
     assert mean == pytest.approx(own.time.value)
 
@@ -148,8 +150,8 @@ def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
     salt.write_bytes(bytes(range(32)))
     given = {"split": "hidden", "worlds": 2, "judge": judge, "salt_file": salt}
     found = bench(files[:2], [level], out=out, **given)
-    names = {path.name for path in out.iterdir()} - {"lock"}
-    assert names - {".lock"} <= {"bench.json", "timing.csv", "sealed"}
+    names = {path.name for path in out.iterdir()}
+    assert names - {".lock"} == {"bench.json", "timing.csv", "sealed", "scores.svg"}
     assert stat.S_IMODE((out / "sealed").stat().st_mode) == 0o700
     other = tmp_path / "other"
     with pytest.raises(RunError, match="was driven on these hidden worlds before"):
