@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+import shutil
+from collections.abc import Generator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_report import SetReport
@@ -15,6 +19,7 @@ from tdac_envs.core.intake import read_file
 REPORT_FILE = "set.json"
 ROWS_FILE = "episodes.jsonl"
 TRAJECTORIES = "trajectories"
+UNFINISHED, ABOUT = "unfinished", "about.json"
 _MOST_BYTES = 512 << 20
 
 
@@ -22,6 +27,31 @@ def keep_report(report: SetReport, out: Path) -> None:
     """Writes `set.json`."""
     out.mkdir(parents=True, exist_ok=True)
     write_atomic(out / REPORT_FILE, report.model_dump_json(indent=2) + "\n")
+
+
+@contextmanager
+def unfinished(out: Path | None, about: dict[str, Any]) -> Generator[Path | None]:
+    """The folder of what an interrupted evaluation has driven; removed at the end.
+
+    Args:
+        out: Folder of the evaluation; None for none.
+        about: What determines the episodes. What others have driven is removed.
+    """
+    if out is None:
+        yield None
+        return
+    folder, text = out / UNFINISHED, json.dumps(about, sort_keys=True)
+    try:
+        same = (folder / ABOUT).read_text(encoding="utf-8") == text
+    except (OSError, ValueError):
+        same = False
+    if not same:
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        folder.chmod(0o700)
+        write_atomic(folder / ABOUT, text)
+    yield folder
+    shutil.rmtree(folder)
 
 
 def kept_report(

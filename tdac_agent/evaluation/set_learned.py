@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,14 +14,25 @@ from tdac_agent.episodes.learned import Learned
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.entrants import Entrant
-from tdac_agent.evaluation.kept_sets import TRAJECTORIES, keep_report, keep_sealed
+from tdac_agent.evaluation.kept_sets import (
+    ROWS_FILE,
+    TRAJECTORIES,
+    keep_report,
+    keep_sealed,
+    keep_trajectories,
+    unfinished,
+)
 from tdac_agent.evaluation.ledger import HiddenEvaluation, on_record
 from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
 from tdac_agent.evaluation.set_verify import write_set
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.verification.judge.driving import FOREVER
-from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of
+from tdac_agent.verification.judge.set_job import (
+    WorldEpisode,
+    figures_of,
+    kept_worlds,
+)
 from tdac_envs.ladder.env import OnSet, make
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet
@@ -109,12 +120,20 @@ class LearnedRuns:
         out: Path | None,
         watch: Callable[[int, int], None] | None,
     ) -> SetReport:
-        began, episodes = time.monotonic(), []
-        for episode in self._episodes(worlds, out):
-            episodes.append(episode)
-            if watch is not None:
-                watch(len(episodes), sum(each.success for each in episodes))
+        began = time.monotonic()
         assert self.entrant.sha256 is not None
+        told, wrappers = self.salt is None, self.entrant.policy.wrappers
+        about = {
+            "policy": [self.entrant.sha256, wrappers],
+            "set": self.tasks.sha256,
+            "worlds": [self.split, worlds],
+            "secret": None if self.salt is None else sha256_of(self.salt),
+            "versions": dict(versions()),
+        }
+        with unfinished(out, about) as driven:
+            episodes = self._episodes(worlds, driven, watch)
+            if told and out is not None and driven is not None:
+                keep_trajectories(driven / TRAJECTORIES, out)
         provenance = SetProvenance(
             set=self.tasks.name,
             set_sha256=self.tasks.sha256,
@@ -126,7 +145,6 @@ class LearnedRuns:
             versions=dict(versions()),
         )
         seconds = time.monotonic() - began
-        told = self.salt is None
         report = summarise(provenance, episodes, None, seconds, told=told)
         if out is not None and told:
             keep_report(report, out)
@@ -134,18 +152,31 @@ class LearnedRuns:
             keep_sealed(episodes, out)
         return report
 
-    def _episodes(self, worlds: int, out: Path | None) -> Iterator[WorldEpisode]:
+    def _episodes(
+        self,
+        worlds: int,
+        kept: Path | None,
+        watch: Callable[[int, int], None] | None,
+    ) -> list[WorldEpisode]:
+        """Drives the worlds that an interrupted call has not driven."""
+        rows = None if kept is None else kept / ROWS_FILE
+        episodes = kept_worlds(rows, tuple(range(worlds)))
         told = self.salt is None
-        kept = None if out is None or not told else out / TRAJECTORIES
-        if kept is not None:
-            kept.mkdir(parents=True, exist_ok=True)
-        for index in range(worlds):
+        for index in range(len(episodes), worlds):
             before = time.process_time()
             rollout = self.drive(index)
             cpu = time.process_time() - before
-            if kept is not None:
-                rollout.trajectory.save(kept / f"{index}.npz")
-            yield figures_of(self.env, self.split, index, rollout, cpu, told=told)
+            if kept is not None and told:
+                (kept / TRAJECTORIES).mkdir(exist_ok=True)
+                rollout.trajectory.save(kept / TRAJECTORIES / f"{index}.npz")
+            found = figures_of(self.env, self.split, index, rollout, cpu, told=told)
+            episodes.append(found)
+            if rows is not None:
+                with rows.open("a", encoding="utf-8") as file:
+                    file.write(f"{found.model_dump_json()}\n")
+            if watch is not None:
+                watch(len(episodes), sum(each.success for each in episodes))
+        return episodes
 
     def drive(self, index: int) -> Rollout:
         """Drives the episode of a world."""

@@ -14,9 +14,12 @@ from pathlib import Path
 
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.kept_sets import (
+    ROWS_FILE,
+    TRAJECTORIES,
     keep_report,
     keep_sealed,
     keep_trajectories,
+    unfinished,
 )
 from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, on_record
 from tdac_agent.evaluation.seeded_run import run_job
@@ -87,7 +90,8 @@ def verify_on_set(
             that of the run folder that the file is in, if it is in one.
         tier: Sandbox tier; `auto` for the best one on this machine.
         out: Folder for `set.json` and `trajectories/`; of hidden worlds, for `set.json`
-            and `sealed/`, which only this user can read.
+            and `sealed/`, which only this user can read. With a number of worlds, an
+            interrupted call leaves its episodes there, and the same call goes on.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with the numbers of episodes and successes so far.
 
@@ -196,9 +200,21 @@ def _driven(
     test = SequentialTest(tasks.file.bar, most) if worlds is None else None
     count = most if worlds is None else worlds
     compile_for_set(tasks)
-    with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
+    about = {
+        "controller": sha256_of(request.source),
+        "set": tasks.sha256,
+        "worlds": [request.split, request.first, count],
+        "secret": None if told else request.secret_sha256,
+        "sandbox": [request.tier, asdict(limits_of(tasks))],
+        "versions": dict(versions()),
+    }
+    with (
+        tempfile.TemporaryDirectory(prefix="tdac-set-") as name,
+        unfinished(None if test else out, about) as driven,
+    ):
         folder = Path(name)
         salt_file = request.salt_file
+        kept = (driven or folder) / TRAJECTORIES
         job = SetJob(
             set_file=write_set(tasks, folder / "set.yaml"),
             split=request.split,
@@ -210,8 +226,9 @@ def _driven(
             tier=request.tier,
             limits=limits_of(tasks),
             out=folder / "results",
-            trajectories=folder / "trajectories" if out is not None and told else None,
+            trajectories=kept if out is not None and told else None,
             hidden_folder=request.hidden_folder,
+            kept=None if driven is None else driven / ROWS_FILE,
         )
         write_atomic(job.controller, request.source)
         longest = tasks.file.horizon.most * tasks.file.dt * len(job.worlds)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Generator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -54,7 +54,8 @@ from tdac_envs.movers.state import SPEED
 class SetJob(BaseModel):
     """Worlds to drive on; all paths are absolute.
 
-    `test` stops early. `told` is whether episodes may have a diagnosis.
+    `test` stops early. `told` is whether episodes may have a diagnosis. In `kept`,
+    without a test, an interrupted job finds the episodes that it has driven already.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -72,6 +73,7 @@ class SetJob(BaseModel):
     out: Path
     trajectories: Path | None = None
     hidden_folder: Path | None = None
+    kept: Path | None = None
 
 
 class WorldEpisode(PrintableRecord):
@@ -124,6 +126,33 @@ class WorldSummary:
     is_retryable: bool
 
 
+def kept_worlds(path: Path | None, worlds: tuple[int, ...]) -> list[WorldEpisode]:
+    """The first episodes of these worlds that an interrupted job has kept.
+
+    A line that was not written completely ends them. Its file is cut off before it.
+
+    Args:
+        path: The file; None for none.
+        worlds: Numbers of the worlds, in their order.
+    """
+    found: list[WorldEpisode] = []
+    if path is None or not path.is_file():
+        return found
+    text = path.read_bytes()
+    size = 0
+    for line in text.splitlines(keepends=True):
+        if len(found) == len(worlds) or not line.endswith(b"\n"):
+            break
+        episode = WorldEpisode.model_validate_json(line)
+        if episode.index != worlds[len(found)]:
+            break
+        found.append(episode)
+        size += len(line)
+    if size < len(text):
+        write_atomic(path, text[:size])
+    return found
+
+
 @dataclass(eq=False)
 class SetRun:
     """Everything that the episodes of a job share.
@@ -168,16 +197,24 @@ def judge_set(job: SetJob, child_pool: ChildPool) -> None:
     job.out.mkdir(exist_ok=True)
     run = SetRun(job, read_file(job.controller, RECORD_BYTES), child_pool)
     counts, tier, fault, problem = [0, 0], job.tier, None, None
-    with (job.out / EPISODES_FILE).open("w", encoding="utf-8") as file:
+    before = kept_worlds(job.kept, job.worlds)
+    with ExitStack() as stack:
+        paths = [job.out / EPISODES_FILE, *([job.kept] if job.kept else [])]
+        files = [
+            stack.enter_context(path.open("a", encoding="utf-8")) for path in paths
+        ]
+        files[0].writelines(f"{each.model_dump_json()}\n" for each in before)
+        files[0].flush()
         try:
             checks, tier = _checked(run)
             write_atomic(job.out / CHECKS_FILE, checks.model_dump_json())
-            worlds = () if checks.failures else job.worlds
-            for kept in _episodes(run, worlds):
-                tier = kept.tier or tier
-                file.write(kept.figures.model_dump_json() + "\n")
-                file.flush()
-                counts[not kept.figures.success] += 1
+            worlds = () if checks.failures else job.worlds[len(before) :]
+            for driven in _episodes(run, worlds):
+                tier = driven.tier or tier
+                for file in files:
+                    file.write(driven.figures.model_dump_json() + "\n")
+                    file.flush()
+                counts[not driven.figures.success] += 1
                 if job.test and job.test.decide(*counts) != "undecided":
                     break
         except SandboxError as error:

@@ -252,3 +252,30 @@ def test_nobody_drives(tdac, tmp_path, level, files):
     assert (code, "did not drive" in said) == (1, True)
     code, _, err = tdac("bench", "show", tmp_path)
     assert (code, len(err.strip().splitlines())) == (2, 1)
+
+
+def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
+    """Not only whole files, but each of their episodes is driven once."""
+    out, seen = tmp_path / "out", []
+
+    def interrupt(name, entrant, episodes, successes):
+        if episodes == 2:
+            raise KeyboardInterrupt
+
+    def note(name, entrant, episodes, successes):
+        seen.append(episodes)
+
+    given = {"split": "dev", "worlds": 6, "judge": judge}
+    with pytest.raises(KeyboardInterrupt):
+        bench(files[:1], [level], out=out, watch=interrupt, **given)
+    (rows,) = out.glob("driven/few/*/unfinished/episodes.jsonl")
+    kept = rows.read_text().splitlines()
+    assert len(kept) >= 2
+    changed = json.loads(kept[0]) | {"time_score": 0.5}
+    rows.write_text("\n".join([json.dumps(changed), kept[1], kept[1][:20]]))
+    found = bench(files[:1], [level], out=out, watch=note, **given)
+    # The first episode is the one that was kept, the broken line is driven again.
+    assert found.rows[0].time.value == pytest.approx(0.5 / 6)
+    assert not rows.parent.exists()
+    assert len(list(out.glob("driven/few/*/trajectories/*.npz"))) == 6
+    assert len(pd.read_csv(out / "worlds.csv")) == 6
