@@ -99,7 +99,7 @@ def named(words: Sequence[str]) -> tuple[Named, ...]:
         if not name.isprintable():
             raise TaskError(f"expected printable names of entrants, got {name!r:.80}")
         if names.count(name) > 1:
-            raise TaskError(f"the entrant {name!r} is given twice")
+            raise TaskError(f"the entrant {name!r} is given twice: name it, NAME=FILE")
     for each in found:
         for word in each.words:
             if word not in rival_names():
@@ -110,7 +110,7 @@ def named(words: Sequence[str]) -> tuple[Named, ...]:
 def _named(word: str) -> Named:
     name, equals, files = word.partition("=")
     if not equals or Path(word).exists():
-        return Named(word, (word,))
+        return Named(Path(word).name or word, (word,))
     return Named(name, tuple(file for file in files.split(",") if file))
 
 

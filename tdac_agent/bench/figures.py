@@ -11,6 +11,8 @@ from tdac_agent.plots.arena import plot_difficulty, plot_scores, plot_training
 from tdac_agent.plots.style import save_figure
 
 SCORES, TRAINING = "scores.svg", "training.svg"
+LEAST_WORLDS = 20
+"""Worlds of a set that are enough for groups by difficulty."""
 
 
 def draw_figures(found: Bench, worlds: pd.DataFrame | None, out: Path) -> list[str]:
@@ -31,7 +33,7 @@ def draw_figures(found: Bench, worlds: pd.DataFrame | None, out: Path) -> list[s
         names.append(TRAINING)
     for each in found.sets if worlds is not None and len(worlds) else ():
         assert worlds is not None
-        if (worlds["set"] == each.name).any():
+        if (worlds["set"] == each.name).any() and each.worlds >= LEAST_WORLDS:
             names.append(f"difficulty-{each.name}.svg")
             save_figure(plot_difficulty(worlds, each.name), out / names[-1])
     return names

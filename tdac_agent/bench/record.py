@@ -59,7 +59,9 @@ class BenchRow(_Record):
     tuned: bool | None = Field(
         None, description="Whether its constants were tuned for this level."
     )
-    steps: int | None = Field(None, description="Training steps of all its seeds.")
+    steps: int | None = Field(
+        None, description="Training steps, up to what was saved, of all its seeds."
+    )
     files: tuple[BenchFile, ...] = ()
     problem: str | None = Field(None, description="Why it did not drive.")
     worlds: int = 0

@@ -28,6 +28,8 @@ _KINDS = {
     "learned": "learned",
 }
 _COLUMNS = 3
+# Characters of a name.
+_LONGEST = 22
 
 
 def plot_scores(rows: pd.DataFrame) -> Figure:
@@ -51,7 +53,7 @@ def plot_scores(rows: pd.DataFrame) -> Figure:
             f"{name}, {int(own['worlds'].max())} worlds", loc="left", fontsize=9.5,
             color=TEXT,
         )  # fmt: skip
-        axes.set_yticks(range(len(order), 0, -1), order)
+        axes.set_yticks(range(len(order), 0, -1), [_short(name) for name in order])
         axes.set_ylim(0.4, len(order) + 0.6)
         axes.set_xlim(-0.02, 1.0)
         axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "", "0.5", "", "1"])
@@ -106,7 +108,7 @@ def plot_difficulty(worlds: pd.DataFrame, name: str) -> Figure:
                 color=COLOURS[number % len(COLOURS)],
                 markersize=3.5,
                 linewidth=1.2,
-                label=entrant,
+                label=_short(entrant),
                 clip_on=False,
             )
         axes.set_xlabel(DIFFICULTY[key], fontsize=9, color=TEXT)
@@ -146,7 +148,7 @@ def plot_training(rows: pd.DataFrame) -> Figure:
                 yerr=[[row.time - row.low], [row.high - row.time]],
                 fmt=MARKERS[number % len(MARKERS)],
                 color=COLOURS[number % len(COLOURS)],
-                label=row.entrant,
+                label=_short(row.entrant),
             )
         best = rows[(rows["set"] == name) & (rows["kind"] != "learned")]["time"].max()
         if not pd.isna(best):
@@ -159,6 +161,10 @@ def plot_training(rows: pd.DataFrame) -> Figure:
     figure.supxlabel(label, fontsize=9, color=TEXT)
     figure.supylabel("time score, 95 % intervals", fontsize=9, color=TEXT)
     return figure
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
 
 
 def _panels(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
+from tdac_agent.bench.bench import bench
 from tdac_agent.episodes.sb3_file import read_metadata
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
@@ -111,6 +112,32 @@ def test_its_evaluation_is_that_of_the_judge(trained):
     assert row.hit / 4 == best.collision_rate
     steps = np.mean([episode.steps for episode in report.episodes])
     assert steps == pytest.approx(best.mean_length)
+
+
+def test_a_policy_in_a_bench(trained, few, tmp_path, monkeypatch):
+    """Beside a program, on hidden worlds, too; one that does not fit is a row."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    tasks, plan, _, out = trained(**LOST)
+    level, file = tmp_path / "few.yaml", out / "policy.zip"
+    still = tmp_path / "still.py"
+    still.write_text("def policy(obs):\n    return 0.0, 0.0\n")
+    words = [f"ppo={file}", str(still)]
+    found = bench(words, [level], "dev", 4, out=tmp_path / "bench")
+    alone = evaluate_on_set([file], tasks, "dev", 4)
+    learned, program = found.rows
+    assert learned.success.value == alone.rows[0].successes / 4
+    assert (learned.kind, learned.knows, program.kind) == (
+        "learned", "sensors", "controller",
+    )  # fmt: skip
+    assert 0 < learned.steps <= plan.steps
+    hidden = bench(words, [level], "hidden", 3, out=tmp_path / "hidden")
+    assert [row.files[0].hidden for row in hidden.rows] == [1, 1]
+    ledger = tmp_path / "state" / "tdac" / "hidden-evaluations.jsonl"
+    assert len(ledger.read_text().splitlines()) == 4
+    other = few(name="others")
+    (row, drove) = bench(words, [other], "dev", 1, out=tmp_path / "other").rows
+    assert "the task set 'few', not on 'others'" in row.problem
+    assert (row.time, drove.worlds) == (None, 1)
 
 
 def test_trials_begin_in_their_own_worlds(few, config):
