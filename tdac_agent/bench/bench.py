@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,11 @@ from tdac_agent.bench.entrants import (
     named,
 )
 from tdac_agent.bench.figures import draw_figures
+from tdac_agent.bench.page import MOST_WORLDS, Replay, write_page
 from tdac_agent.bench.record import Bench, BenchFile, BenchRow, BenchSet
+from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import ControllerFileError, RunError
-from tdac_agent.evaluation.kept_sets import ROWS_FILE, kept_report
+from tdac_agent.evaluation.kept_sets import ROWS_FILE, TRAJECTORIES, kept_report
 from tdac_agent.evaluation.salt import SEALED, drawn_salt
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import MOST_EPISODES
@@ -37,7 +39,7 @@ from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.source import read_salt
-from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.ladder.task_sets import AnyTask, TaskSet, load_set
 
 WORLDS = 100
 RESULTS, WORLD_TABLE, TIMING = "bench.json", "worlds.csv", "timing.csv"
@@ -81,6 +83,7 @@ class _Arena:
     driven: dict[str, list[Driven]] = field(default_factory=dict)
     rows: list[dict[str, Any]] = field(default_factory=list)
     timing: list[dict[str, Any]] = field(default_factory=list)
+    replays: dict[str, list[Replay]] = field(default_factory=dict)
 
     @property
     def salt_sha256(self) -> str | None:
@@ -155,7 +158,10 @@ def bench(
         if public:
             publish(out, arena.rows, salt_file)
         write_atomic(out / TIMING, pd.DataFrame(arena.timing).to_csv(index=False))
-        draw_figures(found, pd.DataFrame(arena.rows) if public else None, out)
+        table = pd.DataFrame(arena.rows) if public else None
+        figures = draw_figures(found, table, out)
+        tasks_of = {own.name: _first_tasks(arena, own) for own in tasks}
+        write_page(found, arena.replays, tasks_of, figures, out)
         write_atomic(out / RESULTS, found.model_dump_json(indent=2) + "\n")
     return found
 
@@ -261,6 +267,7 @@ def _row(arena: _Arena, part: _Part) -> BenchRow:
     found = Driven.of(part.entrant.name, episodes)
     arena.driven.setdefault(tasks.name, []).append(found)
     arena.rows.extend(world_rows(tasks.name, part.entrant.name, episodes))
+    arena.replays.setdefault(tasks.name, []).extend(_replays(arena, part, episodes))
     arena.timing.append(_timing(tasks.name, part.entrant.name, episodes))
     about["files"] = tuple(
         BenchFile(
@@ -322,6 +329,27 @@ def sealed_episodes(folder: Path, sha256: str) -> tuple[WorldEpisode, ...]:
             "worlds before; use the folder of that bench, or another salt"
         ) from None
     return tuple(map(WorldEpisode.model_validate_json, lines))
+
+
+def _first_tasks(arena: _Arena, tasks: TaskSet) -> dict[int, AnyTask]:
+    """The tasks of the worlds whose episodes are shown."""
+    if not arena.replays.get(tasks.name):
+        return {}
+    count = min(arena.count, MOST_WORLDS)
+    return {index: tasks.task(arena.split, index) for index in range(count)}
+
+
+def _replays(arena: _Arena, part: _Part, episodes: Episodes) -> Iterator[Replay]:
+    """The first episodes of an entrant's first file, if they may be shown."""
+    if arena.split == "hidden":
+        return
+    folder = folder_of(arena.out / DRIVEN, part.tasks.name, part.members[0].sha256)
+    for episode in episodes[0][:MOST_WORLDS]:
+        path = folder / TRAJECTORIES / f"{episode.index}.npz"
+        if path.is_file():
+            trajectory = Trajectory.load(path)
+            name, outcome = part.entrant.name, episode.outcome
+            yield Replay(name, episode.index, outcome, trajectory)
 
 
 def _timing(name: str, entrant: str, episodes: Episodes) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from tdac_agent.bench.bench import RESULTS, SALT, TIMING, WORLD_TABLE, bench
+from tdac_agent.bench.page import PAGE
 from tdac_agent.bench.record import Bench, BenchPair, BenchRow, BenchSet, Interval
 from tdac_agent.bench.shown import merged
 from tdac_agent.bench.shown import reveal as reveal_folder
@@ -95,6 +96,7 @@ def _say_where(folder: Path, salt_file: Path | None, console: Console) -> None:
     files = RESULTS, WORLD_TABLE, TIMING, SALT
     names = [name for name in files if (folder / name).exists()]
     names += sorted(path.name for path in folder.glob("*.svg"))
+    names += [PAGE] if (folder / PAGE).exists() else []
     console.print(escape(f"wrote {', '.join(names)} to {folder}"), soft_wrap=True)
     if salt_file is not None and not (folder / SALT).exists():
         words = ["tdac", "bench", "reveal", str(folder), "--salt-file", str(salt_file)]

@@ -214,7 +214,7 @@ def _driven(
     ):
         folder = Path(name)
         salt_file = request.salt_file
-        kept = (driven or folder) / TRAJECTORIES
+        kept = (driven or folder).resolve() / TRAJECTORIES
         job = SetJob(
             set_file=write_set(tasks, folder / "set.yaml"),
             split=request.split,
@@ -228,7 +228,7 @@ def _driven(
             out=folder / "results",
             trajectories=kept if out is not None and told else None,
             hidden_folder=request.hidden_folder,
-            kept=None if driven is None else driven / ROWS_FILE,
+            kept=None if driven is None else driven.resolve() / ROWS_FILE,
         )
         write_atomic(job.controller, request.source)
         longest = tasks.file.horizon.most * tasks.file.dt * len(job.worlds)

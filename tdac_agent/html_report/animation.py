@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.runs.history import CandidateHistory, Told
+from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import contact_of
 from tdac_agent.verification.diagnosis.report import Episode
@@ -37,18 +38,64 @@ def animations(told: Told, task: Task, scene: TaskPicture) -> list[dict[str, Any
     """Encodes the recorded episodes of all candidates of a run.
 
     Returns:
-        A dict per episode for the player: candidate, name, outcome, dt, steps, points
-        (differences of step, x, y and heading, flattened), contact, and movers: radius
-        and points (differences of step, x and y) of each.
+        A dict per episode for the player: candidate, its label, name, and what
+        `encoded` returns.
     """
     found = [(one, *pair) for one in told.tried for pair in _episodes(one)]
-    most = _share(ALL_POINTS, len(found))
-    of_mover = _share(ALL_MOVER_POINTS, sum(_count(each[-1]) for each in found))
+    most = shares([each[-1] for each in found])
     return [
-        _encoded(task, scene, most, *each)
-        | {"movers": _movers(scene, of_mover, each[-1])}
-        for each in found
+        {
+            "candidate": f"{one.k}.{one.j}",
+            "label": f"k={one.k} j={one.j}",
+            "name": episode.name,
+            **encoded(task.nominal, scene, trajectory, episode.outcome, most),
+        }
+        for one, episode, trajectory in found
     ]
+
+
+def shares(found: Sequence[Trajectory]) -> tuple[int, int]:
+    """Most points of each episode, and of each mover, for a page with all of them."""
+    return (
+        _share(ALL_POINTS, len(found)),
+        _share(ALL_MOVER_POINTS, sum(map(_count, found))),
+    )
+
+
+def encoded(
+    nominal: Nominal,
+    scene: TaskPicture,
+    trajectory: Trajectory,
+    outcome: str,
+    most: tuple[int, int],
+) -> dict[str, Any]:
+    """Encodes an episode.
+
+    Args:
+        nominal: Its task.
+        scene: The picture on which it is shown.
+        trajectory: The episode.
+        outcome: How it ended.
+        most: From `shares`.
+
+    Returns:
+        Outcome, dt, steps, points (differences of step, x, y and heading, flattened),
+        contact, and movers: radius and points (differences of step, x and y) of each.
+    """
+    poses = scene.at(trajectory.poses)
+    kept = thinned(poses, most[0])
+    rows = np.column_stack([kept, poses[kept] * (FINENESS, FINENESS, TURNS)])
+    whole = np.rint(rows).astype(int)
+    touched = contact_of(nominal, trajectory, outcome)
+    contact = None if touched is None else scene.at(np.array([touched]))[0].round(1)
+    return {
+        "outcome": outcome,
+        "dt": trajectory.dt,
+        "steps": trajectory.steps,
+        "points": np.diff(whole, axis=0, prepend=0).ravel().tolist(),
+        "contact": None if contact is None else contact.tolist(),
+        "movers": _movers(scene, most[1], trajectory),
+    }
 
 
 def _share(points: int, count: int) -> int:
@@ -89,31 +136,6 @@ def _episodes(one: CandidateHistory) -> Iterator[tuple[Episode, Trajectory]]:
         # The file may hold an episode of `run_episode` from the same start.
         if trajectory is not None and trajectory.steps == episode.steps > 0:
             yield episode, trajectory
-
-
-def _encoded(
-    task: Task,
-    scene: TaskPicture,
-    most: int,
-    one: CandidateHistory,
-    episode: Episode,
-    trajectory: Trajectory,
-) -> dict[str, Any]:
-    poses = scene.at(trajectory.poses)
-    kept = thinned(poses, most)
-    rows = np.column_stack([kept, poses[kept] * (FINENESS, FINENESS, TURNS)])
-    whole = np.rint(rows).astype(int)
-    touched = contact_of(task.nominal, trajectory, episode.outcome)
-    contact = None if touched is None else scene.at(np.array([touched]))[0].round(1)
-    return {
-        "candidate": f"{one.k}.{one.j}",
-        "name": episode.name,
-        "outcome": episode.outcome,
-        "dt": trajectory.dt,
-        "steps": trajectory.steps,
-        "points": np.diff(whole, axis=0, prepend=0).ravel().tolist(),
-        "contact": None if contact is None else contact.tolist(),
-    }
 
 
 def thinned(poses: Rows, most: int, tolerance: float = TOLERANCE) -> NDArray[np.intp]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import functools
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -65,25 +66,41 @@ def make_page(place: Path) -> Page:
     if not runs:
         raise RunError(unreadable[0])
     details, scenes = _details(runs)
-    script = _text("page.js")
     told = [one for _, one in runs]
-    html = _environment().get_template("page.html.j2").render(
+    html = rendered(
+        "page.html.j2",
+        scenes,
         name=place.name,
         runs=runs,
         unreadable=unreadable,
         overview=overview_of(told),
         details=details,
-        scenes={key: _for_player(scene) for key, scene in scenes.items()},
-        style=Markup(_text("page.css")),
-        script=Markup(script),
-        script_hash=_hash(script),
-    )  # fmt: skip
+    )
     return Page(
-        html.translate(_HIDDEN).encode("utf-8", "replace"),
+        html,
         len(runs),
         sum(one.run.verified for one in told),
         tuple(unreadable),
     )
+
+
+def rendered(template: str, scenes: Mapping[str, TaskPicture], **values: Any) -> bytes:
+    """A page with its style, its script, and the scenes of its players.
+
+    Args:
+        template: Name of its template.
+        scenes: Scenes by their keys.
+        values: Further values for the template.
+    """
+    script = _text("page.js")
+    html = _environment().get_template(template).render(
+        scenes={key: _for_player(scene) for key, scene in scenes.items()},
+        style=Markup(_text("page.css")),
+        script=Markup(script),
+        script_hash=_hash(script),
+        **values,
+    )  # fmt: skip
+    return html.translate(_HIDDEN).encode("utf-8", "replace")
 
 
 def _details(

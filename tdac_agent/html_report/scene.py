@@ -12,7 +12,7 @@ from PIL import Image
 
 from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.tasks.task import Task
-from tdac_envs.drawing.backdrop import Chart
+from tdac_envs.drawing.backdrop import Backdrop, Chart
 from tdac_envs.drawing.canvas import Image as Picture
 
 LARGEST = 880
@@ -55,7 +55,11 @@ class TaskPicture:
 
 def scene_of(task: Task) -> TaskPicture:
     """Draws the map or world with start, goal and shortest path."""
-    backdrop = pictures_of(task.setting).backdrop()
+    return picture_of(pictures_of(task.setting).backdrop())
+
+
+def picture_of(backdrop: Backdrop) -> TaskPicture:
+    """Draws a map or world on which robots drive."""
     chart = backdrop.whole()
     drawn = chart.canvas.image[: chart.canvas.strip_top]
     zoom = min(1.0, LARGEST / max(drawn.shape[:2]))

@@ -75,19 +75,26 @@
   }
 
   function watch(player) {
-    const scene = scenes[player.dataset.scene], episodes = read(player.dataset.episodes);
+    const episodes = read(player.dataset.episodes);
     const part = (name) => player.querySelector(`.${name}`);
     const canvas = player.querySelector("canvas"), pen = canvas.getContext("2d");
     const play = part("play"), scrub = part("scrub"), clock = part("clock");
     const ofCandidate = part("candidate"), ofEpisode = part("episode"), speed = part("speed");
     const sharp = Math.min(2, window.devicePixelRatio || 1);
-    canvas.width = scene.width * sharp;
-    canvas.height = scene.height * sharp;
-    canvas.style.aspectRatio = `${scene.width} / ${scene.height}`;
-    canvas.style.width = `${Math.min(720, scene.width)}px`;
-    pen.scale(sharp, sharp);
     const background = new Image();
-    let episode, path, movers, step = 0, before = null;
+    let scene, episode, path, movers, step = 0, before = null;
+
+    // An episode may have a scene of its own.
+    function place(key) {
+      if (scene === scenes[key]) return;
+      scene = scenes[key];
+      canvas.width = scene.width * sharp;
+      canvas.height = scene.height * sharp;
+      canvas.style.aspectRatio = `${scene.width} / ${scene.height}`;
+      canvas.style.width = `${Math.min(720, scene.width)}px`;
+      pen.scale(sharp, sharp);
+      background.src = scene.picture;
+    }
 
     function line(points, colour, width) {
       pen.beginPath();
@@ -176,6 +183,7 @@
     function show(number, playing) {
       pause();
       episode = episodes[number];
+      place(episode.scene ?? player.dataset.scene);
       path = rows(episode.points, 4);
       movers = episode.movers.map(({ radius, points }) => (
         { way: rows(points, 3), radius: Math.max(radius, 2) }));
@@ -192,18 +200,19 @@
 
     const first = new Map();
     episodes.forEach((e, n) => first.has(e.candidate) || first.set(e.candidate, n));
-    fill(ofCandidate, [...first].map(([name, n]) => {
-      const [k, j] = name.split(".");
-      return [`k=${k} j=${j}`, n];
-    }));
-    ofCandidate.addEventListener("change", () => show(Number(ofCandidate.value), false));
+    fill(ofCandidate, [...first.values()].map((n) => [episodes[n].label, n]));
+    ofCandidate.addEventListener("change", () => {
+      // The same episode of the other candidate, if it has it.
+      const { candidate } = episodes[Number(ofCandidate.value)], { name } = episode;
+      const same = episodes.findIndex((e) => e.candidate === candidate && e.name === name);
+      show(same < 0 ? Number(ofCandidate.value) : same, false);
+    });
     ofEpisode.addEventListener("change", () => show(Number(ofEpisode.value), false));
     play.addEventListener("click", () => (before === null ? start() : pause()));
     scrub.addEventListener("input", () => { pause(); step = Number(scrub.value); draw(); });
     background.addEventListener("load", draw);
-    background.src = scene.picture;
-    // Begin with the last candidate, which is the verified one if there is one.
-    show([...first.values()].at(-1), false);
+    // The last candidate of a run is the verified one, if there is one.
+    show([...first.values()].at(player.dataset.begin === "last" ? -1 : 0), false);
     return { show };
   }
 })();

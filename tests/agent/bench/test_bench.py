@@ -1,14 +1,18 @@
 """Entrants on the same worlds: rows, resumption, hidden worlds, folders together."""
 
 import json
+import re
 import stat
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from selenium.webdriver.common.by import By
+from selenium.webdriver.support.ui import Select, WebDriverWait
 
 from tdac_agent.bench.bench import bench
+from tdac_agent.bench.page import MOST_WORLDS
 from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, reveal
 from tdac_agent.errors import ControllerFileError, RunError
@@ -150,7 +154,9 @@ def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
     given = {"split": "hidden", "worlds": 2, "judge": judge, "salt_file": salt}
     found = bench(files[:2], [level], out=out, **given)
     names = {path.name for path in out.iterdir()}
-    assert names - {".lock"} == {"bench.json", "timing.csv", "sealed", "scores.svg"}
+    shown = {"bench.json", "bench.html", "timing.csv", "scores.svg"}
+    assert names - {".lock"} == {*shown, "sealed"}
+    assert "Replays" not in (out / "bench.html").read_text()
     assert stat.S_IMODE((out / "sealed").stat().st_mode) == 0o700
     other = tmp_path / "other"
     with pytest.raises(RunError, match="was driven on these hidden worlds before"):
@@ -258,7 +264,7 @@ def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
     out, seen = tmp_path / "out", []
 
     def interrupt(name, entrant, episodes, successes):
-        if episodes == 2:
+        if episodes >= 2:
             raise KeyboardInterrupt
 
     def note(name, entrant, episodes, successes):
@@ -278,3 +284,50 @@ def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
     assert not rows.parent.exists()
     assert len(list(out.glob("driven/few/*/trajectories/*.npz"))) == 6
     assert len(pd.read_csv(out / "worlds.csv")) == 6
+
+
+def test_the_page(judge, tmp_path, level, files):
+    """Tables, and replays of all entrants on the same worlds; none of hidden ones."""
+    out = tmp_path / "out"
+    found = bench(["go-to-goal", *files], [level], "dev", 8, out=out, judge=judge)
+    html = (out / "bench.html").read_text()
+    for row in found.rows[:2]:
+        assert f"{row.time.value:.3f}" in html
+    assert "did not drive: " in html
+    shown = json.loads(re.search(r'id="episodes-1">(.*?)</script>', html)[1])
+    scenes = json.loads(re.search(r'id="scenes">(.*?)</script>', html)[1])
+    assert len(shown) == 3 * MOST_WORLDS
+    assert {episode["label"] for episode in shown} == {"go-to-goal", "still", "ahead"}
+    table = pd.read_csv(out / "worlds.csv").set_index(["entrant", "index"])
+    for episode in shown:
+        index = int(episode["name"].removeprefix("world "))
+        row = table.loc[(episode["label"], index)]
+        points = np.array(episode["points"]).reshape(-1, 4).sum(axis=0)
+        assert points[0] == episode["steps"] == row.steps
+        assert episode["outcome"] == row.outcome
+        scene = scenes[episode["scene"]]
+        assert 0 <= points[1] / 4 <= scene["width"]
+        assert 0 <= points[2] / 4 <= scene["height"]
+        assert (episode["contact"] is None) == (row.outcome != "collision")
+
+
+def test_the_page_in_a_browser(browser, judge, tmp_path, level, files):
+    """Another entrant is shown in the same world, another world has its own map."""
+    out = tmp_path / "out"
+    bench(files[:2], [level], "dev", 2, out=out, judge=judge)
+    browser.get((out / "bench.html").as_uri())
+    script = "return document.querySelector('canvas').toDataURL()"
+    pictures = [browser.execute_script(script)]
+    for name, choice in (("candidate", "ahead"), ("episode", None)):
+        select = Select(browser.find_element(By.CSS_SELECTOR, f"select.{name}"))
+        if choice is None:
+            select.select_by_index(1)
+        else:
+            select.select_by_visible_text(choice)
+        WebDriverWait(browser, 20).until(
+            lambda opened: opened.execute_script(script) not in pictures
+        )
+        pictures.append(browser.execute_script(script))
+    entrant = Select(browser.find_element(By.CSS_SELECTOR, "select.candidate"))
+    assert entrant.first_selected_option.text == "ahead"
+    assert browser.get_log("browser") == []
