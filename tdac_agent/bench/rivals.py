@@ -11,11 +11,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.builtin.level import level_of
 from tdac_envs.core.errors import TaskError
-from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
+from tdac_envs.core.intake import TEXT_BYTES, parse_json, parse_yaml, read_file
 from tdac_envs.ladder.task_sets import TaskSet
 
 FOLDER = Path(__file__).with_name("planners")
 """Folder of their files."""
+RIVALS, TUNED = "rivals.yaml", "tuned.json"
 
 
 class _Rival(BaseModel):
@@ -25,10 +26,7 @@ class _Rival(BaseModel):
     paper: str
     levels: tuple[str, ...] = Field(description="Levels whose observations it uses.")
     ranges: dict[str, tuple[float, float]] = Field(
-        {}, description="Constants of the file that are tuned, with their bounds."
-    )
-    tuned: dict[str, dict[str, float]] = Field(
-        {}, description="Chosen values, by level; those of the file elsewhere."
+        description="Constants of the file that are tuned, with their bounds."
     )
 
 
@@ -60,9 +58,20 @@ def rival_on(name: str, tasks: TaskSet) -> Rival:
     if level not in rival.levels:
         known = ", ".join(rival.levels)
         raise TaskError(f"{name} drives by what is observed in {known}")
-    values = rival.tuned.get(level, {})
+    assert level is not None
+    values = _tuned().get(name, {}).get(level, {})
     tuned = bool(values) if rival.ranges else None
     return Rival(with_values(source_of(name), values), tuned)
+
+
+def levels_of(name: str) -> tuple[str, ...]:
+    """The levels on which a rival drives."""
+    return _known()[name].levels
+
+
+def ranges_of(name: str) -> dict[str, tuple[float, float]]:
+    """The constants of a rival that are tuned, with their bounds."""
+    return _known()[name].ranges
 
 
 def source_of(name: str) -> str:
@@ -87,5 +96,13 @@ def with_values(source: str, values: dict[str, float]) -> str:
 
 @cache
 def _known() -> dict[str, _Rival]:
-    data = parse_yaml(read_file(FOLDER / "rivals.yaml", TEXT_BYTES))
+    data = parse_yaml(read_file(FOLDER / RIVALS, TEXT_BYTES))
     return {name: _Rival.model_validate(each) for name, each in data.items()}
+
+
+@cache
+def _tuned() -> dict[str, dict[str, dict[str, float]]]:
+    """The chosen values, by rival and level; elsewhere, those of the file hold."""
+    found: dict[str, dict[str, dict[str, float]]]
+    found = parse_json(read_file(FOLDER / TUNED, TEXT_BYTES))
+    return found

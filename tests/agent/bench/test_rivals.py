@@ -1,0 +1,74 @@
+"""Classical planners: each drives on each of its levels, with the values on record."""
+
+import json
+
+import pytest
+
+from tdac_agent.bench.rivals import (
+    FOLDER,
+    TUNED,
+    levels_of,
+    ranges_of,
+    rival_names,
+    rival_on,
+    source_of,
+    with_values,
+)
+from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_envs import load_set
+from tdac_envs.core.errors import TaskError
+
+FIRST = [(name, levels_of(name)[0]) for name in rival_names()]
+ALL = [(name, level) for name in rival_names() for level in levels_of(name)]
+PAIRS = [*FIRST, *(pair for pair in ALL if pair not in FIRST)]
+
+
+@pytest.mark.slow_after(6)
+@pytest.mark.parametrize(("name", "level"), PAIRS)
+def test_it_drives(name, level, warm):
+    """It passes the tests, and no episode ends with an error of its own."""
+    tasks = load_set(level)
+    source = rival_on(name, tasks).source
+    report = verify_on_set(source, tasks, "dev", 2, judge=warm)
+    assert not report.refused, report.told
+    assert {each.outcome for each in report.episodes} <= {
+        "reached", "collision", "out of time",
+    }  # fmt: skip
+
+
+def test_dwa_arrives(warm):
+    """A planner with a map of what it has seen is no straw man."""
+    tasks = load_set("unknown")
+    report = verify_on_set(rival_on("dwa", tasks).source, tasks, "dev", 6, judge=warm)
+    assert report.successes >= 4
+
+
+def test_values_on_record_are_of_this_file():
+    """Known constants, within their ranges, on levels of the planner."""
+    tuned = json.loads((FOLDER / TUNED).read_text())
+    for name, levels in tuned.items():
+        assert set(levels) <= set(levels_of(name))
+        for level, values in levels.items():
+            assert set(values) == set(ranges_of(name))
+            rival = rival_on(name, load_set(level))
+            assert rival.tuned
+            for constant, value in values.items():
+                low, high = ranges_of(name)[constant]
+                assert low <= value <= high
+                assert f"\n{constant} = {value!r}\n" in rival.source
+
+
+def test_files_have_the_constants_that_are_tuned():
+    for name in rival_names():
+        with_values(source_of(name), dict.fromkeys(ranges_of(name), 1.0))
+
+
+def test_what_is_not_tuned_is_said():
+    assert rival_on("go-to-goal", load_set("known")).tuned is None
+    with pytest.raises(ValueError, match="expected one line 'NO = "):
+        with_values(source_of("dwa"), {"NO": 1.0})
+
+
+def test_a_level_that_it_cannot_drive():
+    with pytest.raises(TaskError, match="orca drives by what is observed in moving, c"):
+        rival_on("orca", load_set("known"))
