@@ -2,10 +2,11 @@
 
 A Kalman filter holds the pose, the errors of the odometry and the gains of the wheels.
 Each scan is matched with the robot's own map: cells that hold the mean of the hits in
-them. What is planned, is planned from where the robot will be when the next action
-takes effect. Arcs are tried out against the hits, and must begin in space that rays
-have found free; the less room their way leaves, the dearer they are. Where the goal is
-missed, it is sought where the errors of the pose make it likely.
+them. Where walls are at right angles, lines of hits tell the heading, too. What is
+planned, is planned from where the robot will be when the next action takes effect. Arcs
+are tried out against the hits, and must begin in space that rays have found free; the
+less room their way leaves, the dearer they are. Where the goal is missed, it is sought
+where the errors of the pose make it likely.
 """
 
 import json
@@ -30,6 +31,8 @@ RAY_NOISE = max(NOISES.get("range_noise", 0.0), 0.002)
 DELAY = int(NOISES.get("delay", 0))
 FAR = RANGE * (1.0 - 3.0 * RAY_NOISE) - 1e-3  # a ray that reads more has hit nothing
 ROUGH = 0.3  # px by which walls differ from lines
+PARALLEL, LINES = 0.9, 20  # agreement, and number, of lines that tell the walls' angle
+ASKEW, OBLIQUE = 0.01, 0.12  # rad of the walls' angle when it is told; of odd lines
 MARGIN, BOLDER = 0.15, 0.04  # px kept from hits, less so by BOLDER a step of waiting
 MOVED = 4.0  # px; within less, the robot waits
 NEARBY, TRIES = 3.0 * TOLERANCE, 20  # px to the goal, and steps spent there on a place
@@ -37,7 +40,8 @@ DRIFT = 0.03, 0.015  # deviation of the goal, aside and along, by its distance
 WAIT, PATIENCE = 30, 200  # steps of waiting, after which it is STRICT for some steps
 STRICT = -0.6
 UNSEEN = 0.2  # how much more an unseen px costs
-LOOSE = 0.5  # px by which the search may come too near to a hit
+LOOSE = 0.65  # px by which the search may come too near to a hit
+SQUEEZE = 3.0  # the same, where there is no way otherwise
 SLIVER = 1.5  # px around hits in which unseen space is no matter
 SLACK = 0.7  # px by which the body may come too near to the centre of an unseen px
 CHORD = 5.0  # px between two hits that are taken for one borders
@@ -47,8 +51,10 @@ PRICE = 0.3  # how much more a px beside a wall costs
 CARE = 0.5  # share of this that is saved by driving slowly
 PEEK = 6.0  # px that a look costs
 RISK = 40.0  # how much more a px costs that is driven in contact
-DOUBT = 0.65  # share of the deviation of a hit, and px, that it is taken to be further
-UNSURE = 0.35  # px by which pose and map may be wrong
+DOUBT = 0.4  # share of the deviation of a hit, and px, that it is taken to be further
+UNSURE = 0.3  # px by which pose and map may be wrong
+COARSE = 0.6  # the same for the places of the search
+CAPPED = 0.6  # share of the slip that is left at full speed
 CELL = 2  # px between the places of the search, and the size of a cell of hits
 LOOK, TURN = 6.0, 10.0  # px ahead; px that a turn by a right angle costs
 WINDOW = 36  # px around the robot in which arcs lie
@@ -61,21 +67,26 @@ NEXT, SOON = 5, 11  # entries of TIMES up to one and four steps
 TURNS = np.arange(120) * (2.0 * math.pi / 120)  # directions of lines from the heading
 FULL_SPINS = np.remainder(TURNS + math.pi, 2.0 * math.pi) - math.pi
 LENGTHS = np.arange(1, 33) * 0.75  # px
+WAYS = np.linspace(0.0, 1.3, 131)  # speeds of a wheel if it could be so fast, in STEP
 
 
 class Filter:
     """A Kalman filter over what the robot does not know.
 
     Attributes:
-        state: x, y, heading, odometry factors of distance and turn, wheel gains.
+        state: x, y, heading, odometry factors of distance and turn, wheel gains, and
+            the direction of the walls, up to right angles.
         spread: Its covariance.
+        lines: Sum of the directions of walls, as unit vectors of four times the angle.
+        count: How many they are.
     """
 
     def __init__(self):
-        self.state = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+        self.state = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
         bound = GAINS / math.sqrt(3.0)
-        deviations = [1e-3, 1e-3, 1e-4, SCALE, SCALE, bound, bound]
+        deviations = [1e-3, 1e-3, 1e-4, SCALE, SCALE, bound, bound, 0.0]
         self.spread = np.diag(np.square(deviations))
+        self.lines, self.count = 0j, 0
 
     def pose(self):
         """x, y and heading."""
@@ -88,17 +99,17 @@ class Filter:
         state = np.concatenate([self.state, [0.0, 0.0]])
         left, by_left, left_sd = wheel(float(wheels[0]), float(state[5]))
         right, by_right, right_sd = wheel(float(wheels[1]), float(state[6]))
-        state[7], state[8] = 0.5 * (left + right), (left - right) / AXLE
+        state[8], state[9] = 0.5 * (left + right), (left - right) / AXLE
         mix = np.array([[0.5, 0.5], [1.0 / AXLE, -1.0 / AXLE]])
         by_gain = mix * [by_left, by_right]
-        spread = np.zeros((9, 9))
-        spread[:7, :7] = self.spread
-        spread[7:, :7] = by_gain @ self.spread[5:7]
-        spread[:7, 7:] = spread[7:, :7].T
+        spread = np.zeros((10, 10))
+        spread[:8, :8] = self.spread
+        spread[8:, :8] = by_gain @ self.spread[5:7]
+        spread[:8, 8:] = spread[8:, :8].T
         slips = np.diag([left_sd**2 + 1e-4, right_sd**2 + 1e-4])
-        spread[7:, 7:] = by_gain @ spread[5:7, 7:] + mix @ slips @ mix.T
-        for factor, motion, value in (3, 7, odometry[0]), (4, 8, odometry[1]):
-            row = np.zeros(9)
+        spread[8:, 8:] = by_gain @ spread[5:7, 8:] + mix @ slips @ mix.T
+        for factor, motion, value in (3, 8, odometry[0]), (4, 9, odometry[1]):
+            row = np.zeros(10)
             row[factor], row[motion] = state[motion], state[factor]
             size = max(abs(state[motion]), abs(float(value)))
             noise = (ODOMETRY * size) ** 2 + 1e-5
@@ -109,17 +120,41 @@ class Filter:
 
     def turn_by(self, state, spread):
         """Moves the pose by distance and turn, the last two values of the state."""
-        distance, turn = state[7:].tolist()
+        distance, turn = state[8:].tolist()
         middle = state[2] + 0.5 * turn
         cosine, sine = math.cos(middle), math.sin(middle)
-        step = np.eye(9)
+        step = np.eye(10)
         step[0, 2], step[1, 2] = -distance * sine, distance * cosine
-        step[0, 7:] = cosine, -0.5 * distance * sine
-        step[1, 7:] = sine, 0.5 * distance * cosine
-        step[2, 8] = 1.0
+        step[0, 8:] = cosine, -0.5 * distance * sine
+        step[1, 8:] = sine, 0.5 * distance * cosine
+        step[2, 9] = 1.0
         state[:3] += distance * cosine, distance * sine, turn
-        self.state = state[:7]
-        self.spread = (step @ spread @ step.T)[:7, :7]
+        self.state = state[:8]
+        self.spread = (step @ spread @ step.T)[:8, :8]
+        self.spread = 0.5 * (self.spread + self.spread.T)
+
+    def align(self, ranges, hit):
+        """Corrects the heading where all walls are parallel or at right angles."""
+        angles, sd = wall_angles(ranges, hit)
+        known = self.count >= LINES and abs(self.lines) > PARALLEL * self.count
+        self.lines += np.exp(4j * (self.state[2] + angles)).sum()
+        self.count += angles.size
+        if not known:
+            self.state[7] = 0.25 * np.angle(self.lines)
+            self.spread[7], self.spread[:, 7] = 0.0, 0.0
+            self.spread[7, 7] = ASKEW**2
+            return
+        gaps = 0.25 * np.angle(np.exp(4j * (self.state[2] + angles - self.state[7])))
+        near = np.abs(gaps) < 2.0 * OBLIQUE
+        if not near.any():
+            return
+        weights = near / (sd**2 * (1.0 + (gaps / OBLIQUE) ** 2))
+        row = np.zeros(8)
+        row[2], row[7] = 1.0, -1.0
+        gain = self.spread @ row
+        gain /= row @ gain + 1.0 / weights.sum()
+        self.state = self.state - gain * (weights @ gaps / weights.sum())
+        self.spread -= np.outer(gain, row @ self.spread)
         self.spread = 0.5 * (self.spread + self.spread.T)
 
     def match(self, surfaces, ranges, hit):
@@ -152,19 +187,36 @@ class Filter:
         self.spread = 0.5 * (self.spread + self.spread.T)
 
 
+def wall_angles(ranges, hit):
+    """Directions, from the heading, of lines of four hits in a row, and deviations."""
+    x, y = ranges * np.cos(FAN), ranges * np.sin(FAN)
+    dx, dy = x[3:] - x[:-3], y[3:] - y[:-3]
+    length = np.maximum(np.hypot(dx, dy), 0.5)
+    angles = np.arctan2(dy, dx)
+    ends = np.stack([ranges[3:], ranges[:-3]])
+    slants = np.sin(np.stack([FAN[3:], FAN[:-3]]) - angles)
+    # A line may be off by so much at its ends, and its middle is no further aside.
+    aside = np.sqrt(((RAY_NOISE * ends * slants) ** 2 + ROUGH**2).sum(axis=0))
+    good = hit[3:] & hit[:-3] & (aside < 0.2 * length)
+    for k in 1, 2:
+        off = dx * (y[k : k - 3] - y[:-3]) - dy * (x[k : k - 3] - x[:-3])
+        good &= hit[k : k - 3] & (np.abs(off) < 1.5 * aside * length)
+    return angles[good], (aside / length)[good]
+
+
 def wheel(command, gain):
     """Mean way of a wheel in a step, its derivative by the gain, and its deviation."""
     way = abs(command) * gain * STEP
-    capped = way >= STEP
-    way = min(way, STEP)
     sd = SLIP * way + 1e-6
-    z = min((STEP - way) / sd, 6.0)
+    z = (STEP - way) / sd
     below = 0.5 * (1.0 + math.erf(z / math.sqrt(2.0)))
-    mean = STEP - sd * (z * below + math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi))
-    mean = mean if z < 6.0 else way
-    slope = 0.2 if capped else below
-    sd *= 0.6 + 0.4 * min(z / 1.5, 1.0)
-    return math.copysign(mean, command), command * STEP * slope, sd
+    peak = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    mean = STEP - sd * (z * below + peak)
+    sd *= CAPPED + (1.0 - CAPPED) * min(max(z, -1.0) / 1.5, 1.0)
+    return math.copysign(mean, command), command * STEP * (below - SLIP * peak), sd
+
+
+MEANS = np.array([wheel(1.0, way)[0] / STEP for way in WAYS])  # what comes of WAYS
 
 
 class Surfaces:
@@ -330,7 +382,7 @@ class Maps:
                 away[to] = np.minimum(away[to], far)
         away = away.reshape(side, side)
         price = 1.0 + PRICE * np.clip((ROOM - away) / (ROOM - RADIUS), 0.0, 1.0) ** 2
-        price += risk(away + 0.5 - RADIUS, 0.6)
+        price += risk(away + LOOSE - RADIUS, COARSE)
         price += UNSEEN * ~self.free[::CELL, ::CELL]
         passable = away >= RADIUS - slack
         passable[:3], passable[-3:], passable[:, :3], passable[:, -3:] = (False,) * 4
@@ -539,10 +591,9 @@ class Courses:
                 sizes.append((0.5 * step * (abs(left) + abs(right)), abs(forward)))
         self.pairs = np.array(pairs)
         self.ahead, self.aside, self.facing = np.array(parts).transpose(1, 0, 2)
-        times = np.minimum(TIMES, 3.0)
-        size, way = np.array(sizes).T[:, :, None] * np.sqrt(times)
-        bend = SLIP * math.sqrt(2.0) / AXLE * size * way * np.sqrt(times / 3.0)
-        self.spread = np.sqrt((SLIP * size) ** 2 / 2.0 + bend**2)
+        size = np.array(sizes)[:, :1]
+        slip = CAPPED * SLIP / math.sqrt(2.0)
+        self.spread = slip * size * np.sqrt(np.minimum(TIMES, 3.0))
         steps = np.diff([self.ahead, self.aside], prepend=0.0)
         hurry = np.abs(self.pairs).max(axis=1)[:, None]
         self.ways = np.hypot(*steps) * (1.0 - CARE + CARE * hurry)
@@ -712,9 +763,8 @@ def expected(pose, gains, queue):
 
 def commands(pair, gains, best):
     """Commands that let the wheels turn at these shares of the best speed."""
-    left, right = best * pair[0] / gains[0], best * pair[1] / gains[1]
-    most = max(abs(left), abs(right), 1.0)
-    return left / most, right / most
+    ways = np.interp(np.abs(pair) * best, MEANS, WAYS) / gains
+    return np.copysign(np.minimum(ways, 1.0), pair).tolist()
 
 
 def policy(obs):
@@ -723,6 +773,7 @@ def policy(obs):
     ranges = np.asarray(obs["ranges"], float)
     hit = ranges < FAR
     filter_.moved(np.asarray(obs["wheel_speeds"], float), obs["odometry"])
+    filter_.align(ranges, hit)
     if STATE["steps"]:
         filter_.match(maps.surfaces, ranges, hit)
     STATE["steps"] += 1
@@ -733,7 +784,7 @@ def policy(obs):
     maps.surfaces.add(tips[hit], RAY_NOISE * ranges[hit])
     maps.carve(x, y, heading, ranges, hit)
     gains = filter_.state[5:7].tolist()
-    best = min(0.98, *gains)
+    best = min(wheel(1.0, gain)[0] for gain in gains) / STEP
     courses = STATE["courses"]
     if abs(courses.step - best * STEP) > 0.03 * STEP:
         courses = STATE["courses"] = Courses(best * STEP)
@@ -748,7 +799,7 @@ def policy(obs):
     if maps.age > maps.rest + (0 if maps.stale or STATE["steps"] < 3 else 3):
         maps.plan(x, y, LOOSE if STATE["steps"] > STATE["strict"] else STRICT)
         if not np.isfinite(maps.cost[maps.cell(x, y)]):
-            maps.plan(x, y, 2.0 * LOOSE)
+            maps.plan(x, y, SQUEEZE)
         maps.age, maps.stale = 0, False
         maps.rest = int(np.isfinite(maps.cost).sum()) // 6000
     pair = chosen(maps, courses, x, y, heading, math.hypot(UNSURE, slipped))
