@@ -54,7 +54,7 @@ def train(
         ),
     ] = None,
     algo: Annotated[
-        Optional[Literal["ppo", "sac", "td3"]],  # noqa: UP045
+        Optional[Literal["ppo", "recurrent-ppo", "sac", "td3"]],  # noqa: UP045
         typer.Option(help="Algorithm of stable-baselines3.  [default: ppo]"),
     ] = None,
     steps: Annotated[

@@ -36,6 +36,7 @@ _NETWORKS = {
     "stable_baselines3.common.policies": "ActorCriticPolicy",
     "stable_baselines3.sac.policies": "SACPolicy",
     "stable_baselines3.td3.policies": "TD3Policy",
+    "sb3_contrib.common.recurrent.policies": "RecurrentActorCriticPolicy",
 }
 """Policy class for observations in a Box, by the module of the saved class."""
 _WITHOUT_SDE = "stable_baselines3.td3.policies"
@@ -63,15 +64,19 @@ class Learned:
         space, actions = self._env.observation_space, env.action_space
         text = f"{space} {actions}"
         self._network = _load_network(file, _Spaces(space, actions, text))
+        self._memory: Any = None
 
-    def reset(self, observation: Observation) -> None:
-        """Does nothing, as the policy has no memory."""
+    def reset(self, observation: Observation) -> None:  # noqa: ARG002
+        """Begins an episode, with an empty memory."""
+        self._memory = None
 
     def policy(self, observation: Observation) -> NDArray[np.float32]:
         """Returns the action, shape (2,), float32."""
         wrapped = self._wrapped(self._env, observation)
         try:
-            action, _ = self._network.predict(wrapped, deterministic=True)
+            action, self._memory = self._network.predict(
+                wrapped, self._memory, deterministic=True
+            )
         # Manipulated weights can cause various errors of torch.
         except (ValueError, RuntimeError) as error:
             message = f"the policy's network: {one_line(error)}"
@@ -166,8 +171,10 @@ def _policy_class(module: str, dict_observation: bool) -> Any:
 
         name = _NETWORKS[module]
         if dict_observation:
-            actor_critic = name == "ActorCriticPolicy"
-            name = "MultiInputActorCriticPolicy" if actor_critic else "MultiInputPolicy"
+            name = {
+                "ActorCriticPolicy": "MultiInputActorCriticPolicy",
+                "RecurrentActorCriticPolicy": "RecurrentMultiInputActorCriticPolicy",
+            }.get(name, "MultiInputPolicy")
         return getattr(import_module(module), name)
     except ImportError as error:
         needed = f"SB3 policies need an extra: {install_command('sb3')}"
@@ -175,7 +182,7 @@ def _policy_class(module: str, dict_observation: bool) -> Any:
     except KeyError as error:
         raise ControllerFault(
             f"a policy from {module[:80]} cannot be evaluated; expected one of PPO, "
-            "A2C, SAC or TD3",
+            "RecurrentPPO, A2C, SAC or TD3",
             "import",
         ) from error
 

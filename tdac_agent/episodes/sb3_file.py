@@ -74,6 +74,10 @@ class Settings(BaseModel):
     ortho_init: bool = True
     clip_mean: Number = 2.0
     n_critics: int = Field(2, ge=1, le=8)
+    lstm_hidden_size: int = Field(256, ge=1, le=4096)
+    n_lstm_layers: int = Field(1, ge=1, le=8)
+    shared_lstm: bool = False
+    enable_critic_lstm: bool = True
     normalize_images: bool = True
     share_features_extractor: bool = True
     features_extractor_kwargs: dict[str, None] | None = Field(None, max_length=0)

@@ -14,7 +14,7 @@ from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.learning.wrappers import WRAPPERS
 
-Algo = Literal["ppo", "sac", "td3"]
+Algo = Literal["ppo", "recurrent-ppo", "sac", "td3"]
 _LINEAR = "lin_"
 
 

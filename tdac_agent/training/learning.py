@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor
@@ -28,7 +29,7 @@ from tdac_agent.training.set_plan import make_set_batch, make_trials
 from tdac_agent.training.set_trials import evaluate_on_worlds
 from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 
-ALGOS = {"ppo": PPO, "sac": SAC, "td3": TD3}
+ALGOS = {"ppo": PPO, "recurrent-ppo": RecurrentPPO, "sac": SAC, "td3": TD3}
 EVALUATION_SEED = 1_000_000
 """Added to the training seed; `tdac evaluate` uses other episodes."""
 _Trials = VecMonitor | WrappedVectorEnv
@@ -97,8 +98,9 @@ def evaluate_batch(model: Any, envs: VecMonitor, seed: int | Sequence[int]) -> P
     envs.venv.seed(seed)  # type: ignore[arg-type]
     observations: Any = envs.reset()
     ended: list[dict[str, Any] | None] = [None] * envs.num_envs
+    state, over = None, np.ones(envs.num_envs, np.bool_)
     while None in ended:
-        actions, _ = model.predict(observations, deterministic=True)
+        actions, state = model.predict(observations, state, over, deterministic=True)
         observations, _, over, infos = envs.step(actions)
         for i in np.flatnonzero(over).tolist():
             ended[i] = ended[i] or infos[i]

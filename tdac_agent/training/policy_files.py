@@ -18,7 +18,7 @@ from tdac_agent.training.plan import TrainingPlan
 from tdac_agent.training.set_plan import set_of
 
 POLICY, FACTS = "policy.zip", "policy.json"
-LEARNERS = ("stable_baselines3", "torch")
+LEARNERS = ("stable_baselines3", "sb3_contrib", "torch")
 
 
 def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> None:

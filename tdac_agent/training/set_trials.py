@@ -26,8 +26,9 @@ def evaluate_on_worlds(model: Any, trials: WrappedVectorEnv) -> Point:
     ended = np.zeros(count, np.bool_)
     reached, hit = np.zeros(count), np.zeros(count)
     returns, lengths = np.zeros(count), np.zeros(count)
+    state, over = None, np.ones(count, np.bool_)
     while not ended.all():
-        actions, _ = model.predict(seen, deterministic=True)
+        actions, state = model.predict(seen, state, over, deterministic=True)
         seen, rewards, terminated, truncated, infos = trials.step(actions)
         returns[~ended] += rewards[~ended]
         lengths[~ended] += 1

@@ -42,10 +42,12 @@ def threads():
 def config(tmp_path):
     """Writes the shipped hyperparameters, made small; gives the file."""
 
-    def write(**changes):
-        own = yaml.safe_load(config_file("ppo").read_text())["TDAC-Ladder-v0"]
-        small = own | SMALL | {"policy_kwargs": {"net_arch": [8]}} | changes
-        file = tmp_path / "ppo.yml"
+    def write(algo="ppo", **changes):
+        own = yaml.safe_load(config_file(algo).read_text())["TDAC-Ladder-v0"]
+        sizes = own["policy_kwargs"] | {"net_arch": [8]}
+        sizes |= {"lstm_hidden_size": 8} if algo == "recurrent-ppo" else {}
+        small = own | SMALL | {"policy_kwargs": sizes} | changes
+        file = tmp_path / f"{algo}.yml"
         file.write_text(yaml.safe_dump({"TDAC-Ladder-v0": small}))
         return file
 
@@ -71,9 +73,9 @@ def few(tmp_path):
 def trained(tmp_path, few, config):
     """A short training, and the set that it was on."""
 
-    def run(**values):
+    def run(algo="ppo", **values):
         level = few(**values)
-        plan = make_set_plan(level, steps=256, episodes=4, config=config())
+        plan = make_set_plan(level, algo, steps=256, episodes=4, config=config(algo))
         points = train(plan, tmp_path / "out")
         return load_set(level), plan, points, tmp_path / "out"
 
@@ -102,9 +104,13 @@ def test_a_training_records_its_set(trained, values):
     assert len(read_curve(out)) == len(points)
 
 
-def test_its_evaluation_is_that_of_the_judge(trained):
-    """World i of dev for robot i: the judge drives the same, one after the other."""
-    tasks, _, points, out = trained(**LOST)
+@pytest.mark.parametrize("algo", ["ppo", "recurrent-ppo"])
+def test_its_evaluation_is_that_of_the_judge(trained, algo):
+    """World i of dev for robot i: the judge drives the same, one after the other.
+
+    A recurrent policy begins each episode with an empty memory.
+    """
+    tasks, _, points, out = trained(algo, **LOST)
     best = max(points, key=lambda point: point.worth)
     found = evaluate_on_set([out / "policy.zip"], tasks, "dev", 4)
     (row,), (report,) = found.rows, found.reports
