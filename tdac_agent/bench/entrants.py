@@ -101,6 +101,8 @@ def named(words: Sequence[str]) -> tuple[Named, ...]:
         if names.count(name) > 1:
             raise TaskError(f"the entrant {name!r} is given twice: name it, NAME=FILE")
     for each in found:
+        if not each.name or not each.words:
+            raise TaskError(f"expected NAME=FILE, got {each.name!r} and {each.words}")
         for word in each.words:
             if word not in rival_names():
                 _check(word)

@@ -8,14 +8,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tdac_agent.bench.bench import (
-    RESULTS,
-    WORLD_TABLE,
-    folder_of,
-    publish,
-    sealed_episodes,
-    world_rows,
-)
+from tdac_agent.bench.arena import folder_of, sealed_episodes, world_rows
+from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, publish
 from tdac_agent.bench.compared import Driven, overall_of, pairs_of
 from tdac_agent.bench.figures import draw_figures
 from tdac_agent.bench.record import Bench, BenchRow, BenchSet
