@@ -10,8 +10,8 @@ is given; what has not been seen counts as free. Dijkstra's costs of the way to 
 over it are the navigation function. In each step, noise is added to the last sequence
 of commands; the new one is the mean of all samples, weighted by the exponential of
 their costs: way that is left, walls that are near, contacts. If the robot gets no
-further, it clears the obstacle layer and turns on the spot. Without a pose, it is
-located by dead reckoning.
+further, it clears the obstacle layer and turns on the spot. It drives backwards only if
+it sees all around or has a map. Without a pose, it is located by dead reckoning.
 """
 
 import json
@@ -306,6 +306,8 @@ def map_distances(cells):
     return found
 
 
+SEES = PARAMS["map"] or ROBOT["field_of_view_deg"] > 300.0  # also behind
+LEAST = -math.inf if SEES else 0.0  # speed ahead, as a share
 STATE = {}
 
 
@@ -316,8 +318,9 @@ def sampled(nominal):
     noise = np.repeat(noise, HOLD, axis=1)[:, :STEPS] * (NOISE_AHEAD, NOISE_TURN)
     noise[0] = 0.0  # the last sequence itself
     noise[:-SHARE] += nominal
-    left = np.clip(noise[..., 0] + noise[..., 1], -1.0, 1.0)
-    right = np.clip(noise[..., 0] - noise[..., 1], -1.0, 1.0)
+    ahead = np.maximum(noise[..., 0], LEAST)
+    left = np.clip(ahead + noise[..., 1], -1.0, 1.0)
+    right = np.clip(ahead - noise[..., 1], -1.0, 1.0)
     return np.stack([left + right, left - right], axis=2) / 2.0
 
 

@@ -1,11 +1,11 @@
 """Drives to a goal on a map it is given, among people.
 
-A ray that ends away from all walls has hit a person. Ranges are exact: the circle
-through three hits gives the centre of a person and its radius, and two centres give a
-velocity. A field of path lengths to the goal is computed once. In each step, a search
-in space and time around the robot finds the course of the next seconds that ends
-nearest to the goal and keeps away from where the people will be; it may also wait or
-withdraw. Wheel speeds are tried out with the gains of the wheels, which are measured.
+A ray that ends away from all walls has hit a person; Kalman filters estimate where each
+person is, how large it is and how it moves. The time from everywhere to the goal is
+computed once. In each step, a search in space and time around the robot, backwards from
+a few seconds ahead, finds what each place is worth soon, by where the people will be.
+Courses of the next steps are tried out with the gains of the wheels, which are
+measured: the one with the least costs, up to its end and from there on, is driven.
 """
 
 import heapq
@@ -20,324 +20,501 @@ ROBOT = PARAMS["robot"]
 RADIUS, AXLE, RANGE = ROBOT["radius"], ROBOT["axle_length"], ROBOT["range_max"]
 DT = PARAMS["dt"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
+TOLERANCE = 0.95 * PARAMS["goal_tolerance"]
 FAN = math.radians(ROBOT["field_of_view_deg"]) * np.linspace(-0.5, 0.5, ROBOT["n_rays"])
 
-BESIDE = 1.2  # px from a wall within which a hit is of the wall
-SMALLEST, LARGEST, USUAL = 4.0, 10.0, 6.5  # px, radii of people
-SAME = 0.3  # px between the centres of two circles that are of one person
-GATE = 5.0  # px from where a person is expected to where it is found, at most
-COAST = 20  # steps for which a person is remembered that is not seen
-KEEP = 0.25  # px that are kept from walls
-NODE = 4  # px between the nodes of the search in space and time
-LAYER = 2  # steps between two layers
-LAYERS = 18
-HELD = 2  # layers for which wheel speeds are held
-WINDOW = 18  # nodes from the robot to the border of the search
-TOUCH, WIDTH = 0.5, 0.5  # px from a person at which a contact is as likely as not
-SPREAD, FADE = 0.15, 0.87  # by how much less is known of people with each layer
-LOST = 800.0  # px that a contact costs
-HURRY = 0.35  # price of a layer, as a part of the length that is left
-PAUSE = 0.6  # px that a layer of waiting costs
-TURNING, HABIT = 5.0, 0.3  # px that a rad costs; that a change of a wheel costs
-STEPS = NODE * np.arange(-WINDOW, WINDOW + 1)
-COLUMNS, ROWS = np.meshgrid(STEPS, STEPS)
-MOVES = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
-ANGLES = np.array([math.atan2(row, column) for row, column in MOVES])
-SPEEDS = np.array([-1.0, -0.7, -0.4, -0.15, 0.0, 0.15, 0.4, 0.7, 1.0])
-PAIRS = np.array([(left, right) for left in SPEEDS for right in SPEEDS])
+EDGE = 36  # occupied pixels that are added around the map
+REACH = 40  # px up to which clearances are known
+BESIDE = 0.3  # px from a wall within which a hit is of the wall
+SMALLEST, LARGEST, USUAL = 5.0, 8.0, 6.5  # px, radii of people
+FASTEST = 26.0  # px/s, people
+HIT_NOISE = 0.005  # px^2, variance of the distance of a hit from a circle
+CIRCLE, PAIR, SINGLE = (0.1, 0.05), (2.0, 0.8), (4.0, 0.8)  # px^2, variances of the
+# place and the radius of a person that is new, by three hits or more, two, and one
+SHAKE = np.diag([0.02, 0.02, 9.0, 9.0, 0.0005])  # what a step adds to the covariance
+SPEEDS = 144.0  # (px/s)^2, variance of a velocity of which nothing is known
+VAGUE = 60.0  # (px/s)^2, variance from which a velocity is not known well
+GATE = 6.0  # px from a circle within which a hit may be of its person, at most
+JUMP = 11.0  # px between two neighbouring hits of a person, at most
+APART = 7.0  # px between the centres of two people, at least
+COAST, LATELY = 30, 5  # steps for which a person is remembered, and known well, unseen
+MARGIN = 0.25  # px that are kept from walls
+NODE = 2  # px between the nodes of the search in space and time
+LAYER = 2  # steps between two layers; within them, the robot drives three nodes
+LAYERS, BEGIN = 24, 3  # layers, and the one in which courses end
+WINDOW = 48  # nodes from the robot to the border of the search
+STAMP = 17  # nodes around a person where there is a risk
+FAR = np.float32(1e4)  # steps, where there is no way
+ROOM, CROWDED = 20.0, 0.7  # px from walls below which a step costs more, and how much
+GRAZE, GRAZING = 9.3, 1.5  # px from walls below which, and steps that a px less costs
+BLOCKED, DEEPER = 250.0, 100.0  # steps that a step too near to a wall costs, and a px
+RISK, FADE = 80.0, 3.0  # steps that a contact costs at once; by how much less later
+TOUCH = 0.8  # px from a person at which a contact is as likely as not
+SHARP, BLUR, BLURRED = 0.28, 0.4, 1.2  # px by which gaps are uncertain at first, after
+# a second more, and at most
+VAGUE_SHARP, VAGUE_BLUR, VAGUE_BLURRED = 0.8, 1.6, 2.8  # the same where little is known
+HIT, HIT_STEPS = 0.3, 5  # px below which a gap counts as a contact, in the first steps
+STRUCK, STRUCK_DEEPER = 100.0, 20.0  # steps that such a contact costs, and a px
+AROUND = 75.0  # px from the robot within which people matter for courses
+VEER, REVERSE = 0.4, 0.4  # steps that another direction, and another gear, costs
+FIRST = 3  # steps of the first part of a course
+FACING = 1.2  # rad to the direction of a course from which the robot drives
 STATE = {}
 
 
-def clearances(cells, reach):
-    """Distance from each pixel's centre to the nearest obstacle, at most `reach` px."""
-    padded = np.pad(cells, reach, constant_values=True)
-    height, width = cells.shape
-    away = np.full(padded.shape, float(reach))
-    for k in range(reach + 1):
-        gap = max(k - 0.5, 0.0)
-        for sign in (-1, 1):
-            rolled = np.roll(padded, sign * k, axis=1)
-            away = np.where(rolled, np.minimum(away, gap), away)
-    best = np.full((height, width), float(reach))
-    for k in range(-reach, reach + 1):
-        rows = away[reach + k : reach + k + height, reach : reach + width]
-        best = np.minimum(best, np.hypot(rows, max(abs(k) - 0.5, 0.0)))
-    return best
+def clearances(cells):
+    """Distances of pixels to the nearest obstacle, at most REACH px."""
+    far = np.float32(REACH**2)
+    found = np.where(np.pad(cells, EDGE, constant_values=True), np.float32(0.0), far)
+    for _ in range(2):  # first along the columns, then along the rows
+        best = found.copy()
+        for d in range(1, REACH + 1):
+            gap = np.float32((d - 0.5) ** 2)
+            np.minimum(best[d:], found[:-d] + gap, out=best[d:])
+            np.minimum(best[:-d], found[d:] + gap, out=best[:-d])
+        found = np.ascontiguousarray(best.T)
+    return np.sqrt(found)
 
 
-def between(values, x, y):
-    """Values between the entries of an array, by column and row."""
-    i = np.clip(np.floor(x).astype(int), 0, values.shape[1] - 2)
-    j = np.clip(np.floor(y).astype(int), 0, values.shape[0] - 2)
-    u, v = np.clip(x - i, 0.0, 1.0), np.clip(y - j, 0.0, 1.0)
-    top = (1.0 - u) * values[j, i] + u * values[j, i + 1]
-    return (1.0 - v) * top + v * (
-        (1.0 - u) * values[j + 1, i] + u * values[j + 1, i + 1]
-    )
+CELLS = np.load("occupancy.npy")
+CLEAR = clearances(CELLS)
+SLOPES = np.stack(np.gradient(CLEAR)[::-1], axis=-1)
+SLOPES /= np.maximum(np.linalg.norm(SLOPES, axis=-1, keepdims=True), 1e-6)
 
 
-CLEAR = clearances(np.load("occupancy.npy"), int(2.0 * RADIUS) + 2)
+def corners(x, y, width):
+    """The four entries around points in a grid, and the share of each."""
+    i, j = x.astype(np.int32), y.astype(np.int32)
+    u, v, at = x - i, y - j, j * width + i
+    shares = (1.0 - u) * (1.0 - v), u * (1.0 - v), (1.0 - u) * v, u * v
+    return (at, at + 1, at + width, at + width + 1), shares
 
 
-def lengths_to(goal):
-    """Length of the path to the goal from every second pixel, longer beside walls."""
-    clear = CLEAR[::2, ::2]
-    rows, columns = clear.shape
-    free = clear >= RADIUS + KEEP
-    price = 2.0 * (1.0 + 0.3 * np.clip(1.7 - clear / RADIUS, 0.0, 0.7))
-    price = np.pad(np.where(free, price, 60.0), 1, constant_values=np.inf)
-    width = columns + 2
-    price, lengths = price.ravel().tolist(), [math.inf] * price.size
-    begin = (round(float(goal[1]) / 2) + 1) * width + round(float(goal[0]) / 2) + 1
-    steps = [(1, 1.0), (-1, 1.0), (width, 1.0), (-width, 1.0)]
-    steps += [
-        (row + side, math.sqrt(2.0)) for row in (width, -width) for side in (1, -1)
+def clear_at(x, y):
+    """Clearances at points, interpolated, px."""
+    height, width = CLEAR.shape
+    x = np.clip(x + EDGE, 0.0, width - 1.001)
+    y = np.clip(y + EDGE, 0.0, height - 1.001)
+    around = zip(*corners(x, y, width), strict=True)
+    return sum(CLEAR.ravel()[at] * share for at, share in around)
+
+
+def price_at(clear):
+    """What a step costs by the clearance: it is more beside walls."""
+    return 1.0 + CROWDED * np.clip((ROOM - clear) / (ROOM - RADIUS), 0.0, 1.0)
+
+
+def times_to(goal):
+    """Steps to the goal from every node of a grid, and the prices of steps there."""
+    clear = CLEAR[EDGE % NODE :: NODE, EDGE % NODE :: NODE]
+    height, width = clear.shape
+    off_x = NODE * np.arange(width) - EDGE - goal[0]
+    off_y = NODE * np.arange(height)[:, None] - EDGE - goal[1]
+    near = np.hypot(off_x, off_y)
+    free = clear >= RADIUS + 2.0 * MARGIN
+    free |= (near < TOLERANCE) & (clear >= RADIUS)
+    price = price_at(clear)
+    open_, prices = free.ravel().tolist(), price.ravel().tolist()
+    times = [math.inf] * free.size
+    waiting = [(0.0, k) for k in np.flatnonzero(free & (near < TOLERANCE)).tolist()]
+    for _, k in waiting:
+        times[k] = 0.0
+    moves = [
+        (j * width + i, 0.5 * NODE / STEP * math.hypot(i, j))
+        for i in range(-2, 3)
+        for j in range(-2, 3)
+        if math.gcd(i, j) == 1
     ]
-    lengths[begin], queue = 0.0, [(0.0, begin)]
-    while queue:
-        length, at = heapq.heappop(queue)
-        if length > lengths[at]:
+    while waiting:
+        time, k = heapq.heappop(waiting)
+        if time > times[k]:
             continue
-        for offset, far in steps:
-            longer = length + far * price[at + offset]
-            if longer < lengths[at + offset]:
-                lengths[at + offset] = longer
-                heapq.heappush(queue, (longer, at + offset))
-    return np.array(lengths).reshape(rows + 2, width)[1:-1, 1:-1]
+        for offset, steps in moves:
+            to = k + offset
+            if open_[to]:
+                later = time + steps * (prices[k] + prices[to])
+                if later < times[to]:
+                    times[to] = later
+                    heapq.heappush(waiting, (later, to))
+    times = np.minimum(np.array(times).reshape(clear.shape), FAR).astype(np.float32)
+    price = np.where(free, LAYER * price, FAR).astype(np.float32)
+    return times, price, free & (near < TOLERANCE)
 
 
 class Person:
-    """A person: place (px), velocity (px/s), radius (px), steps since it was seen."""
+    """A person: place (px), velocity (px/s) and radius (px) with their covariance."""
 
-    def __init__(self, place, radius):
-        self.place, self.radius = np.array(place), radius
-        self.velocity, self.seen, self.unseen = np.zeros(2), 0, 0
+    def __init__(self, x, y, radius, spread, spread_radius):
+        self.mean = np.array([x, y, 0.0, 0.0, radius])
+        self.covariance = np.diag([spread, spread, SPEEDS, SPEEDS, spread_radius])
+        self.unseen, self.denied = 0, 0.0
 
-    def meet(self, place, exact):
-        """Corrects place and velocity by what was seen in this step."""
-        off = np.array(place) - self.place  # from where it was expected
-        if self.seen == 0:
-            self.velocity = off / DT
-        else:
-            self.velocity = self.velocity + (0.7 if exact else 0.3) / DT * off
-        speed = float(np.hypot(*self.velocity))
-        if speed > 0.9 * STEP / DT:
-            self.velocity *= 0.9 * STEP / DT / speed
-        self.place = self.place + (1.0 if exact or not self.seen else 0.6) * off
-        self.seen, self.unseen = self.seen + 1, 0
+    def expect(self):
+        """Goes on by a step."""
+        before = self.mean.copy()
+        self.mean[:2] += DT * self.mean[2:4]
+        self.covariance = MOTION @ self.covariance @ MOTION.T + SHAKE
+        self.unseen += 1
+        if self.unseen > 1:  # walls stop whom nobody sees
+            clear = clear_of(self.mean[None, :2])[0]
+            if clear < self.mean[4] - 1.0 and clear < clear_of(before[None, :2])[0]:
+                self.mean[:2] = before[:2]
+                self.mean[2:4] *= 0.8
+
+    def hit(self, x, y):
+        """Corrects the estimates: there is a point on the circle."""
+        off_x, off_y = x - self.mean[0], y - self.mean[1]
+        far = max(math.hypot(off_x, off_y), 1e-6)
+        slope = np.array([-off_x / far, -off_y / far, 0.0, 0.0, -1.0])
+        spread = self.covariance @ slope
+        gain = spread / (float(slope @ spread) + HIT_NOISE)
+        self.mean += gain * (self.mean[4] - far)
+        self.covariance -= np.outer(gain, spread)
+        self.unseen, self.denied = 0, 0.0
+
+    def tidy(self):
+        """Keeps the estimates within what is possible."""
+        self.mean[4] = min(max(self.mean[4], SMALLEST), LARGEST)
+        speed = math.hypot(self.mean[2], self.mean[3])
+        if speed > FASTEST:
+            self.mean[2:4] *= FASTEST / speed
+        self.covariance = 0.5 * (self.covariance + self.covariance.T)
 
 
-def circles(numbers, points, x, y):
-    """Circles through three hits each, as lists of centre, radius and hits."""
-    found = []
-    for k in range(len(numbers) - 2):
-        if numbers[k + 2] - numbers[k] > 5:
-            continue
-        (ax, ay), (bx, by), (cx, cy) = points[k : k + 3].tolist()
-        ux, uy, vx, vy = bx - ax, by - ay, cx - ax, cy - ay
-        twice = 2.0 * (ux * vy - uy * vx)
-        if abs(twice) < 1e-3:
-            continue
-        u, v = ux * ux + uy * uy, vx * vx + vy * vy
-        px, py = (vy * u - uy * v) / twice, (ux * v - vx * u) / twice
-        radius, px, py = math.hypot(px, py), ax + px, ay + py
-        behind = math.hypot(px - x, py - y) > math.hypot(bx - x, by - y)
-        if not (SMALLEST < radius < LARGEST and behind):
-            continue
-        for other in found:
-            if math.hypot(px - other[0][0], py - other[0][1]) < SAME:
-                other[2].update((k, k + 1, k + 2))
-                break
-        else:
-            found.append(((px, py), radius, {k, k + 1, k + 2}))
+MOTION = np.eye(5)
+MOTION[0, 2] = MOTION[1, 3] = DT
+
+
+def clear_of(places):
+    """Clearances of the pixels of some places, shape (n, 2)."""
+    i, j = pixels(places)
+    return CLEAR[j, i]
+
+
+def pixels(places):
+    """Columns and rows of the pixels of some places among the clearances."""
+    i, j = (np.rint(places) + EDGE).astype(int).T
+    return np.clip(i, 0, CLEAR.shape[1] - 1), np.clip(j, 0, CLEAR.shape[0] - 1)
+
+
+def on_walls(x, y):
+    """Which points are within BESIDE of a wall."""
+    found = np.zeros(len(x), bool)
+    for i in (-BESIDE, BESIDE):
+        for j in (-BESIDE, BESIDE):
+            columns, rows = pixels(np.column_stack([x + i, y + j]))
+            found |= CLEAR[rows, columns] == 0.0
     return found
 
 
-def track(people, numbers, points, pose):
-    """Finds people in the hits that are not of walls; updates the list of people."""
-    x, y, _ = pose
-    for person, place in zip(people, moved(*motion(people)), strict=True):
-        person.place, person.unseen = place, person.unseen + 1
-    found = circles(numbers, points, x, y)
-    pairs = sorted(
-        (math.dist(person.place, place), k, m)
-        for k, (place, _, _) in enumerate(found)
-        for m, person in enumerate(people)
-    )
-    met = {}
-    for far, k, m in pairs:
-        gate = GATE + (4.0 if people[m].seen < 2 else 0.0) + 0.5 * people[m].unseen
-        if far <= gate and k not in met and m not in met.values():
-            met[k] = m
-    left = set(range(len(numbers)))
-    for k, (place, radius, hits) in enumerate(found):
-        left -= hits
-        if k in met:
-            people[met[k]].meet(place, True)
-            people[met[k]].radius = radius
-        else:
-            people.append(Person(place, radius))
-    known = list(people)
-    for group in groups(sorted(left), numbers, points):
-        middle = group.mean(axis=0)
-        away = (middle - (x, y)) / max(math.dist(middle, (x, y)), 1e-6)
-        by_distance = [
-            (abs(math.dist(middle, each.place) - each.radius), k)
-            for k, each in enumerate(known)
-        ]
-        off, k = min(by_distance, default=(math.inf, -1))
-        if off > GATE:
-            people.append(Person(middle + 0.8 * USUAL * away, USUAL))
-        elif known[k].unseen:
-            known[k].meet(middle + 0.8 * known[k].radius * away, False)
-    return people
+def circle_through(x, y):
+    """Centre and radius of the circle through three points; None if there is none."""
+    ux, uy, vx, vy = x[1] - x[0], y[1] - y[0], x[2] - x[0], y[2] - y[0]
+    twice = 2.0 * (ux * vy - uy * vx)
+    if abs(twice) < 1e-3:
+        return None
+    u, v = ux * ux + uy * uy, vx * vx + vy * vy
+    px, py = (vy * u - uy * v) / twice, (ux * v - vx * u) / twice
+    return x[0] + px, y[0] + py, math.hypot(px, py)
 
 
-def groups(left, numbers, points):
-    """Hits that are neighbours in number and in place."""
-    found = []
-    for k in left:
-        last = found[-1][-1] if found else k
-        near = numbers[k] - numbers[last] <= 2
-        if last < k and near and math.dist(points[k], points[last]) < SMALLEST:
-            found[-1].append(k)
-        else:
-            found.append([k])
-    return [points[group] for group in found]
+def new_people(x, y, from_x, from_y):
+    """People who explain neighbouring hits, by their points."""
+    n = len(x)
+    if n >= 3:
+        ends = [0, n // 2, n - 1]
+        circle = circle_through(x[ends], y[ends])
+        if circle is not None:
+            off = np.abs(np.hypot(x - circle[0], y - circle[1]) - circle[2]).max()
+            behind = (
+                math.hypot(circle[0] - from_x, circle[1] - from_y)
+                > np.hypot(x - from_x, y - from_y).min()
+            )
+            if off < 0.2 and SMALLEST - 0.3 < circle[2] < LARGEST + 0.3 and behind:
+                return [Person(*circle, *CIRCLE)]
+        cut = int(np.hypot(np.diff(x), np.diff(y)).argmax()) + 1
+        parts = (x[:cut], y[:cut]), (x[cut:], y[cut:])
+        return [p for part in parts for p in new_people(*part, from_x, from_y)]
+    middle_x, middle_y = x.mean(), y.mean()
+    half = 0.5 * math.hypot(x[-1] - x[0], y[-1] - y[0])
+    far = max(math.hypot(middle_x - from_x, middle_y - from_y), 1e-6)
+    deep = math.sqrt(max(USUAL**2 - half**2, 0.0)) if n == 2 else 0.85 * USUAL
+    centre_x = middle_x + deep * (middle_x - from_x) / far
+    centre_y = middle_y + deep * (middle_y - from_y) / far
+    return [Person(centre_x, centre_y, USUAL, *(PAIR if n == 2 else SINGLE))]
 
 
-def forget(people, pose, ranges):
-    """The people that are still there, as far as the robot can see."""
+def track(people, pose, ranges):
+    """The people after this step, by the rays."""
     x, y, heading = pose
-    kept = []
     for person in people:
-        off = person.place - (x, y)
-        far = math.dist(person.place, (x, y))
-        bearing = math.remainder(math.atan2(off[1], off[0]) - heading, 2.0 * math.pi)
-        ray = int(np.argmin(np.abs(FAN - bearing)))
-        seen_past = far < RANGE and RANGE - 1e-3 > ranges[ray] > far + 2.0
-        if person.unseen <= (2 if seen_past else COAST):
-            kept.append(person)
-    return kept
+        person.expect()
+    hit_x, hit_y = (
+        x + ranges * np.cos(heading + FAN),
+        y + ranges * np.sin(heading + FAN),
+    )
+    hits = np.flatnonzero((ranges < RANGE - 0.5) & ~on_walls(hit_x, hit_y))
+    left = []
+    if people:
+        means = np.array([person.mean for person in people])
+        spread = np.array([p.covariance[0, 0] + p.covariance[1, 1] for p in people])
+        gates = np.minimum(1.5 + 2.0 * np.sqrt(np.maximum(spread, 0.0)), GATE)
+        off_x, off_y = (
+            hit_x[hits, None] - means[:, 0],
+            hit_y[hits, None] - means[:, 1],
+        )
+        off = np.abs(np.hypot(off_x, off_y) - means[:, 4])
+        off = np.where(off < gates, off, np.inf)
+        for k, row in zip(hits.tolist(), off, strict=True):
+            who = int(row.argmin())
+            if row[who] < np.inf:
+                people[who].hit(float(hit_x[k]), float(hit_y[k]))
+            else:
+                left.append(k)
+    else:
+        left = hits.tolist()
+    for person in people:
+        person.tidy()
+    kept = [person for person in people if is_there(person, pose, ranges)]
+    group = []
+    for k in [*left, None]:
+        if group and (
+            k is None
+            or k - group[-1] > 2
+            or math.hypot(hit_x[k] - hit_x[group[-1]], hit_y[k] - hit_y[group[-1]])
+            > JUMP
+        ):
+            kept += new_people(hit_x[group], hit_y[group], x, y)
+            group = []
+        group.append(k)
+    kept.sort(key=lambda p: (p.unseen > 0, p.covariance[0, 0] + p.covariance[1, 1]))
+    found = []
+    for person in kept:
+        if all(math.dist(person.mean[:2], other.mean[:2]) > APART for other in found):
+            found.append(person)
+    return found
 
 
-def clear_at(points):
-    """Clearances of the pixels of some points, shape (n, 2)."""
-    columns, rows = np.rint(points).astype(int).T
-    height, width = CLEAR.shape
-    return CLEAR[np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1)]
+def is_there(person, pose, ranges):
+    """Whether a person may still be there, by the rays that pass its place."""
+    if person.unseen == 0:
+        return True
+    x, y, heading = pose
+    off_x, off_y = person.mean[0] - x, person.mean[1] - y
+    far = math.hypot(off_x, off_y)
+    if far < RANGE - LARGEST:
+        bearing = FAN + heading - math.atan2(off_y, off_x)
+        bearing = np.abs(np.remainder(bearing + math.pi, 2.0 * math.pi) - math.pi)
+        across = bearing < math.asin(min(0.75 * person.mean[4] / max(far, 0.1), 1.0))
+        seen = ranges[across]
+        if np.any((seen > far) & (seen < RANGE - 0.5)):
+            person.denied += 1.0
+        else:
+            person.denied += 0.5 * min(np.count_nonzero(seen >= RANGE - 0.5), 2)
+    inside = clear_of(person.mean[None, :2])[0] < 2.0
+    return person.denied < 2.0 and person.unseen <= COAST and not inside
 
 
-def moved(places, rates, radii):
-    """Places after a step, shape (n, 2); walls stop the motion towards them."""
-    after, done = places.copy(), np.zeros(len(places), bool)
-    for along in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0)):
-        there = places + rates * along
-        fits = ~done & (clear_at(there) >= radii - 1.0)
-        after[fits] = there[fits]
-        done |= fits
-    return after
-
-
-def motion(people):
-    """Places, velocities (px per step) and radii of some people."""
-    places = np.array([person.place for person in people]).reshape(-1, 2)
-    rates = DT * np.array([person.velocity for person in people]).reshape(-1, 2)
-    return places, rates, np.array([person.radius for person in people])
-
-
-def futures(people):
-    """Places in each step, shape (LAYERS * LAYER + 1, n, 2), px."""
-    at, rates, radii = motion(people)
-    places = np.empty((LAYERS * LAYER + 1, *at.shape))
-    for step in range(len(places)):
-        places[step] = at
-        at = moved(at, rates, radii)
+def forecast(people):
+    """Places in each layer, shape (LAYERS + 1, n, 2), px; people slide along walls."""
+    means = np.array([person.mean for person in people])
+    at, rates, radii = means[:, :2], LAYER * DT * means[:, 2:4], means[:, 4]
+    places = np.empty((LAYERS + 1, *at.shape))
+    places[0] = at
+    for k in range(1, LAYERS + 1):
+        at = at + rates
+        i, j = pixels(at)
+        lack = radii - CLEAR[j, i]
+        if (lack > 0.0).any():
+            normals = np.where((lack > 0.0)[:, None], SLOPES[j, i], 0.0)
+            at = at + np.clip(lack, 0.0, 6.0)[:, None] * normals
+            into = np.minimum((rates * normals).sum(axis=1), 0.0)
+            rates = rates - into[:, None] * normals
+        places[k] = at
     return places
 
 
-def danger(gaps, layers):
-    """Probability of a contact in a layer, by the gap that is expected then, px."""
-    # What is far ahead is not known well.
-    width = WIDTH + SPREAD * layers
-    return FADE**layers / (1.0 + np.exp(np.clip((gaps - TOUCH) / width, -30.0, 30.0)))
+def risks(gaps, times, unsure):
+    """Costs of a step at gaps to a person, px, at times ahead, s."""
+    if unsure:
+        width = np.minimum(VAGUE_SHARP + VAGUE_BLUR * times, VAGUE_BLURRED)
+    else:
+        width = np.minimum(SHARP + BLUR * times, BLURRED)
+    off = np.clip((gaps - TOUCH) / width, -30.0, 30.0)
+    return RISK / (1.0 + times) ** FADE / (1.0 + np.exp(off))
 
 
-def dangers(places, people, x, y):
-    """Probability of a contact at each node in each layer."""
-    if not people:
-        return np.zeros((LAYERS + 1, *COLUMNS.shape))
-    reach = RADIUS + np.array([person.radius for person in people], np.float32)
-    off = (places[::LAYER] - (x, y)).astype(np.float32)
-    steps = STEPS.astype(np.float32)
-    dx, dy = (steps - off[:, :, :1]) ** 2, (steps - off[:, :, 1:]) ** 2
-    far = np.sqrt(dy[:, :, :, None] + dx[:, :, None, :]) - reach[:, None, None]
-    return danger(far.min(axis=1), np.arange(LAYERS + 1)[:, None, None])
+def stamps():
+    """Risks of a layer around people, by surety, layer and radius in halves of a px."""
+    side = NODE * np.arange(-STAMP, STAMP + 1)
+    far = np.hypot(side, side[:, None]) - RADIUS
+    return {
+        (unsure, layer, half): (
+            LAYER * risks(far - 0.5 * half, layer * LAYER * DT, unsure)
+        ).astype(np.float32)
+        for unsure in (False, True)
+        for layer in range(BEGIN, LAYERS)
+        for half in range(round(2 * SMALLEST), round(2 * LARGEST) + 1)
+    }
 
 
-def around(values):
-    """Values of the nodes to which MOVES lead, shape (moves, rows, columns)."""
-    padded, side = np.pad(values, 1, constant_values=LOST), 2 * WINDOW + 1
-    return np.stack(
-        [padded[1 + j : 1 + j + side, 1 + i : 1 + i + side] for j, i in MOVES]
+STAMPS = stamps()
+
+
+def least_around(values):
+    """The least value within three nodes, shape smaller by 3 on each side."""
+    height, width = values.shape[0] - 6, values.shape[1] - 6
+    three = np.minimum(np.minimum(values[:, :-2], values[:, 1:-1]), values[:, 2:])
+    five = np.minimum(three[:, :-2], three[:, 2:])
+    seven = np.minimum(five[:, :-2], five[:, 2:])
+    three, five = three[:, 2 : 2 + width], five[:, 1 : 1 + width]
+    best = np.minimum(seven[2 : 2 + height], seven[3 : 3 + height])
+    np.minimum(best, seven[4 : 4 + height], out=best)
+    for rows, top in ((five, 1), (five, 5), (three, 0), (three, 6)):
+        np.minimum(best, rows[top : top + height], out=best)
+    return best
+
+
+def values_ahead(people, places, x, y):
+    """What is left to pay at each node in layer BEGIN; column and row of the first."""
+    times, price, at_goal = STATE["grid"]
+    column = min(max(round((x + EDGE) / NODE), 20), times.shape[1] - 21)
+    row = min(max(round((y + EDGE) / NODE), 20), times.shape[0] - 21)
+    left, top = max(column - WINDOW, 3), max(row - WINDOW, 3)
+    right = min(column + WINDOW + 1, times.shape[1] - 3)
+    bottom = min(row + WINDOW + 1, times.shape[0] - 3)
+    height, width = bottom - top, right - left
+    values = times[top - 3 : bottom + 3, left - 3 : right + 3].copy()
+    inner = values[3:-3, 3:-3]
+    goals = at_goal[top:bottom, left:right]
+    prices = np.full((height + 2 * STAMP, width + 2 * STAMP), FAR)
+    base = price[top:bottom, left:right]
+    side = 2 * STAMP + 1
+    columns = np.rint((places[:, :, 0] + EDGE) / NODE).astype(int) - left
+    rows = np.rint((places[:, :, 1] + EDGE) / NODE).astype(int) - top
+    near = (columns > -STAMP) & (columns < width + STAMP)
+    near &= (rows > -STAMP) & (rows < height + STAMP)
+    columns, rows = np.clip(columns, 0, width - 1), np.clip(rows, 0, height - 1)
+    kinds = [kind_of(person) for person in people]
+    for layer in range(LAYERS - 1, BEGIN - 1, -1):
+        prices[STAMP:-STAMP, STAMP:-STAMP] = base
+        for m in np.flatnonzero(near[layer]).tolist():
+            unsure, half = kinds[m]
+            i, j = columns[layer, m], rows[layer, m]
+            prices[j : j + side, i : i + side] += STAMPS[unsure, layer, half]
+        inner[:] = prices[STAMP:-STAMP, STAMP:-STAMP] + least_around(values)
+        inner[goals] = 0.0
+    return values, NODE * (left - 3) - EDGE, NODE * (top - 3) - EDGE
+
+
+def kind_of(person):
+    """Whether the velocity of a person is unsure, and its radius in halves of a px."""
+    unsure = person.covariance[2, 2] + person.covariance[3, 3] > VAGUE
+    half = math.ceil(2.0 * person.mean[4] - 0.15)
+    return bool(unsure or person.unseen > LATELY), min(half, round(2 * LARGEST))
+
+
+def value_at(values, left, top, x, y):
+    """Values at points, interpolated between the nodes that are free."""
+    height, width = values.shape
+    at, shares = corners(
+        np.clip((x - left) / NODE, 0.0, width - 1.001),
+        np.clip((y - top) / NODE, 0.0, height - 1.001),
+        width,
     )
+    total, weights = 0.0, 1e-9
+    for k, share in zip(at, shares, strict=True):
+        found = values.ravel()[k]
+        part = np.where(found < 0.5 * FAR, share, 0.0)
+        total, weights = total + part * found, weights + part
+    return np.where(weights > 0.03, total / weights, 0.3 * FAR)
 
 
-def values(lengths, places, people, x, y):
-    """What is left to pay at each node in layer HELD, and the move from there."""
-    left = between(lengths, (x + COLUMNS) / 2.0, (y + ROWS) / 2.0)
-    left = np.minimum(left - left[WINDOW, WINDOW], 0.5 * LOST)
-    walls = between(CLEAR, x + COLUMNS, y + ROWS) < RADIUS + KEEP
-    risks = dangers(places, people, x, y)
-    # Whoever is early is better off than who arrives at last.
-    value = np.where(walls, LOST, left + risks[LAYERS] * (LOST - left))
-    for layer in range(LAYERS - 1, HELD - 1, -1):
-        options = around(value)
-        options[0] += PAUSE
-        choice = options.argmin(axis=0)
-        further = np.minimum(options.min(axis=0) + HURRY * left, LOST)
-        value = further + risks[layer] * (LOST - further)
-        value[walls] = LOST
-    # Wheel speeds are tested by themselves for walls.
-    value = np.where(walls, around(value).min(axis=0) + NODE, value)
-    return value, choice
+def candidates():
+    """Headings and speeds to try: first turn and further one (rad), speeds, gear."""
+    rows = []
+    for k in range(36):
+        angle = math.radians(10.0 * k)
+        rows += [(angle, b, 1.0, 1.0, 1.0) for b in (0.0, -0.5, 0.5, -1.1, 1.1)]
+        rows += [(angle, b, 1.0, 1.0, -1.0) for b in (0.0, -0.8, 0.8)]
+        for first, then in ((0.5, 0.5), (1.0, 0.0), (0.0, 1.0)):
+            rows += [(angle, 0.0, first, then, gear) for gear in (1.0, -1.0)]
+    rows.append((0.0, 0.0, 0.0, 0.0, 1.0))
+    return np.array(rows).T
 
 
-def chosen(lengths, people, pose):
-    """The best wheel speeds, held up to layer HELD, by what they lead to."""
+CANDIDATES = candidates()
+STEPS = BEGIN * LAYER
+
+
+def roll(pose):
+    """Drives all candidates: x, y after each step and the first wheel speeds."""
+    first, further, speed_1, speed_2, gear = CANDIDATES
     x, y, heading = pose
-    places = futures(people)
-    value, choice = values(lengths, places, people, x, y)
-    wheels = np.clip(PAIRS * STATE["gains"], -1.0, 1.0) * STEP
-    forward = 0.5 * wheels.sum(axis=1)
-    turn = (wheels[:, 0] - wheels[:, 1]) / AXLE
-    facing = np.full(len(PAIRS), heading)
-    px, py = np.full(len(PAIRS), x), np.full(len(PAIRS), y)
-    safe = np.ones(len(PAIRS))
-    reach = RADIUS + np.array([person.radius for person in people])
-    for step in range(1, HELD * LAYER + 1):
-        for part in (0.5, 0.5):
-            middle = facing + 0.5 * part * turn
-            px = px + part * forward * np.cos(middle)
-            py = py + part * forward * np.sin(middle)
-            facing = facing + part * turn
-            safe[between(CLEAR, px, py) < RADIUS + KEEP] = 0.0
-        if people:
-            off_x, off_y = (
-                px[:, None] - places[step, :, 0],
-                py[:, None] - places[step, :, 1],
-            )
-            gaps = (np.hypot(off_x, off_y) - reach).min(axis=1)
-            safe *= 1.0 - danger(gaps, step / LAYER)
-    cost = between(value, (px - x) / NODE + WINDOW, (py - y) / NODE + WINDOW)
-    column = np.rint((px - x) / NODE).astype(int) + WINDOW
-    row = np.rint((py - y) / NODE).astype(int) + WINDOW
-    moves = choice[row, column]
-    off = np.remainder(ANGLES[moves] - facing + 0.5 * math.pi, math.pi) - 0.5 * math.pi
-    cost += np.where(moves > 0, TURNING * np.abs(off), 0.0)
-    cost += HABIT * np.abs(PAIRS - STATE["last"]).sum(axis=1)
-    cost = LOST + safe * (cost - LOST)
-    return PAIRS[int(np.argmin(cost))]
+    top = min(1.0, *STATE["gains"])
+    limit = 2.0 * STEP * top / AXLE
+    aim = heading + first + np.where(gear < 0.0, math.pi, 0.0)
+    x, y = np.full(len(gear), x), np.full(len(gear), y)
+    heading = np.full(len(gear), heading)
+    xs, ys = [], []
+    for step in range(STEPS):
+        goal, speed = (aim, speed_1) if step < FIRST else (aim + further, speed_2)
+        off = np.remainder(goal - heading + math.pi, 2.0 * math.pi) - math.pi
+        turn = np.clip(off, -limit, limit)
+        wheel = 0.5 * AXLE / STEP * turn
+        drive = np.maximum(np.minimum(speed * top, top - np.abs(wheel)), 0.0)
+        drive = gear * np.where(np.abs(off) > FACING, 0.0, drive)
+        if step == 0:
+            wheels = np.column_stack([drive + wheel, drive - wheel])
+        length = STEP * drive * (1.0 - turn * turn / 24.0)
+        x = x + length * np.cos(heading + 0.5 * turn)
+        y = y + length * np.sin(heading + 0.5 * turn)
+        heading = heading + turn
+        xs.append(x)
+        ys.append(y)
+    return np.array(xs), np.array(ys), wheels
+
+
+def costs_of(xs, ys, people, places, pose):
+    """Costs of each step of all candidates, by walls and people."""
+    clear = clear_at(xs, ys)
+    costs = price_at(clear) + GRAZING * np.clip(GRAZE - clear, 0.0, 2.0)
+    lack = RADIUS + MARGIN - clear
+    costs += np.where(lack > 0.0, BLOCKED + DEEPER * lack, 0.0)
+    steps = np.arange(1, STEPS + 1)
+    for person, way in zip(people, places.transpose(1, 2, 0), strict=True):
+        if math.dist(person.mean[:2], pose[:2]) > AROUND:
+            continue
+        unsure, half = kind_of(person)
+        layers = np.arange(LAYERS + 1)
+        at_x, at_y = (np.interp(steps / LAYER, layers, each)[:, None] for each in way)
+        gaps = np.hypot(xs - at_x, ys - at_y) - 0.5 * half - RADIUS
+        costs += risks(gaps, DT * steps[:, None], unsure)
+        lack = HIT - gaps[:HIT_STEPS]
+        costs[:HIT_STEPS] += np.where(lack > 0.0, STRUCK + STRUCK_DEEPER * lack, 0.0)
+    return costs
+
+
+def chosen(people, pose):
+    """The wheel speeds of the candidate that costs least."""
+    places = forecast(people) if people else np.zeros((LAYERS + 1, 0, 2))
+    values, left, top = values_ahead(people, places, *pose[:2])
+    xs, ys, wheels = roll(pose)
+    costs = costs_of(xs, ys, people, places, pose)
+    goal_x, goal_y = STATE["goal"]
+    done = np.hypot(xs - goal_x, ys - goal_y) < TOLERANCE
+    done = np.logical_or.accumulate(done, axis=0)
+    costs[1:][done[:-1]] = 0.0
+    total = costs.sum(axis=0)
+    total += np.where(done[-1], 0.0, value_at(values, left, top, xs[-1], ys[-1]))
+    way = pose[2] + CANDIDATES[0]
+    if STATE["way"] is not None:
+        total += VEER * (1.0 - np.cos(way - STATE["way"][0]))
+        total += np.where(CANDIDATES[4] != STATE["way"][1], REVERSE, 0.0)
+    best = int(total.argmin())
+    if CANDIDATES[2, best] > 0.0:
+        STATE["way"] = way[best], CANDIDATES[4, best]
+    return wheels[best]
 
 
 def measure(pose):
@@ -357,22 +534,18 @@ def measure(pose):
 
 def reset(obs):
     """Plans the way from everywhere to the goal."""
-    STATE.update(people=[], last=np.zeros(2), gains=np.ones(2), pose=None)
-    STATE["lengths"] = lengths_to(obs["goal"])
+    STATE.update(people=[], last=np.zeros(2), gains=np.ones(2), pose=None, way=None)
+    STATE["goal"] = obs["goal"].astype(float)
+    STATE["grid"] = times_to(STATE["goal"])
 
 
 def policy(obs):
     """Wheel speeds for an observation."""
-    pose = x, y, heading = tuple(float(value) for value in obs["pose"])
-    ranges = np.asarray(obs["ranges"], float)
+    pose = tuple(float(value) for value in obs["pose"])
     if STATE["pose"] is not None:
         measure(pose)
     STATE["pose"] = pose
-    points = np.column_stack(
-        [x + ranges * np.cos(heading + FAN), y + ranges * np.sin(heading + FAN)]
-    )
-    hits = np.flatnonzero((ranges < RANGE - 1e-3) & (clear_at(points) > BESIDE))
-    people = track(STATE["people"], hits.tolist(), points[hits], pose)
-    STATE["people"] = forget(people, pose, ranges)
-    STATE["last"] = pair = chosen(STATE["lengths"], STATE["people"], pose)
-    return pair.astype(np.float32)
+    STATE["people"] = track(STATE["people"], pose, obs["ranges"].astype(float))
+    wheels = chosen(STATE["people"], pose)
+    STATE["last"] = np.clip(wheels / STATE["gains"], -1.0, 1.0)
+    return STATE["last"].astype(np.float32)

@@ -89,8 +89,11 @@ def test_it_is_called_scripted_costs_nothing_and_gives_no_rules(chosen):
         ({"generate": [{"file": "d.py"}]}, "d.py: No such file"),
         ({"generate": [{"parameters": {"cruise": 1}}]}, "did you mean 'cruise_speed'"),
         ({"generate": [{"file": "a.py", "parameters": {"x": 1}}]}, "a file or"),
-        ({"generate": [{"weight": 0}]}, "generate.0.weight: .*greater than 0"),
-        ({"edit": []}, "edit: .*at least 1 item"),
+        (
+            {"generate": [{"weight": 0}]},
+            "generate.0.weight: .*expected more than 0, got 0",
+        ),
+        ({"edit": []}, "edit: .*expected at least 1 of them"),
         ({"speed": 1}, "speed: unknown key"),
     ],
 )
