@@ -112,7 +112,7 @@ def test_a_setting_is_a_loop_and_the_loop_tells_the_setting(setting, loop, writt
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"runs": 0}, "few.yaml: runs: .*greater than or equal to 1"),
+        ({"runs": 0}, "few.yaml: runs: .*expected at least 1, got 0"),
         (
             {"runz": 3},
             r"few.yaml: runz: unknown key \(did you mean 'runs'\?\)",

@@ -192,7 +192,7 @@ def test_the_shipped_prices_can_be_read():
         ("schema: 1\nmodels: {}\n", "dated: is missing"),
         (
             "dated: 2026-01-01\nmodels: {openai:x: {input: -1, output: 1}}\n",
-            "greater than or equal to 0",
+            "expected at least 0, got -1",
         ),
         (
             "dated: 2026-01-01\nmodels: {openai:x: {input: .nan, output: 1}}\n",

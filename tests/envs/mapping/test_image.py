@@ -120,7 +120,7 @@ def test_ros_rules(fields: dict[str, object], occupied: list, tmp_path: Path) ->
     ("text", "message"),
     [
         ("resolution: 0.05\n", "expected a field `image`"),
-        ("image: map.pgm\nresolution: -1\n", "resolution: Input should be greater"),
+        ("image: map.pgm\nresolution: -1\n", "resolution: expected more than 0"),
         ("image: map.pgm\nresolution: 1\nmode: odd\n", "mode: Input should be"),
         ("image: none.pgm\nresolution: 1\n", "none.pgm: no such file"),
         ("image: [\n", "not valid YAML"),
