@@ -1,15 +1,19 @@
 """Drives an e-puck to a goal without a map and without a pose, by feel.
 
-A Kalman filter adds up the angles of the wheels, and corrects the pose by the
-directions of the walls, which are all parallel or at right angles to each other. What
-the infra-red sensors hit is kept in a map of the robot's own. Runs of hits along the
-walls are plates: they are taken to go on until a ray finds nothing there, and believed
-to go on up to the next plate across. A search finds the way to the goal that is
-cheapest if all else is free, and the robot drives straight to the farthest point of it
-that it can, along the arc that leads there best and leaves room.
+The floor is a grid of cells: all plates lie on lines that cross at right angles, and
+each plate spans a whole side of a cell. So a few hits tell where a line is, a few more
+that a whole side is closed, and a ray that passes through it that it is open. Start and
+goal are in the middles of their cells, which tells of lines that no ray has seen.
+
+A Kalman filter adds up the angles of the wheels, and corrects the pose by directions of
+plates and by the lines, which it estimates as well. A search finds the way to the goal
+that is cheapest if sides that are neither closed nor open are open, but cost something.
+The robot drives straight to the farthest point of it that it can, along the arc that
+leads there best and leaves room.
 """
 
 import heapq
+import itertools
 import json
 import math
 
@@ -44,35 +48,37 @@ READINGS = np.array(
 )
 FLAT = 0.987  # length on the floor of a ray of length 1
 SEEN = 84.0  # a lower reading may be noise
+FORWARD = (0, 1, 5, 6, 7)  # sensors whose next one looks much the same way
 CLEAR = 0.06  # m that a ray without a hit is free
-SIDES = (2, 5)  # sensors that look to the sides
+SHARP = 0.058  # m, longer rays are too rough for lines
 
 FINE = 0.01  # m, cells of hits and of free space
 CELL = 0.015  # m, cells of the search
-HALF = 3.2  # m from the start to the borders of the maps
-# How much more a place costs in the search whose body would be so near to a hit, m.
-BELTS = (
-    (0.002, 300.0),
-    (0.006, 8.0),
-    (0.010, 5.0),
-    (0.015, 3.0),
-    (0.02, 1.5),
-    (0.025, 0.7),
-    (0.032, 0.3),
-)
-WIDE = 0.009  # m beside a ray that count as seen
+HALF = 3.2  # m from the start to the borders of the map
+SIDE = 2.03  # m, longest side of the floor
+PITCH = 0.275  # m between two lines, mostly
+NARROW, WIDE = 0.12, 0.165  # m between two lines at least; half of it at most
+THICK = 0.015  # m, plates, mostly
+SAME = 0.05  # m, faces that are not farther apart are the same
+LONGEST = 0.08  # m, no side of a thing is so long
+SHORTEST = 0.04  # m, runs of hits that tell the direction of a plate
+FIRST = 0.065  # m, the same for the first one, from which the frame follows
+TILT = 0.12  # rad, plates seem to be turned by less
+GATE = 16.0  # squared SDs by which a measurement may be off
+# Prices of a m of way, by the room between body and hits, m.
+ROOMS = np.array([0.002, 0.006, 0.010, 0.015, 0.02, 0.025, 0.032])
+PRICES = np.array([301.0, 9.0, 6.0, 4.0, 2.5, 1.7, 1.3, 1.0])
+GUESSED = 30.0  # most that a m costs near a part of a plate that no ray has seen
+DOUBT = 1.0  # how much more a m costs on a line where nothing is known
+RECENT = 20  # steps for which hits move along when the pose is corrected
+BEYOND = 0.03  # m that a thing is taken to go on beyond its last hit
 LOOK = 0.25  # m ahead on the path
 MARGIN = 0.009  # m that arcs keep from hits
-BEYOND = 0.02  # m that a thing is taken to go on beyond its last hit
-PLATE = 0.05  # m that a plate is taken to go on beyond its last hit
-LEAST, MOST = 0.22, 0.3  # m, widths of passages
-SIDE = 2.03  # m, longest side of the floor
-TIGHT = 1  # belt whose hits on the path call for another path
 REPLAN = 5  # steps after which a path is looked for anew
-DOUBT = 4.0  # how much more a place costs where a plate is believed to go on
-UNKNOWN = 0.3  # how much more a place costs that no ray has seen
+KEEP = 0.03  # m by which another path must be cheaper
 AGAIN = 0.02  # m that a spin back costs
-RISK, SAFE = 0.06, 0.012  # m that a contact costs; m of room in which it is a third
+RISK, SAFE = 0.08, 0.015  # m that a contact costs; m of room in which it is a third
+RIGHT = 0.5 * math.pi
 
 
 def wrapped(angle, turn=2.0 * math.pi):
@@ -80,295 +86,445 @@ def wrapped(angle, turn=2.0 * math.pi):
     return angle - turn * math.floor(angle / turn + 0.5)
 
 
-class Pose:
-    """A Kalman filter over the pose and what is wrong with the wheels.
+class Face:
+    """A side of a line on which plates have been seen.
 
     Attributes:
-        pose: x, y and heading.
-        bend: Turn for each m, rad, since the wheels differ.
-        scale: Relative error of turns, since the axle differs.
-        grid: Direction of the walls, rad, up to right angles; None if not known yet.
+        axis: 0 for lines along the grid, 1 for lines across it.
+        sign: On which side the plates are, 1 or -1.
+        pieces: Both ends of the parts that have been seen, m along the line.
+    """
+
+    def __init__(self, axis, sign):
+        self.axis, self.sign = axis, sign
+        self.pieces = []
+
+    def add(self, low, high):
+        """Adds a part."""
+        for old in list(self.pieces):
+            if low < old[1] + BEYOND and high > old[0] - BEYOND:
+                low, high = min(low, old[0]), max(high, old[1])
+                self.pieces.remove(old)
+        self.pieces.append((low, high))
+
+    def longer(self, length):
+        """Whether hits on it are so far apart."""
+        ends = [end for piece in self.pieces for end in piece]
+        return bool(ends) and max(ends) - min(ends) > length
+
+
+class Pose:
+    """A Kalman filter over the pose, what is wrong with the wheels, and the lines.
+
+    Its frame is that of the start at first. The first plate that it sees is taken to be
+    in line with the grid, and from then on it is the start that may be turned.
+
+    Attributes:
+        state: x, y, heading; turn for each m, rad, since the wheels differ; relative
+            errors of turns and ways; by how much the start is turned, rad; and for each
+            face its place across it, m.
         spread: Covariance of the errors of all of these.
+        faces: The faces that have been seen.
+        grid: Direction of the grid, rad; None if not known yet.
     """
 
     def __init__(self):
-        self.pose = [0.0, 0.0, 0.0]
-        self.bend = self.scale = 0.0
-        self.grid = None
+        self.state = np.zeros(7)
         bend = WHEEL * math.sqrt(2.0 / 3.0) / AXLE
-        scale = AXLE_ERROR / math.sqrt(3.0) + WHEEL / 3.0
-        self.spread = np.diag([1e-8, 1e-8, 1e-8, bend**2, scale**2, 100.0])
+        way = WHEEL / math.sqrt(6.0)
+        turn = math.hypot(AXLE_ERROR / math.sqrt(3.0), way)
+        self.spread = np.diag([1e-8, 1e-8, 1e-8, bend**2, turn**2, way**2, 0.0])
+        self.spread[4, 5] = self.spread[5, 4] = way**2
+        self.faces = []
+        self.grid = None
+
+    def turned(self, point):
+        """A point that is known in the frame of the start."""
+        return rotated(point, -float(self.state[6])).tolist()
+
+    def align(self, direction, sd):
+        """Takes the direction of the first plate for that of the grid."""
+        self.grid = wrapped(direction, RIGHT)
+        x, y = self.state[:2].tolist()
+        # The error of the heading becomes that of the start, about which all turns.
+        turn = np.eye(7)
+        turn[[0, 1, 2, 6], 2] = y, -x, 0.0, -1.0
+        noise = np.array([-y, x, 1.0, 0.0, 0.0, 0.0, 1.0])
+        self.spread = turn @ self.spread @ turn.T + sd * sd * np.outer(noise, noise)
 
     def moved(self, left, right):
         """Takes a step of the wheels, m."""
-        x, y, heading = self.pose
+        full = 0.99 * STEP
+        # Slip makes a wheel slower at times, but never faster than its top speed.
+        left, right = (w * (1.0 - 0.4 * SLIP * (abs(w) > full)) for w in (left, right))
+        heading, bend, turns, ways = self.state[2:6].tolist()
         way, turn = 0.5 * (left + right), (right - left) / AXLE
-        true = turn * (1.0 + self.scale) + self.bend * way
+        true = turn * (1.0 + turns) + bend * way
         middle = heading + 0.5 * true
-        dx, dy = way * math.cos(middle), way * math.sin(middle)
-        self.pose = [x + dx, y + dy, heading + true]
-        step = np.eye(6)
+        ahead, side = math.cos(middle), math.sin(middle)
+        true_way = way * (1.0 + ways)
+        dx, dy = true_way * ahead, true_way * side
+        self.state[:3] += dx, dy, true
+        size = len(self.state)
+        step = np.eye(size)
         step[0, 2], step[1, 2] = -dy, dx
+        step[0, 5], step[1, 5] = way * ahead, way * side
         step[2, 3], step[2, 4] = way, turn
-        noise = np.zeros((6, 6))
+        self.spread = step @ self.spread @ step.T
         wheel = SLIP**2 * (left * left + right * right)
-        noise[2, 2] = wheel / AXLE**2
-        along = 0.25 * wheel + 1e-10
-        noise[0, 0], noise[1, 1] = along, along
-        self.spread = step @ self.spread @ step.T + noise
+        self.spread[2, 2] += wheel / AXLE**2
+        self.spread[0, 0] += 0.25 * wheel + 1e-10
+        self.spread[1, 1] += 0.25 * wheel + 1e-10
 
-    def wall(self, direction, sd):
-        """Takes the direction of a wall as seen, rad."""
-        right = 0.5 * math.pi
-        if self.grid is None:
-            self.grid = wrapped(direction, right)
-        off = wrapped(direction - self.grid, right)
-        row = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0])
+    def correct(self, row, off, sd):
+        """Takes a measurement that is by `off` too large; tells if it may be true."""
         gain = self.spread @ row
         size = float(row @ gain) + sd * sd
-        if off * off > 9.0 * size or abs(off) > 0.5:
-            return
+        if off * off > GATE * size:
+            return False
         gain = gain / size
-        fix = gain * off
-        # `fix` is by how much the pose is too far, and the walls are not far enough.
-        self.pose = [p - f for p, f in zip(self.pose, fix[:3].tolist(), strict=True)]
-        self.bend -= float(fix[3])
-        self.scale -= float(fix[4])
-        self.grid += float(fix[5])
+        self.state = self.state - gain * off
         self.spread = self.spread - np.outer(gain, row @ self.spread)
+        return True
 
-
-class Walls:
-    """The last hits of a sensor at the side, for the direction of a wall."""
-
-    def __init__(self):
-        self.points = []
-
-    def add(self, point):
-        """Adds a hit, or forgets all; gives the direction of a wall and its SD."""
-        if point is None:
-            self.points = []
-            return None
-        self.points.append(point)
-        if len(self.points) < 6:
-            return None
-        at = np.array(self.points)
-        length = float(np.hypot(*(at[-1] - at[0])))
-        if length < 0.07:
-            if len(self.points) > 30:
-                self.points = self.points[1:]
-            return None
-        middle = at.mean(axis=0)
-        off = at - middle
-        _, sizes, axes = np.linalg.svd(off, full_matrices=False)
-        rough = float(sizes[1]) / math.sqrt(len(at))
-        if rough > 0.003:
-            self.points = self.points[len(self.points) // 2 :]
-            return None
-        self.points = []
+    def run(self, points):
+        """Takes hits of a ray that follow each other, which may be along a plate."""
+        middle = points.mean(axis=0)
+        _, sizes, axes = np.linalg.svd(points - middle, full_matrices=False)
+        rough = float(sizes[1]) / math.sqrt(len(points))
+        if rough > 0.002:
+            return
+        length = math.dist(points[-1], points[0])
         direction = math.atan2(axes[0, 1], axes[0, 0])
-        return direction, 0.015 + 2.0 * rough / length
+        sd = 0.015 + rough / length
+        if self.grid is None:
+            self.align(direction, sd)
+        off = wrapped(direction - self.grid, RIGHT)
+        row = np.zeros(len(self.state))
+        row[2] = 1.0
+        if abs(off) < 0.2 and self.correct(row, off, sd):
+            self.plate(points, direction, 0.004)
+
+    def plate(self, points, direction, sd):
+        """Takes hits on a plate, its direction, and the SD of its place."""
+        axis = round((direction - self.grid) / RIGHT) % 2
+        angle = self.grid + (1 - axis) * RIGHT
+        across = np.array([math.cos(angle), math.sin(angle)])
+        point = points.mean(axis=0)
+        arm = point - self.state[:2]
+        place = float(across @ point)
+        number = self.face(axis, math.copysign(1.0, float(across @ arm)), place)
+        if number is None:
+            return
+        row = np.zeros(len(self.state))
+        row[:2] = across
+        row[2] = float(across @ np.array([-arm[1], arm[0]]))
+        row[7 + number] = -1.0
+        if self.correct(row, place - float(self.state[7 + number]), sd):
+            along = rotated(points, self.grid)[:, axis]
+            self.faces[number].add(float(along.min()), float(along.max()))
+
+    def face(self, axis, sign, place):
+        """Number of the face at a place; None if there cannot be one."""
+        gaps = {
+            k: abs(place - float(self.state[7 + k]))
+            for k, face in enumerate(self.faces)
+            if (face.axis, face.sign) == (axis, sign)
+        }
+        if gaps and min(gaps.values()) < SAME:
+            return min(gaps, key=gaps.get)
+        near = [k for k, gap in gaps.items() if gap < NARROW]
+        if any(self.faces[k].longer(LONGEST) for k in near):
+            return None
+        self.faces.append(Face(axis, sign))
+        self.state = np.append(self.state, place)
+        self.spread = np.pad(self.spread, (0, 1))
+        self.spread[-1, -1] = 1.0
+        return len(self.faces) - 1
+
+    def lines(self, axis, guesses=()):
+        """Places of the lines that have been seen; fewer hits do near a guess."""
+        places = []
+        for face, place in zip(self.faces, self.state[7:].tolist(), strict=True):
+            likely = any(abs(place - guess) < SAME for guess in guesses)
+            if face.axis == axis and face.longer(SHORTEST if likely else LONGEST):
+                places.append((place, face.sign))
+        found = []
+        for place, sign in sorted(places):
+            if found and place - found[-1][0] < SAME:
+                found[-1] = (0.5 * (place + found[-1][0]), 0.0)
+            else:
+                found.append((place, sign))
+        return [place + 0.5 * THICK * sign for place, sign in found]
+
+    def closed(self, axis, place):
+        """Both ends of the parts of plates that have been seen on a line."""
+        return [
+            piece
+            for face, at in zip(self.faces, self.state[7:].tolist(), strict=True)
+            if face.axis == axis and abs(at - place) < SAME
+            for piece in face.pieces
+        ]
 
 
-class Maps:
-    """Hits, free space, and where the body may be.
+def lattice(seen, middles):
+    """Places of all lines of an axis: those seen, and guesses between and beyond.
+
+    Args:
+        seen: Places of lines.
+        middles: Middles of two cells, the start's and the goal's.
+    """
+    knots = [(place, 0.0) for place in seen]
+    for middle in middles:
+        for line in seen:
+            other = 2.0 * middle - line
+            near = abs(line - middle) < WIDE
+            if near and min(abs(place - other) for place, _ in knots) > NARROW:
+                knots.append((other, 0.0))
+    knots = sorted(knots + [(place, 0.5) for place in middles])
+    places, numbers = [knots[0][0]], [knots[0][1]]
+    for (low, a), (high, b) in itertools.pairwise(knots):
+        half = abs(a - b)
+        step = round((high - low) / PITCH - half) + half
+        if step <= 0.0:
+            continue
+        numbers.append(numbers[-1] + step)
+        places.append(high)
+    many = math.ceil(SIDE / PITCH)
+    places = [places[0] - many * PITCH, *places, places[-1] + many * PITCH]
+    numbers = [numbers[0] - many, *numbers, numbers[-1] + many]
+    return np.interp(np.arange(math.ceil(numbers[0]), numbers[-1]), numbers, places)
+
+
+def rotated(points, angle):
+    """Points in a frame that is turned by the angle."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return np.asarray(points) @ np.array([[cosine, -sine], [sine, cosine]])
+
+
+def cells(points):
+    """Columns and rows of points in the map."""
+    return ((np.asarray(points) + HALF) / FINE).astype(int).T
+
+
+class Map:
+    """Hits and free space.
 
     Attributes:
         hits: Place and time of the last hit in each cell.
-        passed: Cells that a ray has passed.
-        free: Which cells rays and body have found free.
-        belts: Numbers of hits that a body at a place would be nearer to than each of
-            `BELTS`.
-        plates: Pieces of plates: axis, place across, and both ends.
-        part: Rows and columns in which the last search was.
+        passed: Which cells rays or the body have passed.
     """
 
     def __init__(self):
         self.hits = {}
-        self.passed = set()
         side = int(2 * HALF / FINE)
-        self.free = np.zeros((side, side), bool)
-        cells = int(2 * HALF / CELL)
-        self.belts = np.zeros((len(BELTS), cells, cells), np.int16)
-        self.plates = []
-        self.part = slice(0, cells), slice(0, cells)
-        span = int((RADIUS + BELTS[-1][0]) / CELL) + 2
-        self.span = np.arange(-span, span + 1)
+        self.passed = np.zeros((side, side), bool)
         reach = int(RADIUS / FINE) + 1
         i, j = np.meshgrid(np.arange(-reach, reach + 1), np.arange(-reach, reach + 1))
-        inside = np.hypot(i, j) * FINE <= RADIUS + 0.003
+        inside = np.hypot(i, j) * FINE < RADIUS - 0.008
         self.body = np.column_stack([i[inside], j[inside]])
 
-    def stamp(self, point, sign):
-        """Adds or removes what a hit blocks."""
-        i0, j0 = (int((c + HALF) / CELL) for c in point)
-        i, j = i0 + self.span, j0 + self.span
-        dx = (i + 0.5) * CELL - HALF - point[0]
-        dy = (j + 0.5) * CELL - HALF - point[1]
-        far = np.hypot(dx[None, :], dy[:, None])
-        part = np.ix_(j, i)
-        for belt, (room, _) in zip(self.belts, BELTS, strict=True):
-            belt[part] += sign * (far < RADIUS + room)
+    def points(self):
+        """Places of all hits, shape (n, 2)."""
+        return np.array([hit[0] for hit in self.hits.values()]).reshape(-1, 2)
 
     def hit(self, point, now, faint=False):
         """Keeps a hit; a faint one is a guess."""
-        if max(abs(point[0]), abs(point[1])) > HALF - 0.2:
-            return
         key = int((point[0] + HALF) / FINE), int((point[1] + HALF) / FINE)
-        old = self.hits.get(key)
-        if faint and (old is not None or key in self.passed):
-            return
-        if old is None:
-            self.stamp(point, 1)
-            self.hits[key] = (point, now)
-            i, j = key
-            self.free[j - 1 : j + 2, i - 1 : i + 2] = False
-        else:
-            self.hits[key] = (old[0], now)
+        if not (faint and (key in self.hits or self.passed[key[1], key[0]])):
+            self.hits[key] = (self.hits.get(key, (point,))[0], now)
 
-    def drop(self, key):
-        """Forgets a hit."""
-        self.stamp(self.hits.pop(key)[0], -1)
+    def shift(self, before, after, since):
+        """Moves recent hits along when the pose is corrected."""
+        if math.dist(before, after) < 0.001:
+            return
+        turn = after[2] - before[2]
+        for key, (point, time) in list(self.hits.items()):
+            if time >= since:
+                del self.hits[key]
+                x, y = rotated(np.subtract(point, before[:2]), -turn).tolist()
+                self.hit((after[0] + x, after[1] + y), time)
 
     def carve(self, pose, lengths, hit, now):
         """Takes what rays and body passed for free."""
         x, y, heading = pose
-        cosine, sine = math.cos(heading), math.sin(heading)
-        along = np.arange(0.0, 0.0601, 0.005)
-        for k in range(8):
-            far = lengths[k] - 0.004 if hit[k] else CLEAR
-            angle = heading + RAYS[k, 2]
-            ux, uy = math.cos(angle), math.sin(angle)
-            ox = x + cosine * RAYS[k, 0] - sine * RAYS[k, 1]
-            oy = y + sine * RAYS[k, 0] + cosine * RAYS[k, 1]
-            some = along[along <= far]
-            for side in (-WIDE, 0.0, WIDE):
-                i = ((ox + ux * some - uy * side + HALF) / FINE).astype(int)
-                j = ((oy + uy * some + ux * side + HALF) / FINE).astype(int)
-                self.free[j, i] = True
-                if side == 0.0:
-                    sure = max(len(some) - 2, 0)
-                    for key in zip(i[:sure].tolist(), j[:sure].tolist(), strict=True):
-                        self.passed.add(key)
-                        if key in self.hits and self.hits[key][1] < now - 3:
-                            self.drop(key)
-        i, j = int((x + HALF) / FINE), int((y + HALF) / FINE)
-        self.free[j + self.body[:, 1], i + self.body[:, 0]] = True
-        for di, dj in self.body.tolist():
-            if (di * di + dj * dj) * FINE * FINE < (RADIUS - 0.008) ** 2:
-                key = i + di, j + dj
-                if key in self.hits:
-                    self.drop(key)
+        starts = tips(pose, np.zeros(8))
+        along = np.arange(0.0, CLEAR, 0.005)
+        far = np.where(hit, lengths - 0.012, CLEAR)
+        angles = heading + RAYS[:, 2]
+        ways = np.column_stack([np.cos(angles), np.sin(angles)])
+        ray, number = np.nonzero(along[None, :] < far[:, None])
+        i, j = cells(starts[ray] + along[number, None] * ways[ray])
+        body_i, body_j = cells([(x, y)])
+        i = np.concatenate([i, body_i + self.body[:, 0]])
+        j = np.concatenate([j, body_j + self.body[:, 1]])
+        self.passed[j, i] = True
+        for key in zip(i.tolist(), j.tolist(), strict=True):
+            if key in self.hits and self.hits[key][1] < now - 3:
+                del self.hits[key]
 
     def forget(self, place, reach, before):
-        """Forgets the hits about a place that are older than a time."""
-        for key, ((x, y), time) in list(self.hits.items()):
-            if time < before and math.dist((x, y), place) < reach:
-                self.drop(key)
+        """Forgets old hits near a place."""
+        for key, (point, time) in list(self.hits.items()):
+            if time < before and math.dist(point, place) < reach:
+                del self.hits[key]
 
-    def around(self, x, y, reach):
-        """Hits within a square, shape (n, 2)."""
-        found = [
-            p
-            for p, _ in self.hits.values()
-            if abs(p[0] - x) < reach and abs(p[1] - y) < reach
-        ]
-        return np.array(found).reshape(-1, 2)
 
-    def plate(self, axis, across, low, high):
-        """Keeps a piece of a plate: its axis, its place across, and its ends."""
-        for old in self.plates:
-            same = old[0] == axis and abs(old[1] - across) < 0.025
-            if same and low < old[3] + 0.06 and high > old[2] - 0.06:
-                old[1:] = [across, min(low, old[2]), max(high, old[3])]
-                return
-        self.plates.append([axis, across, low, high])
+def is_closed(low, high, pieces, along):
+    """Whether a side is surely closed by plates, and if it may be by single hits.
 
-    def prices(self, grid, seen):
-        """Price of each place: hits, plates that go on, and the sides of the floor.
+    Args:
+        low: An end of the side, m, and whether it is known.
+        high: The other end.
+        pieces: Ends of the parts of plates on its line.
+        along: Places of hits on its line.
+    """
+    (low, low_sure), (high, high_sure) = low, high
+    near = along[(along > low + 0.015) & (along < high - 0.015)]
+    low += 0.02 if low_sure else 0.045
+    high -= 0.02 if high_sure else 0.045
+    surely = any(min(b, high) - max(a, low) > 0.02 for a, b in pieces)
+    return surely, len(near) > 2 and float(np.ptp(near)) > 0.015
 
-        Args:
-            grid: Direction of the walls, rad, or None.
-            seen: Places that are surely on the floor, shape (n, 2).
-        """
-        side = self.belts.shape[1]
-        price = np.full((side, side), 1000.0)
-        hits = np.array([hit[0] for hit in self.hits.values()]).reshape(-1, 2)
-        places = np.concatenate([seen, hits])
-        low = ((places.min(axis=0) - 0.4 + HALF) / CELL).astype(int).clip(0, side)
-        high = ((places.max(axis=0) + 0.4 + HALF) / CELL).astype(int).clip(0, side)
-        part = slice(low[1], high[1]), slice(low[0], high[0])
-        self.part = part
-        rows, columns = (
-            ((np.arange(c.start, c.stop) + 0.5) * CELL / FINE).astype(int) for c in part
-        )
-        price[part] = 1.0 + UNKNOWN * ~self.free[np.ix_(rows, columns)]
-        for belt, (_, more) in zip(self.belts, BELTS, strict=True):
-            price[part] = np.maximum(price[part], (1.0 + more) * (belt[part] > 0))
-        if grid is None:
-            return price
-        ahead = np.array([math.cos(grid), math.sin(grid)])
-        across = np.array([-ahead[1], ahead[0]])
-        for x, y in self.doubtful(ahead, across):
-            i, j = int((x + HALF) / CELL), int((y + HALF) / CELL)
-            near = price[j - 2 : j + 3, i - 2 : i + 3]
-            np.maximum(near, 1.0 + DOUBT, out=near)
-        rows, columns = ((np.arange(c.start, c.stop) + 0.5) * CELL - HALF for c in part)
-        for way in ahead, across:
-            places = seen @ way
-            far = way[0] * columns[None, :] + way[1] * rows[:, None]
-            out = (far < places.max() - SIDE) | (far > places.min() + SIDE)
-            price[part] += 1000.0 * out
-        return price
 
-    def doubtful(self, ahead, across):
-        """Unseen places where plates go on, if they end at the next plate across."""
-        found = []
-        for axis, place, low, high in self.plates:
-            along, other = (across, -ahead) if axis else (ahead, across)
-            lines = [p[1] if axis else -p[1] for p in self.plates if p[0] != axis]
-            for end, sign in (low, -1.0), (high, 1.0):
-                ways = [sign * (line - end) for line in lines]
-                ways = [way for way in ways if -0.02 < way < MOST]
-                most = min(ways, default=max(0.5 * (LEAST - high + low), 0.03))
-                steps = FINE * np.arange(1, int(most / FINE) + 1)
-                points = np.outer(end + sign * steps, along) + place * other
-                i, j = ((points + HALF) / FINE).astype(int).T
-                found += points[~self.free[j, i]].tolist()
-        return found
+class Plan:
+    """Prices of places and the way to the goal, in the frame of the grid.
 
-    def path(self, start, goal, price):
+    Attributes:
+        grid: Direction of the frame, rad.
+        low: Place of the corner of the first cell.
+        price: Price of a m of way in each cell.
+        walls: Places on closed sides that no ray has seen, in the frame of the start.
+    """
+
+    def __init__(self, pose, maps, goal, visited):
+        self.grid = pose.grid or 0.0
+        goal, visited = (rotated(p, self.grid) for p in (goal, visited))
+        sure = np.vstack([goal, visited])
+        hits = rotated(maps.points(), self.grid)
+        known = np.vstack([sure, hits])
+        bounds = SIDE if pose.grid is not None else 9.0
+        low = np.maximum(known.min(axis=0) - 0.4, sure.max(axis=0) - bounds)
+        high = np.minimum(known.max(axis=0) + 0.4, sure.min(axis=0) + bounds)
+        self.low = low
+        shape = np.maximum(((high - low) / CELL).astype(int), 4)
+        self.price = self.priced(hits, shape)
+        self.walls = np.zeros((0, 2))
+        if pose.grid is not None:
+            self.add_lines(pose, maps, goal[0], hits)
+
+    def priced(self, points, shape):
+        """Price of each cell by the room to the points."""
+        room = np.full(shape, 1.0)
+        if len(points):
+            reach = int((RADIUS + ROOMS[-1]) / CELL) + 2
+            span = np.arange(-reach, reach + 1)
+            at = np.floor((points - self.low) / CELL).astype(int)
+            i = (at[:, 0, None] + span)[:, :, None]
+            j = (at[:, 1, None] + span)[:, None, :]
+            x = (i + 0.5) * CELL + self.low[0] - points[:, 0, None, None]
+            y = (j + 0.5) * CELL + self.low[1] - points[:, 1, None, None]
+            far = np.sqrt(x * x + y * y)
+            good = (i >= 0) & (i < shape[0]) & (j >= 0) & (j < shape[1])
+            i, j = np.broadcast_arrays(i, j)
+            np.minimum.at(room, (i[good], j[good]), far[good])
+        return PRICES[np.searchsorted(ROOMS, room - RADIUS, side="right")]
+
+    def add_lines(self, pose, maps, goal, hits):
+        """Adds what is known and believed about the sides of the cells."""
+        seen, lines = [], []
+        far = self.low + CELL * np.array(self.price.shape)
+        for axis in (0, 1):
+            middles = [0.0, float(goal[1 - axis])]
+            guesses = lattice(pose.lines(axis), middles)
+            seen.append(np.array(pose.lines(axis, guesses)))
+            places = lattice(seen[axis].tolist(), middles)
+            on = places > self.low[1 - axis] - PITCH
+            lines.append(places[on & (places < far[1 - axis] + PITCH)])
+        walls = [np.zeros((0, 2))]
+        for axis in (0, 1):
+            ends = [
+                (float(end), bool((np.abs(seen[1 - axis] - end) < 0.02).any()))
+                for end in lines[1 - axis]
+            ]
+            for place in lines[axis].tolist():
+                near = np.abs(hits[:, 1 - axis] - place) < 0.018
+                near &= bool((np.abs(seen[axis] - place) < 0.02).any())
+                pieces = pose.closed(axis, place)
+                for low, high in itertools.pairwise(ends):
+                    at = np.arange(low[0], high[0], FINE)
+                    points = np.empty((len(at), 2))
+                    points[:, axis], points[:, 1 - axis] = at, place
+                    shut = is_closed(low, high, pieces, hits[near, axis])
+                    free = self.is_open(points, maps)
+                    if shut[0] or (shut[1] and not free):
+                        walls.append(points)
+                    elif not free:
+                        self.doubt(points)
+        self.wall_off(np.concatenate(walls), maps)
+
+    def is_open(self, points, maps):
+        """Whether rays have passed a side, away from its ends."""
+        i, j = cells(rotated(points[3:-3], -self.grid))
+        return int(maps.passed[j, i].sum()) > 1
+
+    def doubt(self, points):
+        """Makes places on a side dearer."""
+        i, j = np.floor((points - self.low) / CELL).astype(int).T
+        inside = (i > 0) & (j > 0)
+        inside &= (i < self.price.shape[0] - 1) & (j < self.price.shape[1] - 1)
+        for u, v in set(zip(i[inside].tolist(), j[inside].tolist(), strict=True)):
+            part = self.price[u - 1 : u + 1, v - 1 : v + 1]
+            np.maximum(part, 1.0 + DOUBT, out=part)
+
+    def wall_off(self, points, maps):
+        """Closes the parts of closed sides that no ray has seen."""
+        turned = rotated(points, -self.grid)
+        i, j = cells(turned)
+        unseen = ~maps.passed[j, i]
+        points, self.walls = points[unseen], turned[unseen]
+        guessed = np.minimum(self.priced(points, self.price.shape), GUESSED)
+        self.price = np.maximum(self.price, guessed)
+
+    def at(self, points):
+        """Prices at points in the frame of the start."""
+        i, j = np.floor((rotated(points, self.grid) - self.low) / CELL).astype(int).T
+        i = i.clip(0, self.price.shape[0] - 1)
+        j = j.clip(0, self.price.shape[1] - 1)
+        return self.price[i, j]
+
+    def costs(self, path):
+        """What it costs to get to each point of a path."""
+        prices = self.at(path)
+        sizes = np.hypot(*np.diff(path, axis=0).T)
+        return np.append(0.0, np.cumsum(0.5 * sizes * (prices[1:] + prices[:-1])))
+
+    def path(self, start, goal):
         """Points of the cheapest way, if all unknown space is free; and its price."""
-        low_j, low_i = (c.start for c in self.part)
-        flat = price[self.part]
-        count, cells = flat.shape
-        flat = flat.ravel().tolist()
-        (si, sj), (gi, gj) = (
-            (int((x + HALF) / CELL) - low_i, int((y + HALF) / CELL) - low_j)
-            for x, y in (start, goal)
-        )
-        first = sj * cells + si
+        rows, width = self.price.shape
+        flat = self.price.ravel().tolist()
+        ends = np.floor((rotated([start, goal], self.grid) - self.low) / CELL)
+        (si, sj), (gi, gj) = ends.astype(int).tolist()
+        first = si * width + sj
         best, came = {first: 0.0}, {}
-        heap = [(math.hypot(gi - si, gj - sj), first)]
+        heap = [(CELL * math.hypot(gi - si, gj - sj), first)]
         near = TOLERANCE * 0.6 / CELL
         done = set()
-        steps = [(j * cells + i, size) for i, j, size in NEIGHBOURS]
+        steps = [(i * width + j, CELL * size) for i, j, size in NEIGHBOURS]
         while heap:
             _, at = heapq.heappop(heap)
             if at in done:
                 continue
             done.add(at)
-            j, i = divmod(at, cells)
+            i, j = divmod(at, width)
             if math.hypot(gi - i, gj - j) <= near and flat[at] < 100.0:
                 way = [at]
                 while way[-1] in came:
                     way.append(came[way[-1]])
                 way.reverse()
-                places = np.array(
-                    [(k % cells + low_i, k // cells + low_j) for k in way]
-                )
-                return (places + 0.5) * CELL - HALF, best[at]
-            if not (1 <= i < cells - 1 and 1 <= j < count - 1):
+                places = np.column_stack(np.divmod(way, width)) + 0.5
+                return rotated(places * CELL + self.low, -self.grid), best[at]
+            if not (1 <= i < rows - 1 and 1 <= j < width - 1):
                 continue
             here, mine = best[at], flat[at]
             for step, size in steps:
@@ -379,8 +535,8 @@ class Maps:
                 if cost < best.get(to, math.inf):
                     best[to] = cost
                     came[to] = at
-                    v, u = divmod(to, cells)
-                    heapq.heappush(heap, (cost + math.hypot(gi - u, gj - v), to))
+                    u, v = divmod(to, width)
+                    heapq.heappush(heap, (cost + CELL * math.hypot(gi - u, gj - v), to))
         return None, math.inf
 
 
@@ -430,23 +586,23 @@ STATE = {}
 
 def reset(obs):
     """Forgets everything."""
+    goal = [float(value) for value in obs["goal"]]
     STATE.update(
         pose=Pose(),
-        maps=Maps(),
-        walls={k: Walls() for k in SIDES},
+        maps=Map(),
         angles=np.zeros(2),
-        goal=[float(value) for value in obs["goal"]],
-        goals=[],
-        aim=[float(value) for value in obs["goal"]],
+        goal=goal,
+        offsets=[],
+        offset=(0.0, 0.0),
         path=None,
+        plan=None,
         age=99,
-        ends=[None] * 8,
         now=0,
         trail=[],
         spin=0.0,
+        ends=[None] * 8,
         runs=[[] for _ in range(8)],
         visited=[(0.0, 0.0)],
-        price=None,
         dropped=-99,
     )
 
@@ -470,6 +626,38 @@ def tips(pose, lengths):
     )
 
 
+def runs(ends, good):
+    """Takes hits of each ray that follow each other, if they are in a line."""
+    pose = STATE["pose"]
+    for k, run in enumerate(STATE["runs"]):
+        if not good[k]:
+            run.clear()
+            continue
+        gap = math.dist(ends[k], run[-1]) if run else 1.0
+        if gap > 0.025:
+            run.clear()
+        if gap > 0.003:
+            run.append(ends[k].tolist())
+        least = FIRST if pose.grid is None else SHORTEST
+        if len(run) > 4 and math.dist(run[0], run[-1]) > least:
+            pose.run(np.array(run))
+            run.clear()
+
+
+def pairs(ends, good):
+    """Takes hits of neighbouring rays that are in line with the grid for a plate."""
+    pose = STATE["pose"]
+    for k in FORWARD:
+        two = ends[[k, (k + 1) % 8]]
+        if pose.grid is None or not (good[k] and good[(k + 1) % 8]):
+            continue
+        dx, dy = (two[1] - two[0]).tolist()
+        length, direction = math.hypot(dx, dy), math.atan2(dy, dx)
+        off = wrapped(direction - pose.grid, RIGHT)
+        if SHORTEST < length < LONGEST and abs(off) < TILT:
+            pose.plate(two, direction, 0.01)
+
+
 def aim_around(x, y):
     """Goes around the goal in rings, if it is not where it is believed."""
     aim = STATE["aim"]
@@ -483,16 +671,14 @@ def aim_around(x, y):
         if gap > 0.3:
             STATE["maps"].forget((x, y), 0.2, STATE["now"] - 10)
             return
-    if not STATE["goals"]:
-        gx, gy = STATE["goal"]
+    if not STATE["offsets"]:
         for ring in range(1, 7):
             for k in range(6 * ring):
                 angle = 2.0 * math.pi * k / (6 * ring)
                 away = 1.3 * TOLERANCE * ring
-                STATE["goals"].append(
-                    [gx + away * math.cos(angle), gy + away * math.sin(angle)]
-                )
-    STATE["aim"] = STATE["goals"].pop(0)
+                offset = away * math.cos(angle), away * math.sin(angle)
+                STATE["offsets"].append(offset)
+    STATE["offset"] = STATE["offsets"].pop(0)
     STATE["path"] = None
 
 
@@ -501,48 +687,43 @@ def plan(x, y):
     maps, path = STATE["maps"], STATE["path"]
     STATE["age"] += 1
     if path is not None and STATE["age"] < REPLAN:
-        i, j = ((path + HALF) / CELL).astype(int).T
-        if int((maps.belts[TIGHT][j, i] > 0).sum()) <= STATE["tight"]:
-            return
+        return
     STATE["age"] = 0
-    grid = STATE["pose"].grid
-    seen = np.array([*STATE["visited"], STATE["goal"], (x, y)])
-    price = STATE["price"] = maps.prices(grid, seen)
-    found, cost = maps.path((x, y), STATE["aim"], price)
-    if cost > 900.0 and STATE["now"] - STATE["dropped"] > 40:
+    visited = [*STATE["visited"], (x, y)]
+    pose = STATE["pose"]
+    new = STATE["plan"] = Plan(pose, maps, [pose.turned(STATE["goal"])], visited)
+    found, cost = new.path((x, y), STATE["aim"])
+    if cost > 20.0 and STATE["now"] - STATE["dropped"] > 40:
         STATE["dropped"] = STATE["now"]
         old = sorted(maps.hits, key=lambda key: maps.hits[key][1])
         for key in old[: max(len(old) // 4, 1)] if old else []:
-            maps.drop(key)
-        maps.plates = []
-        if STATE["goals"]:
-            STATE["aim"] = STATE["goals"].pop(0)
+            del maps.hits[key]
+        if STATE["offsets"]:
+            STATE["offset"] = STATE["offsets"].pop(0)
+    if path is not None and found is not None:
+        first = int(np.hypot(*(path - (x, y)).T).argmin())
+        rest = np.vstack([(x, y), path[first + 1 :]])
+        if float(new.costs(rest)[-1]) < cost + KEEP:
+            found = path[first:]
     STATE["path"] = found
-    if found is not None:
-        i, j = ((found + HALF) / CELL).astype(int).T
-        STATE["tight"] = int((maps.belts[TIGHT][j, i] > 0).sum())
 
 
 def target(x, y):
     """The farthest point of the path that a straight drive reaches as cheaply."""
-    path, price = STATE["path"], STATE["price"]
+    path = STATE["path"]
     if path is None or len(path) < 2:
         return STATE["aim"]
     gaps = np.hypot(path[:, 0] - x, path[:, 1] - y)
     first = int(gaps[:20].argmin())
-    i, j = ((path + HALF) / CELL).astype(int).T
-    sizes = np.hypot(*np.diff(path[first:], axis=0).T)
-    costs = price[j, i][first:]
-    sums = np.concatenate([[0.0], np.cumsum(sizes * 0.5 * (costs[1:] + costs[:-1]))])
+    sums = STATE["plan"].costs(path[first:])
     last = min(len(path) - 1, first + int(LOOK / CELL))
     for k in range(last, first + 2, -2):
-        far = math.hypot(path[k, 0] - x, path[k, 1] - y)
+        far = float(gaps[k])
         if far > LOOK:
             continue
-        share = np.linspace(0.0, 1.0, max(int(far / 0.01), 2))
-        i = ((x + share * (path[k, 0] - x) + HALF) / CELL).astype(int)
-        j = ((y + share * (path[k, 1] - y) + HALF) / CELL).astype(int)
-        if price[j, i].mean() * far <= sums[k - first] * 1.1 + 0.015:
+        share = np.linspace(0.0, 1.0, max(int(far / 0.01), 2))[:, None]
+        straight = (1.0 - share) * (x, y) + share * path[k]
+        if STATE["plan"].at(straight).mean() * far <= sums[k - first] * 1.1 + 0.015:
             break
     else:
         k = min(first + 3, len(path) - 1)
@@ -551,44 +732,19 @@ def target(x, y):
     return path[k].tolist()
 
 
-def plates(ends, hit):
-    """Takes runs of hits along the walls for plates, which go on for a little."""
-    maps, grid = STATE["maps"], STATE["pose"].grid
-    for k in range(8):
-        run = STATE["runs"][k]
+def add_hits(ends, hit):
+    """Keeps hits; what they are on goes on for a little, until a ray passes there."""
+    maps, now = STATE["maps"], STATE["now"]
+    for k, here in enumerate(ends):
+        last, STATE["ends"][k] = STATE["ends"][k], here if hit[k] else None
         if not hit[k]:
-            run.clear()
             continue
-        here = ends[k].tolist()
-        gap = math.dist(here, run[-1]) if run else 1.0
-        if gap > 0.025:
-            run.clear()
-        if gap > 0.003:
-            run.append(here)
-        del run[:-8]
-        if grid is None or len(run) < 4 or math.dist(run[-1], run[0]) < 0.03:
-            continue
-        at = np.array(run)
-        off = at - at.mean(axis=0)
-        angle = 0.5 * math.atan2(
-            2.0 * float(off[:, 0] @ off[:, 1]),
-            float(off[:, 0] @ off[:, 0] - off[:, 1] @ off[:, 1]),
-        )
-        if abs(wrapped(angle - grid, 0.5 * math.pi)) > 0.15:
-            continue
-        axis = round((angle - grid) / (0.5 * math.pi)) % 2
-        way = grid + axis * 0.5 * math.pi
-        cosine, sine = math.cos(way), math.sin(way)
-        across = at @ np.array([-sine, cosine])
-        if across.std() > 0.003:
-            continue
-        along = at @ np.array([cosine, sine])
-        low, high, middle = float(along.min()), float(along.max()), float(across.mean())
-        maps.plate(axis, middle, low, high)
-        for n in range(1, int(PLATE / FINE) + 1):
-            for u in low - n * FINE, high + n * FINE:
-                x, y = u * cosine - middle * sine, u * sine + middle * cosine
-                maps.hit((x, y), STATE["now"] - 4, faint=True)
+        maps.hit(here, now)
+        gap = math.dist(here, last) if last else 0.0
+        if 0.003 < gap < 0.02:
+            dx, dy = (BEYOND / gap * (a - b) for a, b in zip(here, last, strict=True))
+            for guess in (here[0] + dx, here[1] + dy), (last[0] - dx, last[1] - dy):
+                maps.hit(guess, now - 4, faint=True)
 
 
 def policy(obs):
@@ -600,32 +756,16 @@ def policy(obs):
     pose.moved(left, right)
     STATE["now"] += 1
     lengths, hit = sensed(obs["ps"])
-    ends = tips(pose.pose, lengths)
-    for k in SIDES:
-        good = hit[k] and lengths[k] < 0.058
-        found = STATE["walls"][k].add(ends[k] if good else None)
-        if found is not None:
-            pose.wall(*found)
-            ends = tips(pose.pose, lengths)
-            for other in SIDES:
-                STATE["walls"][other].points = []
-    maps.carve(pose.pose, lengths, hit, STATE["now"])
-    for k in range(8):
-        last = STATE["ends"][k]
-        here = STATE["ends"][k] = ends[k].tolist() if hit[k] else None
-        if here is None:
-            continue
-        maps.hit(tuple(here), STATE["now"])
-        if last is None:
-            continue
-        gap = math.dist(here, last)
-        if 0.003 < gap < 0.02:
-            # What has been seen goes on for a little, until a ray finds nothing there.
-            dx, dy = (BEYOND / gap * (a - b) for a, b in zip(here, last, strict=True))
-            for place in (here[0] + dx, here[1] + dy), (last[0] - dx, last[1] - dy):
-                maps.hit(place, STATE["now"] - 4, faint=True)
-    plates(ends, hit)
-    x, y, heading = pose.pose
+    before = pose.state[:3].tolist()
+    runs(tips(before, lengths), hit & (lengths < SHARP))
+    pairs(tips(pose.state[:3], lengths), hit)
+    place = pose.state[:3].tolist()
+    maps.shift(before, place, STATE["now"] - RECENT)
+    maps.carve(place, lengths, hit, STATE["now"])
+    add_hits(tips(place, lengths).tolist(), hit)
+    x, y, heading = place
+    goal = pose.turned(STATE["goal"])
+    STATE["aim"] = [g + o for g, o in zip(goal, STATE["offset"], strict=True)]
     if STATE["now"] % 8 == 0:
         STATE["visited"].append((x, y))
     aim_around(x, y)
@@ -635,12 +775,12 @@ def policy(obs):
 
 def chosen(x, y, heading):
     """Speeds of the course that leads best along the path."""
-    maps = STATE["maps"]
     cosine, sine = math.cos(heading), math.sin(heading)
     px = x + cosine * PLACES[:, :, 0] - sine * PLACES[:, :, 1]
     py = y + sine * PLACES[:, :, 0] + cosine * PLACES[:, :, 1]
     facing = heading + PLACES[:, :, 2]
-    near = maps.around(x, y, 0.2)
+    near = np.vstack([STATE["maps"].points(), STATE["plan"].walls])
+    near = near[np.abs(near - (x, y)).max(axis=1) < 0.2]
     room = np.full(px.shape, 0.1)
     if len(near):
         gaps = np.hypot(px[..., None] - near[:, 0], py[..., None] - near[:, 1])
