@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.bench.record import BenchOverall, BenchPair, Interval
+from tdac_agent.evaluation.set_report import cause_of
 from tdac_agent.metrics.exact import exact_interval, sign_test
 from tdac_agent.metrics.paired import (
     Bootstrap,
@@ -65,18 +66,28 @@ def figures_of(driven: Driven, parts: Episodes) -> dict[str, Any]:
         share = Interval(value=reached / len(episodes), low=low, high=high)
     else:
         share = _interval(bootstrap({"": driven.success})[""])
-    failed = len(episodes) - reached
+    failures = [each for each in episodes if not each.success]
     late, hit = outcomes["out of time"], outcomes["collision"]
     return {
         "worlds": driven.time.shape[1],
         "success": share,
-        "time": _interval(bootstrap({"": driven.time})[""]),
+        "time": _time_of(driven, share),
+        "causes": dict(Counter(map(cause_of, failures)).most_common()),
         "path": fmean(each.path_score for each in episodes),
         "barn": fmean(each.barn_score for each in episodes),
         "contacts": dict(Counter(each.contact for each in episodes if each.contact)),
         "late": late,
-        "errors": failed - late - hit,
+        "errors": len(failures) - late - hit,
     }
+
+
+def _time_of(driven: Driven, success: Interval) -> Interval:
+    """The mean time score, which is at most the rate of success."""
+    found = _interval(bootstrap({"": driven.time})[""])
+    if driven.success.any():
+        return found
+    # Resamples of zeros would claim to know it exactly.
+    return found.model_copy(update={"high": success.high})
 
 
 def overall_of(sets: Mapping[str, Sequence[Driven]]) -> tuple[BenchOverall, ...]:

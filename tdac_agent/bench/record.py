@@ -70,9 +70,14 @@ class BenchRow(_Record):
         description="Share of episodes that reached the goal; exact interval (Clopper "
         "and Pearson), with several seeds a bootstrap.",
     )
-    time: Interval | None = Field(None, description="Mean time score (SCT), bootstrap.")
+    time: Interval | None = Field(
+        None,
+        description="Mean time score (SCT), bootstrap; without a success, the "
+        "upper end is that of `success`.",
+    )
     path: float | None = Field(None, description="Mean path score (SPL).")
     barn: float | None = Field(None, description="Mean score of BARN, at most 0.5.")
+    causes: dict[str, int] = Field({}, description="Failures by cause.")
     contacts: dict[str, int] = Field({}, description="Contacts by what was touched.")
     late: int = Field(0, description="Episodes that ended at the horizon.")
     errors: int = Field(0, description="Its own errors, too much CPU time included.")

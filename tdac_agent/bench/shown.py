@@ -15,6 +15,7 @@ from tdac_agent.bench.figures import draw_figures
 from tdac_agent.bench.record import Bench, BenchRow, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.salt import SEALED
+from tdac_agent.storage.locks import LOCK_FILE
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, read_file
@@ -63,6 +64,8 @@ def read(folder: Path) -> Bench:
     Raises:
         RunError: There are none, or they cannot be read.
     """
+    if not (folder / RESULTS).is_file() and (folder / LOCK_FILE).exists():
+        raise RunError(f"the bench in {folder} is not finished: repeat its command")
     try:
         return Bench.model_validate_json(read_file(folder / RESULTS, RECORD_BYTES))
     except (OSError, ValueError) as error:
@@ -80,10 +83,11 @@ def _same_sets(folders: Sequence[Path], found: Sequence[Bench]) -> dict[str, Ben
         for own in each.sets:
             before = sets.setdefault(own.name, own)
             if before != own:
-                what = "version" if before.sha256 != own.sha256 else "worlds"
+                version = before.sha256 != own.sha256
+                what = "version" if version else "split, number or salt of its worlds"
                 raise RunError(
-                    f"{folder / RESULTS}: other {what} of the set {own.name} than in "
-                    "the folders before; show them one at a time"
+                    f"{folder / RESULTS}: the set {own.name!r} differs in the {what} "
+                    "from the folders before; show them one at a time"
                 )
     return sets
 

@@ -21,6 +21,7 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.synth import next_folder
+from tdac_agent.metrics.paired import LEAST_P
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 
@@ -127,7 +128,7 @@ def show(found: Bench, console: Console) -> None:
     for own in found.sets:
         rows = found.of_set(own.name)
         knows_map = any(row.knows == "+ map" for row in rows)
-        console.print(_table(own, rows))
+        console.print(_table(own, rows, console.width))
         console.print()
         for row in rows:
             for note in _notes(row, knows_map):
@@ -148,7 +149,7 @@ def show(found: Bench, console: Console) -> None:
         print_sentences(console, text)
 
 
-def _table(own: BenchSet, rows: Sequence[BenchRow]) -> Table:
+def _table(own: BenchSet, rows: Sequence[BenchRow], room: int) -> Table:
     table = Table(
         title=escape(
             f"{own.name} {own.sha256[:8]}: worlds 0 to {own.worlds - 1} of {own.split}"
@@ -160,7 +161,8 @@ def _table(own: BenchSet, rows: Sequence[BenchRow]) -> Table:
         show_edge=False,
     )
     longest = max(len(row.entrant) for row in rows)
-    table.add_column("entrant", overflow="fold", width=min(longest, WIDEST))
+    width = max(min(longest, WIDEST + max(room - 80, 0)), len("entrant"))
+    table.add_column("entrant", overflow="fold", width=width)
     for name in ("time (95 %)", "reached, %", "path", "contacts", "late", "error"):
         table.add_column(name, justify="right", no_wrap=True)
     for row in rows:
@@ -195,11 +197,15 @@ def _notes(row: BenchRow, knows_map: bool) -> list[str]:
         notes.append(f"{row.entrant}: a single seed")
     if row.clock_dependent is not None:
         notes.append(f"{row.entrant} is clock-dependent: {row.clock_dependent}")
+    if row.causes:
+        causes = ", ".join(f"{count} {name}" for name, count in row.causes.items())
+        notes.append(f"{row.entrant}, failures: {causes}")
     counts = [each.hidden for each in row.files if each.hidden and each.hidden > 1]
-    if counts:
+    # Nobody chooses among versions of what comes with the package.
+    if counts and row.kind not in ("builtin", "planner"):
         notes.append(
             f"{row.entrant}: hidden evaluation {max(counts)} of its file; the "
-            "first one counts"
+            "first one is the one to report"
         )
     return notes
 
@@ -250,7 +256,7 @@ def _pairs(first: str, pairs: Sequence[BenchPair]) -> Table:
             escape(pair.set or "all"),
             f"[{colour}]{ahead.value:+.3f}[/]",
             f"{ahead.low:+.3f} to {ahead.high:+.3f}",
-            f"{pair.p_holm:.2g}",
+            f"{'≤ ' if pair.p <= LEAST_P else ''}{pair.p_holm:.2g}",
         )
     return table
 

@@ -67,7 +67,11 @@ def run_command(
     tier: Tier = "auto",
     as_json: Json = False,
 ) -> None:
-    """Drive entrants on the same worlds (`run` may be left out)."""
+    """Drive entrants on the same worlds of task sets, and compare them.
+
+    `tdac bench show DIR...` shows results again, `tdac bench reveal DIR` publishes
+    hidden worlds.
+    """
     from tdac_agent.cli import bench
 
     raise typer.Exit(

@@ -51,8 +51,7 @@ class _Group(TyperGroup):
     """A group; its command `run`, if it has one, may be left out."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        words = {*self.commands, *FOR_HELP}
-        if DEFAULT in self.commands and args and args[0] not in words:
+        if DEFAULT in self.commands and args and args[0] not in self.commands:
             args = [DEFAULT, *args]
         return list(super().parse_args(ctx, args))
 

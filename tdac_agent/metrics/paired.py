@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 RESAMPLES = 9_999
+LEAST_P = 2.0 / (RESAMPLES + 1)
+"""The smallest p-value that so many resamples can tell."""
 LEVEL = 0.95
 
 

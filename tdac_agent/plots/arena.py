@@ -28,6 +28,8 @@ _KINDS = {
     "learned": "learned",
 }
 _COLUMNS = 3
+# Inches that the labels below and above the panels need.
+_NARROWEST = 6.2
 # Characters of a name.
 _LONGEST = 22
 
@@ -173,6 +175,7 @@ def _panels(
     """A figure with `count` panels in rows; sizes of a panel in inches."""
     columns = max(min(_COLUMNS, count), 1)
     rows = max(-(-count // columns), 1)
+    width = max(width, (_NARROWEST - left) / columns)
     figure = new_plot(left + width * columns, 0.8 + height * rows)
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     panels = [apply_style(axes) for axes in grid.flat]

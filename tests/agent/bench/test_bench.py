@@ -67,6 +67,8 @@ def test_rows_are_what_verify_says(judge, tmp_path, files):
     assert (own.success.value, own.kind, own.knows) == (1.0, "builtin", "+ map")
     assert (still.late, still.errors, still.contacts) == (2, 0, {})
     assert ahead.contacts == {"wall": 2}
+    assert ahead.causes == alone.causes
+    assert (ahead.time.value, ahead.time.high) == (0.0, ahead.success.high)
     assert (broken.time, broken.worlds) == (None, 0)
     assert "ValueError" in broken.problem
     assert found.of_set("known")[0].entrant == "builtin"
@@ -178,12 +180,12 @@ def test_folders_together(judge, tmp_path, level, files):
         bench(files[number : number + 1], [level], worlds=3, out=folder, **given)
     assert merged([tmp_path / "0", tmp_path / "1"]) == both
     bench(files[1:2], [level], worlds=2, out=tmp_path / "2", **given)
-    with pytest.raises(RunError, match="other worlds of the set few"):
+    with pytest.raises(RunError, match="'few' differs in the split, number or salt"):
         merged([tmp_path / "0", tmp_path / "2"])
     text = level.read_text().replace("clutter", "aisles")
     level.write_text(text)
     bench(files[1:2], [level], worlds=3, out=tmp_path / "3", **given)
-    with pytest.raises(RunError, match="other version of the set few"):
+    with pytest.raises(RunError, match="'few' differs in the version"):
         merged([tmp_path / "0", tmp_path / "3"])
 
 
