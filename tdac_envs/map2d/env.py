@@ -60,7 +60,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `pose` | (3,) | px, px, rad | x, y, heading in (-pi, pi] |
     | `goal` | (2,) | px | x, y of the goal |
     | `wheel_speeds` | (2,) | fraction | left, right, as last applied |
-    | `ranges` | (n_rays,) | px | distance to the first wall or mover along each ray |
+    | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
     | `odometry` | (2,) | px, rad | motion in the last step, with `odometry=True` |
 
     Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the

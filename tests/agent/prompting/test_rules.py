@@ -149,7 +149,7 @@ def test_the_operations_of_an_answer():
         (answer(GOOD) + answer(GOOD), "got 2 blocks"),
         ("```json\n[\n", "got no block"),
         ("```json\n[,]\n```", "not JSON"),
-        (answer(GOOD, GOOD, GOOD, GOOD), "at most 3 items"),
+        (answer(GOOD, GOOD, GOOD, GOOD), "at most 3 of them, got 4"),
         ("```json\n{}\n```", "valid list"),
         (answer({**GOOD, "scope": "world"}), "scope"),
         (answer({**GOOD, "why": "so"}), "why"),

@@ -327,7 +327,7 @@ def test_the_shipped_hyperparameters_are_whole(algo, env):
         (["--wrapper", "none", "--wrapper", "flatten"], "cannot be combined"),
         (["--task", "rooms", "--task", "maze", "--wrapper", "guidance"], "several"),
         (["--range-noise", "-1"], "expected a range noise from 0 to 1"),
-        (["--algo", "dqn"], "'dqn' is not one of 'ppo', 'sac', 'td3'"),
+        (["--algo", "dqn"], "'dqn' is not one of 'ppo', 'recurrent-ppo'"),
         (["--steps", "0"], "'--steps'"),
         (["--config", "none.yml"], "cannot read hyperparameters"),
         (["--resume", "nowhere"], "no training in 'nowhere'"),
