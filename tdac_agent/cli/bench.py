@@ -27,7 +27,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 
 NONE = "–"
 # Widest name of an entrant, so that a table fits into 80 columns.
-WIDEST = 12
+WIDEST = 14
 LEGEND = (
     "time: mean of success x OT / T (SCT), with a 95 % interval by bootstrap over "
     "worlds (and seeds). reached: with the exact 95 % interval; by bootstrap if there "
