@@ -9,7 +9,6 @@ from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from tdac_agent.bench.bench import RESULTS, SALT, TIMING, WORLD_TABLE, bench
@@ -19,6 +18,7 @@ from tdac_agent.bench.shown import merged
 from tdac_agent.bench.shown import reveal as reveal_folder
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
+from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.synth import next_folder
 from tdac_agent.metrics.paired import LEAST_P
@@ -51,19 +51,7 @@ def run(
     check_tier(tier)
     folder = out or next_folder("bench")
     console = Console(stderr=as_json)
-    columns = (
-        TextColumn("{task.fields[doing]}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[successes]} reached"),
-    )
-    bar = Progress(
-        *columns,
-        console=console,
-        transient=True,
-        auto_refresh=False,
-        disable=not console.is_terminal,
-    )
+    bar = policy_bar(console)
     row = bar.add_task("", total=worlds, successes=0, doing="preparing")
 
     def watch(name: str, entrant: str, episodes: int, successes: int) -> None:

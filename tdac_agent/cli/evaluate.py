@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.evaluate_view import show_evaluation
 from tdac_agent.cli.flags import TaskFlags, check_tier
+from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.evaluation.entrants import entrants_of
@@ -51,20 +51,7 @@ def run(
     entrants_of(policies, names)  # fails early on a wrong name
     check_outputs(csv, out)
     console = Console(stderr=as_json)
-    columns = (
-        TextColumn("{task.fields[doing]}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[successes]} reached"),
-    )
-    # Redrawn only on updates: a timer would cost CPU time.
-    bar = Progress(
-        *columns,
-        console=console,
-        transient=True,
-        auto_refresh=False,
-        disable=not console.is_terminal,
-    )
+    bar = policy_bar(console)
     row = bar.add_task("", total=episodes, successes=0, doing="preparing")
 
     is_driven = False

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.evaluate import check_outputs, wrapper_names, write_csv
 from tdac_agent.cli.evaluate_view import NONE, PAIRED, comparison_table
 from tdac_agent.cli.flags import check_tier
+from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.evaluation.evaluate import EPISODES
 from tdac_agent.evaluation.set_evaluate import POLICIES, evaluate_on_set
@@ -54,19 +54,7 @@ def run(
     if worlds is None and most:
         count = min(count, most)
     console = Console(stderr=as_json)
-    columns = (
-        TextColumn("{task.fields[doing]}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[successes]} reached"),
-    )
-    bar = Progress(
-        *columns,
-        console=console,
-        transient=True,
-        auto_refresh=False,
-        disable=not console.is_terminal,
-    )
+    bar = policy_bar(console)
     row = bar.add_task("", total=count, successes=0, doing="preparing")
 
     def watch(policy: str, episodes: int, successes: int) -> None:

@@ -8,7 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tdac_agent.plots.style import COLOURS, LINES, MARKERS, TEXT, apply_style, new_plot
+from tdac_agent.plots.style import (
+    COLOURS,
+    LINES,
+    MARKERS,
+    TEXT,
+    apply_style,
+    legend_above,
+    new_plot,
+)
 
 DIFFICULTY = {
     "least_steps": "OT, steps",
@@ -60,7 +68,7 @@ def plot_scores(rows: pd.DataFrame) -> Figure:
         axes.set_xlim(-0.02, 1.0)
         axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "", "0.5", "", "1"])
         axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
-    _legend(figure, panels)
+    legend_above(figure, panels, 4)
     label = "time score: mean of success x OT / T, with 95 % intervals"
     if rows["time"].isna().any():
         label += "; –: did not drive"
@@ -116,7 +124,7 @@ def plot_difficulty(worlds: pd.DataFrame, name: str) -> Figure:
         axes.set_xlabel(DIFFICULTY[key], fontsize=9, color=TEXT)
         axes.set_ylim(-0.02, 1.02)
         axes.xaxis.set_major_locator(MaxNLocator(4))
-    _legend(figure, panels)
+    legend_above(figure, panels, 4)
     label = f"reached, in {BINS} groups of as many worlds"
     figure.supylabel(label, fontsize=9, color=TEXT)
     return figure
@@ -158,7 +166,7 @@ def plot_training(rows: pd.DataFrame) -> Figure:
         axes.set_title(name, loc="left", fontsize=9.5, color=TEXT)
         axes.set_xscale("log")
         axes.set_ylim(0, 1)
-    _legend(figure, panels)
+    legend_above(figure, panels, 4)
     label = "simulated steps of a training (log); dashed: the best other entrant"
     figure.supxlabel(label, fontsize=9, color=TEXT)
     figure.supylabel("time score, 95 % intervals", fontsize=9, color=TEXT)
@@ -182,18 +190,3 @@ def _panels(
     for axes in panels[count:]:
         axes.set_visible(False)
     return figure, panels
-
-
-def _legend(figure: Figure, panels: list[Axes]) -> None:
-    entries = {}
-    for axes in panels:
-        handles, labels = axes.get_legend_handles_labels()
-        entries.update(dict(zip(labels, handles, strict=True)))
-    figure.legend(
-        entries.values(),
-        entries.keys(),
-        loc="outside upper left",
-        ncols=4,
-        frameon=False,
-        fontsize=8.5,
-    )

@@ -19,6 +19,7 @@ from tdac_agent.plots.style import (
     TEXT,
     apply_style,
     colours_of,
+    legend_above,
     new_plot,
 )
 
@@ -49,7 +50,7 @@ def plot_learning_curves(curves: pd.DataFrame) -> Figure:
         axes.set_ylim(-0.03, 1.05)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:.0f}k"))
-    _legend(figure, panels)
+    legend_above(figure, panels, 5)
     figure.supxlabel(
         "training steps of all robots; thin: each seed, bold: mean, shaded: range",
         fontsize=9,
@@ -105,7 +106,7 @@ def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
         axes.set_xticks([0, 0.5, 1])
         axes.xaxis.set_major_formatter(PercentFormatter(1.0))
         axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
-    _legend(figure, panels)
+    legend_above(figure, panels, 5)
     label = "episodes with goal reached without contact, exact 95 % intervals"
     if evaluation["training"].notna().any():
         label += "; one dot per training seed"
@@ -214,19 +215,4 @@ def _title(axes: Axes, text: str, below: str = "") -> None:
         textcoords="offset points",
         fontsize=7.5,
         color="#666666",
-    )
-
-
-def _legend(figure: Figure, panels: list[Axes]) -> None:
-    entries = {}
-    for axes in panels:
-        handles, labels = axes.get_legend_handles_labels()
-        entries.update(dict(zip(labels, handles, strict=True)))
-    figure.legend(
-        entries.values(),
-        entries.keys(),
-        loc="outside upper left",
-        ncols=5,
-        frameon=False,
-        fontsize=8.5,
     )

@@ -85,6 +85,22 @@ def legend(axes: Axes, count: int) -> None:
     )
 
 
+def legend_above(figure: Figure, panels: Sequence[Axes], columns: int) -> None:
+    """Adds a legend of all panels above them, an entry for each label."""
+    entries = {}
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        entries.update(dict(zip(labels, handles, strict=True)))
+    figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="outside upper left",
+        ncols=columns,
+        frameon=False,
+        fontsize=8.5,
+    )
+
+
 def save_figure(figure: Figure, *paths: Path) -> None:
     """Writes a figure to each path, in the format of its suffix (svg, pdf, png)."""
     for path in paths:
