@@ -27,7 +27,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.evaluation.salt import SEALED, drawn_salt
 from tdac_agent.evaluation.set_verify import MOST_EPISODES
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import one_of, whole_number
@@ -88,7 +88,7 @@ def bench(
     _check_sets(tasks, split, worlds)
     parts = [part_of(each, own) for own in tasks for each in wanted]
     with contextlib.ExitStack() as stack:
-        _take(out, stack)
+        stack.enter_context(own_folder(out, "bench"))
         drawn = split == "hidden" and salt_file is None
         if drawn:
             _record(out, parts, worlds)
@@ -160,21 +160,6 @@ def _check_sets(tasks: Sequence[TaskSet], split: str, worlds: int) -> None:
         raise TaskError("expected at least one task set")
     for each in tasks:
         each.check_count(split, worlds, "worlds")
-
-
-def _take(out: Path, stack: contextlib.ExitStack) -> None:
-    """Takes a folder for a bench.
-
-    Raises:
-        RunError: It cannot be used.
-    """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        held = stack.enter_context(hold(out / LOCK_FILE))
-    except OSError as error:
-        raise RunError(f"cannot write to {out}: {error.strerror}") from error
-    if not held:
-        raise RunError(f"another bench writes to {out}; wait until it ends")
 
 
 def _set_of(arena: Arena, tasks: TaskSet) -> BenchSet:

@@ -23,7 +23,7 @@ from tdac_agent.evaluation.set_learned import LearnedRuns
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import MOST_EPISODES, verify_on_set
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import one_of, whole_number
@@ -181,13 +181,7 @@ def _open(out: Path, about: dict[str, Any], stack: contextlib.ExitStack) -> None
     Raises:
         RunError: It cannot be used, or has another evaluation.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        held = stack.enter_context(hold(out / LOCK_FILE))
-    except OSError as error:
-        raise RunError(f"cannot write to {out}: {error.strerror}") from error
-    if not held:
-        raise RunError(f"another evaluation writes to {out}; wait until it ends")
+    stack.enter_context(own_folder(out, "evaluation"))
     if not (out / RESULTS).is_file():
         return
     try:

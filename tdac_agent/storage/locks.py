@@ -6,8 +6,10 @@ import fcntl
 import os
 import time
 from collections.abc import Generator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+
+from tdac_agent.errors import RunError
 
 LOCK_FILE = ".lock"
 TRIES = 5
@@ -31,6 +33,28 @@ def hold(file: Path) -> Generator[bool]:
         yield any(_take(handle, attempt) for attempt in range(TRIES))
     finally:
         os.close(handle)
+
+
+@contextmanager
+def own_folder(out: Path, what: str) -> Generator[None]:
+    """Makes a folder and holds its lock in a `with` block.
+
+    Args:
+        out: The folder.
+        what: What writes to it, for the message: `evaluation`.
+
+    Raises:
+        RunError: It cannot be written, or another process holds its lock.
+    """
+    with ExitStack() as stack:
+        try:
+            out.mkdir(parents=True, exist_ok=True)
+            held = stack.enter_context(hold(out / LOCK_FILE))
+        except OSError as error:
+            raise RunError(f"cannot write to {out}: {error.strerror}") from error
+        if not held:
+            raise RunError(f"another {what} writes to {out}; wait until it ends")
+        yield
 
 
 def _take(handle: int, attempt: int) -> bool:
