@@ -9,7 +9,7 @@ from commands import counted, run
 from place import Place, interpreter
 
 # These pull in gigabytes for GPUs if no smaller build is available.
-HEAVY = ("torch", "stable-baselines3")
+HEAVY = ("torch", "stable-baselines3", "sb3-contrib")
 
 
 def lowest(place: Place) -> str:
