@@ -20,7 +20,8 @@ BIN := $(VENV)/bin
 SAMPLE ?= 1
 # Tests of one file share fixtures, so one process runs them all. The given order puts
 # files with short tests last, so that both processes end at about the same time.
-PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder
+# After a crash, a new process would wait for ever for the files of the old one.
+PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 .PHONY: synth test test-all slow slow-sample lint bench portability clients clean
 

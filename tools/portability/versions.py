@@ -46,7 +46,9 @@ def _tests(place: Place, name: str, version: str, *options: str) -> str:
         # Installed first, so that their lowest versions are not required below.
         place.run_uv(*install, *heavy)
     place.run_uv(*install, *options, "--editable", place.tree, *light)
-    tests = ["-m", "pytest", "-q", "-n", "2", "--dist", "loadfile", "-m", "not slow"]
+    # After a crash, a new process would wait for ever for the files of the old one.
+    parallel = ["-n", "2", "--dist", "loadfile", "--max-worker-restart", "0"]
+    tests = ["-m", "pytest", "-q", *parallel, "-m", "not slow"]
     return counted(run([python, *tests], cwd=place.tree)) + left_out
 
 
