@@ -1,10 +1,11 @@
-"""Wrappers for learning: map-independent observations, guidance, and a goal view.
+"""Wrappers for learning: map-independent observations, guidance, views of a given map.
 
-Re-exports the public names of `wrappers`, `goal_view` and `wrapping` in
+Re-exports the public names of `wrappers`, `map_view`, `goal_view` and `wrapping` in
 `tdac_envs.learning`.
 """
 
 from tdac_envs.learning.goal_view import GoalView
+from tdac_envs.learning.map_view import MapView
 from tdac_envs.learning.wrappers import (
     MIDDLE,
     WRAPPERS,
@@ -27,6 +28,7 @@ __all__ = [
     "GoalRelativeObservation",
     "GoalView",
     "Guidance",
+    "MapView",
     "check_wrappers",
     "guided_space",
     "wrap",

@@ -105,7 +105,8 @@ def row_of(arena: Arena, part: Part) -> BenchRow:
     if refused := next((report for report, _ in reports if report.refused), None):
         return row.model_copy(update={"problem": "; ".join(refused.told)})
     episodes = [driven for _, driven in reports]
-    found = Driven.of(part.entrant.name, episodes)
+    runs = tasks.runs(arena.split, arena.count)
+    found = Driven.of(part.entrant.name, episodes, runs)
     _note(arena, part, found, episodes)
     counts = [each.hidden.count if each.hidden else None for each, _ in reports]
     clocks = [each.clock_dependent for each, _ in reports]

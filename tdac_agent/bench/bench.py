@@ -160,6 +160,7 @@ def _check_sets(tasks: Sequence[TaskSet], split: str, worlds: int) -> None:
         raise TaskError("expected at least one task set")
     for each in tasks:
         each.check_count(split, worlds, "worlds")
+        each.runs(split, worlds)
 
 
 def _set_of(arena: Arena, tasks: TaskSet) -> BenchSet:

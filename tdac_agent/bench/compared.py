@@ -35,8 +35,8 @@ class Driven:
 
     Attributes:
         entrant: Its name.
-        time: Time scores, shape (files, worlds).
-        success: Whether the goal was reached, 0 or 1, shape (files, worlds).
+        time: Time scores, shape (files x runs, worlds).
+        success: Whether the goal was reached, 0 or 1, of the same shape.
     """
 
     entrant: str
@@ -44,11 +44,22 @@ class Driven:
     success: Array
 
     @classmethod
-    def of(cls, entrant: str, episodes: Episodes) -> Driven:
-        """What it reached in episodes, for each file in the order of worlds."""
+    def of(cls, entrant: str, episodes: Episodes, runs: int = 1) -> Driven:
+        """What it reached in episodes.
+
+        Args:
+            entrant: Its name.
+            episodes: For each file, in the order of runs, then of worlds.
+            runs: How often each file drove on each world.
+        """
         time = [[each.time_score for each in part] for part in episodes]
         success = [[each.success for each in part] for part in episodes]
-        return cls(entrant, np.array(time, np.float64), np.array(success, np.float64))
+        shape = len(episodes) * runs, -1
+        return cls(
+            entrant,
+            np.array(time, np.float64).reshape(shape),
+            np.array(success, np.float64).reshape(shape),
+        )
 
 
 def figures_of(driven: Driven, parts: Episodes) -> dict[str, Any]:
@@ -61,7 +72,7 @@ def figures_of(driven: Driven, parts: Episodes) -> dict[str, Any]:
     episodes = [each for part in parts for each in part]
     outcomes = Counter(each.outcome for each in episodes)
     reached = sum(each.success for each in episodes)
-    if len(parts) == 1:
+    if len(driven.success) == 1:
         low, high = exact_interval(reached, len(episodes))
         share = Interval(value=reached / len(episodes), low=low, high=high)
     else:

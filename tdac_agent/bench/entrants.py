@@ -193,4 +193,6 @@ def drive(
 
 def knows(member: Member, tasks: TaskSet) -> str:
     """What a file may use."""
-    return "+ map" if tasks.file.map and member.kind != "learned" else "sensors"
+    if member.learned is None:
+        return "+ map" if tasks.file.map else "sensors"
+    return "+ map" if "map-view" in member.learned.policy.wrappers else "sensors"

@@ -59,7 +59,9 @@ def rival_on(name: str, tasks: TaskSet) -> Rival:
         known = ", ".join(rival.levels)
         raise TaskError(f"{name} drives by what is observed in {known}")
     assert level is not None
-    values = _tuned().get(name, {}).get(level, {})
+    # Some sets with the observations of a level have values of their own.
+    own = _tuned().get(name, {})
+    values = own.get(tasks.name, own.get(level, {}))
     tuned = bool(values) if rival.ranges else None
     return Rival(with_values(source_of(name), values), tuned)
 

@@ -108,7 +108,9 @@ def _driven(table: pd.DataFrame, row: BenchRow) -> Driven:
         own.pivot_table(index="file", columns="index", values=name).to_numpy(np.float64)
         for name in ("time_score", "success")
     )
-    return Driven(row.entrant, time, success)
+    # Several runs on each world follow one another.
+    shape = -1, row.worlds
+    return Driven(row.entrant, time.reshape(shape), success.reshape(shape))
 
 
 def reveal(folder: Path, salt_file: Path) -> None:

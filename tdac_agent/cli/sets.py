@@ -28,7 +28,7 @@ from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.picture import AHEAD, contact_sheet, draw_world
 from tdac_envs.ladder.plate_worlds import PlatesWorld
 from tdac_envs.ladder.robots import EPuckParams
-from tdac_envs.ladder.set_file import SetFile, set_names
+from tdac_envs.ladder.set_file import SetFile, shipped_names
 from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
 from tdac_envs.worlds.bodies import BODY_RADIUS
@@ -41,7 +41,7 @@ LONGEST_CAPTION = 14
 
 def list_sets(as_json: bool) -> int:
     """Prints the task sets that come with the package; returns 0."""
-    sets = [load_set(name) for name in set_names()]
+    sets = [load_set(name) for name in shipped_names()]
     if as_json:
         _print_json([_record(each) for each in sets])
         return 0

@@ -1,7 +1,8 @@
 """Statistics of entrants on the same worlds: paired, and stratified by set.
 
-The unit is a world. Of an entrant that was trained with several seeds, first the seeds
-are resampled, then the worlds. Sets weigh the same, whatever their number of worlds.
+The unit is a world. Of an entrant that was trained with several seeds, or that drove
+several times on each world, first the seeds or runs are resampled, then the worlds.
+Sets weigh the same, whatever their number of worlds.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ def bootstrap(scores: Mapping[str, Array], seed: int = 0) -> dict[str, Bootstrap
     """Means of entrants on the worlds of one set.
 
     Args:
-        scores: By the entrant's name, shape (seeds, worlds); all have the same worlds.
+        scores: By the entrant's name, shape (seeds or runs, worlds); all have the same
+            worlds.
         seed: Seed of the resampling.
     """
     worlds = {each.shape[1] for each in scores.values()}

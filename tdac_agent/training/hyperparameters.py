@@ -16,6 +16,8 @@ from tdac_envs.learning.wrappers import WRAPPERS
 
 Algo = Literal["ppo", "recurrent-ppo", "sac", "td3"]
 _LINEAR = "lin_"
+_CHOSEN = "tdac_envs.wrappers.wrap_for_rl"
+"""The function that chooses wrappers by what an environment tells."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +25,8 @@ class Hyperparameters:
     """The hyperparameters of one algorithm for one environment.
 
     Attributes:
-        wrappers: Names of `WRAPPERS`, innermost first.
+        wrappers: Names of `WRAPPERS`, innermost first; None for those that
+            `wrap_for_rl` chooses.
         n_envs: Number of robots in parallel.
         steps: Training steps, all robots together.
         policy: Name of the policy class in stable-baselines3.
@@ -31,7 +34,7 @@ class Hyperparameters:
         model: Further arguments of the algorithm's class, as written in the file.
     """
 
-    wrappers: tuple[str, ...]
+    wrappers: tuple[str, ...] | None
     n_envs: int
     steps: int
     policy: str
@@ -97,7 +100,9 @@ def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _wrapper_names(paths: list[str] | str) -> tuple[str, ...]:
+def _wrapper_names(paths: list[str] | str) -> tuple[str, ...] | None:
+    if paths == _CHOSEN:
+        return None
     known = {f"{w.__module__}.{w.__qualname__}": name for name, w in WRAPPERS.items()}
     # The public module `wrappers` of a package may re-export its wrappers.
     known |= {
@@ -107,7 +112,9 @@ def _wrapper_names(paths: list[str] | str) -> tuple[str, ...]:
     wanted = [paths] if isinstance(paths, str) else paths
     wrong = [path for path in wanted if path not in known]
     if wrong:
-        raise ValueError(f"env_wrapper: expected some of {list(known)}, got {wrong[0]}")
+        raise ValueError(
+            f"env_wrapper: expected {_CHOSEN}, or some of {list(known)}, got {wrong[0]}"
+        )
     return tuple(known[path] for path in wanted)
 
 

@@ -25,6 +25,7 @@ from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 from tdac_envs.learning.wrappers import check_wrappers
+from tdac_envs.learning.wrapping import FOR_RL
 
 Variation = Literal["nominal", "jitter", "mixed", "random"]
 EVALUATIONS, EPISODES = 12, 100
@@ -113,7 +114,8 @@ def make_plan(
     for task in loaded:
         task.disturbed_options(disturbance)
     given = read_hyperparameters(config or config_file(algo), loaded[0].spec.env)
-    names = given.wrappers if wrappers is None else wrappers
+    chosen = FOR_RL if given.wrappers is None else given.wrappers
+    names = chosen if wrappers is None else wrappers
     check_wrappers(names)
     if len(loaded) > 1 and "goal-relative" not in names:
         raise TaskError(

@@ -21,11 +21,11 @@ from tdac_agent.training.plan import (
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.env import OnSet, make
-from tdac_envs.ladder.set_file import set_names
+from tdac_envs.ladder.set_file import shipped_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.ladder.vector import make as make_batch
 from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
-from tdac_envs.learning.wrapping import wrap_for_rl
+from tdac_envs.learning.wrapping import default_wrappers, wrap_for_rl
 
 TRAINED, SELECTED = "train", "dev"
 """The split of the training, and that of its evaluations, which select the policy."""
@@ -65,12 +65,13 @@ def make_set_plan(
         if number is not None:
             whole_number(argument, number, 1, MOST_ROBOTS)
     given = read_hyperparameters(config or config_file(algo), OnSet.title)
-    names = given.wrappers if wrappers is None else wrappers
     for own in _OWN & given.env.keys():
         raise TaskError(f"env_kwargs: {own} is set by the training; leave it out")
     tasks.check_count(TRAINED, 1, "training worlds")
     tasks.check_count(SELECTED, episodes or 1, "episodes")
     env: Any = make(name, split=SELECTED)
+    chosen = default_wrappers(env) if given.wrappers is None else given.wrappers
+    names = chosen if wrappers is None else wrappers
     wrap_for_rl(env, names)  # checks that they support what is observed
     count = tasks.count(SELECTED)
     wanted = steps or given.steps
@@ -78,7 +79,7 @@ def make_set_plan(
         algo=algo,
         tasks=(),
         task_sha256=(),
-        set=str(name) if str(name) in set_names() else str(Path(name).resolve()),
+        set=str(name) if str(name) in shipped_names() else str(Path(name).resolve()),
         set_sha256=tasks.sha256,
         wrappers=names,
         variation="nominal",

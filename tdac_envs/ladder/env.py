@@ -151,6 +151,9 @@ class LadderEnv(OnSet, Map2DEnv):
         reward_weights: Reward weights by name, where they differ from the defaults.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
         hidden_folder: Folder of maps with the split `"hidden"` of a set of files.
+        nearer_starts: Probability with which an episode of the split `"train"` begins
+            nearer to the goal: the length of its path is drawn evenly up to that from
+            the world's own start. A help for learning.
 
     ## Version History
     * v0: Initial version.
@@ -166,8 +169,11 @@ class LadderEnv(OnSet, Map2DEnv):
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
         hidden_folder: str | Path | None = None,
+        nearer_starts: float = 0.0,
     ) -> None:
-        task_set, source = _opened(level, split, train_pool, salt_file, hidden_folder)
+        task_set, source = _opened(
+            level, split, train_pool, salt_file, hidden_folder, nearer_starts
+        )
         file = task_set.file
         setup = Setup(
             **_shared(task_set, source, reward_weights),
@@ -193,8 +199,11 @@ class EPuckLadderEnv(OnSet, EPuckEnv):
         privileged: bool = False,
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
+        nearer_starts: float = 0.0,
     ) -> None:
-        task_set, source = _opened(level, split, train_pool, salt_file)
+        task_set, source = _opened(
+            level, split, train_pool, salt_file, None, nearer_starts
+        )
         robot, seen = task_set.file.robot, task_set.file.observed
         assert isinstance(robot, EPuckParams)
         shared = _shared(task_set, source, reward_weights)
@@ -232,12 +241,13 @@ def _opened(
     split: str,
     train_pool: int,
     salt_file: str | Path | None,
-    hidden_folder: str | Path | None = None,
+    hidden_folder: str | Path | None,
+    nearer_starts: float,
 ) -> tuple[TaskSet, SetSource]:
     """A set, and the source of its tasks."""
     salt = None if salt_file is None else read_salt(salt_file)
     task_set = load_set(level, None if hidden_folder is None else Path(hidden_folder))
-    return task_set, SetSource(task_set, split, train_pool, salt)
+    return task_set, SetSource(task_set, split, train_pool, salt, nearer_starts)
 
 
 def _shared(

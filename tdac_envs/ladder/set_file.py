@@ -273,6 +273,9 @@ class SetFile(_Strict):
         if self.files is not None:
             splits = list(self.files.splits)
             values["files"] = {"sha256": files_sha256, "splits": splits}
+            if self.files.tests or self.files.runs > 1:
+                more = {"tests": list(self.files.tests), "runs": self.files.runs}
+                values["files"] |= more
         text = json.dumps(values, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode("ascii")).hexdigest()
 
@@ -318,8 +321,13 @@ BUILT_IN = Path(__file__).parent / "sets"
 
 
 def set_names() -> tuple[str, ...]:
-    """Names of the sets that come with the package, the easiest first."""
+    """Names of the levels, the easiest first."""
     return "known", "unknown", "lost", "moving", "crowd", "epuck"
+
+
+def shipped_names() -> tuple[str, ...]:
+    """Names of all sets that come with the package: the levels, then others."""
+    return *set_names(), "barn"
 
 
 def find_set_file(name: str | Path) -> SetFile:
@@ -328,12 +336,12 @@ def find_set_file(name: str | Path) -> SetFile:
     Raises:
         TaskError: There is none, or it is not valid.
     """
-    if str(name) in set_names():
+    names = shipped_names()
+    if str(name) in names:
         return read_set_file(BUILT_IN / f"{name}.yaml")
     path = Path(name)
     if path.suffix in (".yaml", ".yml"):
         return read_set_file(path)
-    names = set_names()
     raise TaskError(
         f"unknown task set {str(name)!r}; expected {', '.join(names)} or the path of "
         f"a set.yaml{hint(str(name), names)}"

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.core.arguments import whole_number
+from tdac_envs.core.arguments import number_up_to, whole_number
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import read_file
+from tdac_envs.ladder.nearer import nearer_task
 from tdac_envs.ladder.plate_pool import PlatePool
 from tdac_envs.ladder.pool import TrainingPool
 from tdac_envs.ladder.task_sets import MOST_SALT, AnyTask, AnyWorld, TaskSet
@@ -30,16 +31,33 @@ class SetSource:
         train_pool: Number of training worlds, which are kept; 0 for a new world in
             each episode.
         salt: Salt of the split `hidden`.
+        nearer_starts: Probability with which a training episode begins nearer to the
+            goal; see `nearer_task`.
+
+    Attributes:
+        gives_map: Whether robots are given the map of their world.
 
     Raises:
-        TaskError: The split is unknown, or its salt is missing or not asked for.
+        TaskError: The split is unknown, its salt is missing or not asked for, or other
+            starts are asked for in a split that is not for training.
     """
 
     def __init__(
-        self, task_set: TaskSet, split: str, train_pool: int, salt: bytes | None
+        self,
+        task_set: TaskSet,
+        split: str,
+        train_pool: int,
+        salt: bytes | None,
+        nearer_starts: float = 0.0,
     ) -> None:
         task_set.key(split, 0, "world", salt)  # checks the split and its salt
         self._set, self._split, self._salt = task_set, split, salt
+        self.gives_map = task_set.file.map
+        self._nearer = number_up_to("nearer_starts", nearer_starts, 1.0)
+        if self._nearer and split != "train":
+            raise TaskError(
+                f"nearer_starts is for the split 'train', not for {split!r}"
+            )
         size = whole_number("train_pool", train_pool, 0, MOST_WORLDS)
         kept = split == "train" and size > 0
         pool = PlatePool if task_set.file.unit == "m" else TrainingPool
@@ -81,12 +99,14 @@ class SetSource:
         if unknown:
             raise TaskError(f"unknown reset options {unknown}; expected 'index'")
         index = options.get("index")
-        if index is None:
-            index = int(random.integers(self._count))
-        task = self.task(index)
+        number = int(random.integers(self._count)) if index is None else index
+        task = self.task(number)
+        if index is None and self._nearer and random.random() < self._nearer:
+            file = self._set.file
+            task = nearer_task(task, file.full_step, file.horizon, random)
         if self._split == "train":
             return task, random
-        return task, self._set.noise(self._split, index, self._salt)
+        return task, self._set.noise(self._split, number, self._salt)
 
 
 def read_salt(path: str | Path) -> bytes:

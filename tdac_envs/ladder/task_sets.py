@@ -67,8 +67,27 @@ class TaskSet:
         return (self.files or self.file).largest_side
 
     def count(self, split: str) -> int | None:
-        """Number of worlds of a split; None if there is no limit."""
+        """Number of worlds of a split; None if there is no limit.
+
+        A set of files may have several runs on each world; all of them count.
+        """
         return None if self.files is None else self.files.counts.get(split, 0)
+
+    def runs(self, split: str, worlds: int) -> int:
+        """How often the first `worlds` worlds of a split are the same ones.
+
+        Raises:
+            TaskError: Some of them are driven more often than others.
+        """
+        if self.files is None or self.files.runs == 1:
+            return 1
+        different = self.files.counts[split] // self.files.runs
+        if worlds > different and worlds % different:
+            raise TaskError(
+                f"worlds {worlds}: set {self.name!r} has {different} different ones "
+                f"with {self.files.runs} runs each; expected a multiple of {different}"
+            )
+        return max(worlds // different, 1)
 
     def kind(self, split: str, index: int) -> str:
         """What results of a world are grouped by: its generator, or kind of map.
@@ -250,18 +269,18 @@ class TaskSet:
         """World `index` of a split, from its file."""
         assert self.files is not None
         self._check_file_split(split)
-        worlds = next(own for name, own in self.files.splits.items() if name == split)
-        if not worlds:
+        count = self.files.counts[split]
+        if not count:
             raise TaskError(
                 f"set {self.name!r} has no worlds in its split {split!r}: whole groups "
                 "of one origin go to a split, and they went elsewhere"
             )
-        if not 0 <= index < len(worlds):
+        if not 0 <= index < count:
             raise TaskError(
-                f"world {index}: set {self.name!r} has {len(worlds)} worlds in its "
-                f"split {split!r}, numbered from 0"
+                f"world {index}: set {self.name!r} has {count} worlds in its split "
+                f"{split!r}, numbered from 0"
             )
-        return worlds[index]
+        return self.files.of(split, index)
 
     def noise(
         self, split: str, index: int, salt: bytes | None = None

@@ -19,6 +19,7 @@ from tdac_envs.drive.stepping import STEPS
 from tdac_envs.drive.vector import DrivenVectorEnv, Observations
 from tdac_envs.learning.dead_reckoning import SOURCES, DeadReckoning, source_of
 from tdac_envs.learning.guidance import Route, look_ahead, route_to_goal
+from tdac_envs.learning.map_view import MapViews, check_map_view, viewed_space
 from tdac_envs.learning.wrappers import (
     Frame,
     check_guidance,
@@ -143,7 +144,7 @@ class WrappedVectorEnv(VectorWrapper):
         super().close(**kwargs)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_routes": None, "_stages": None}
+        return {**self.__dict__, "_routes": None, "_views": None, "_stages": None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -152,6 +153,7 @@ class WrappedVectorEnv(VectorWrapper):
     def _bind(self) -> None:
         """Prepares the computation of each wrapper."""
         self._routes: Routes | None = None
+        self._views: MapViews | None = None
         self._space: spaces.Space[Any] = self.batch.single_observation_space
         self._stages = [self._stage(name) for name in self.names]
 
@@ -172,15 +174,24 @@ class WrappedVectorEnv(VectorWrapper):
                 **seen,
                 "guidance": frame.guidance_to(routes.ahead(poses), poses, routes.reach),
             }
+        if name == "map-view":
+            check_map_view(self.batch.setups[0])
+            self._space = viewed_space(own)
+            views = self._views = self._views or MapViews(self.batch.tasks)
+            return lambda seen, poses: {**seen, "map": views.around(poses)}
         self._space = spaces.flatten_space(own)
         if not isinstance(own, spaces.Dict):
             return lambda seen, _: seen
         keys = tuple(own.spaces)
-        return lambda seen, _: np.concatenate([seen[key] for key in keys], axis=-1)
+        return lambda seen, _: np.concatenate(
+            [seen[key].reshape(self.num_envs, -1) for key in keys], axis=-1
+        )
 
     def _current(self, observations: Observations) -> Seen:
         if self._routes is not None:
             self._routes.refresh()
+        if self._views is not None:
+            self._views.refresh(self.batch.tasks)
         if self._reckoned is not None:
             steps = self.batch.robots.state[:, STEPS]
             pose: Any = self._reckoned.follow(observations[self._source], steps)

@@ -29,6 +29,7 @@ from tdac_envs.drive.stepping import STEPS
 from tdac_envs.epuck.infrared import LARGEST
 from tdac_envs.learning.dead_reckoning import SOURCES, source_of
 from tdac_envs.learning.guidance import REACH, Route, route_to_goal
+from tdac_envs.learning.map_view import MapView
 from tdac_envs.map2d.task import Map2DTask
 
 if TYPE_CHECKING:
@@ -270,6 +271,7 @@ class Guidance(
 WRAPPERS: dict[str, Callable[[Env], Env]] = {
     "goal-relative": GoalRelativeObservation,
     "guidance": Guidance,
+    "map-view": MapView,
     "flatten": FlattenObservation,
 }
 """Wrappers by the names that `wrap`, `tdac train` and `tdac evaluate` accept."""

@@ -14,6 +14,8 @@ FOR_RL = ("goal-relative", "guidance", "flatten")
 """The wrappers of `tdac train` on tasks, innermost first."""
 FOR_SETS = ("goal-relative", "flatten")
 """Those on task sets, where a policy has its sensors alone."""
+WITH_MAP = ("goal-relative", "map-view", "flatten")
+"""Those on task sets that give the map."""
 
 
 @overload
@@ -41,31 +43,38 @@ def wrap_for_rl(
     |---|---|---|
     | `goal` | 3 | direction of the goal in the robot's frame, and its distance |
     | `guidance` | 2 | the next waypoint of the shortest path with a margin |
+    | `map` | 512 | the given map around the robot; see `MapView` |
     | `ranges` or `ps` | n | reading / largest possible reading |
     | `wheel_speeds` | 2 | left, right, as last applied |
 
     Guidance is computed from the whole map; `names=("goal-relative", "flatten")` omits
     it, for policies that use only sensors and the goal. On a task set
-    (`TDAC-Ladder-v0`) that is the default, and there is no guidance; where the robot
-    has no pose, the goal is relative to the pose that its odometry adds up to. Rewards,
+    (`TDAC-Ladder-v0`) there is no guidance. By default, a set that gives the map adds
+    the view of it; where the robot has no pose, the goal is relative to the pose that
+    its odometry adds up to. Rewards,
     actions and the ends of episodes do not change. `tdac train` uses this function.
 
     Args:
         env: An environment, single or batched, with its original observations.
         names: Names in `tdac_envs.wrappers.WRAPPERS`, innermost first. By default
-            `FOR_RL`, and on a task set `FOR_SETS`.
+            `FOR_RL`; on a task set `FOR_SETS`, or `WITH_MAP` if it gives the map.
 
     Raises:
         TaskError: `env` is not from `tdac_envs`, a name is unknown, or a
             wrapper does not support the observations.
     """
-    if isinstance(env, VectorEnv):
-        setups = getattr(env, "setups", None) or [None]
-        return WrappedVectorEnv(env, _names(setups[0]) if names is None else names)
     if names is None:
-        names = _names(getattr(env.unwrapped, "setup", None))
+        names = default_wrappers(env)
+    if isinstance(env, VectorEnv):
+        return WrappedVectorEnv(env, names)
     return wrap(env, names)
 
 
-def _names(setup: Any) -> tuple[str, ...]:
-    return FOR_RL if getattr(setup, "source", None) is None else FOR_SETS
+def default_wrappers(env: Env | VectorEnv[Any, Any, Any]) -> tuple[str, ...]:
+    """The names that `wrap_for_rl` chooses for an environment, single or batched."""
+    plain: Any = env.unwrapped
+    setups = getattr(plain, "setups", None) or [getattr(plain, "setup", None)]
+    source = getattr(setups[0], "source", None)
+    if source is None:
+        return FOR_RL
+    return WITH_MAP if source.gives_map else FOR_SETS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from itertools import accumulate
 
 from tdac_envs.ladder.files.found import FoundWorld
@@ -14,17 +14,35 @@ SHARES: dict[FileSplit, int] = {"train": 3, "dev": 1, "test": 1}
 
 
 def shared_out(
-    worlds: Sequence[FoundWorld], splits: Sequence[FileSplit]
+    worlds: Sequence[FoundWorld],
+    splits: Sequence[FileSplit],
+    tests: Collection[str] = (),
 ) -> dict[AnySplit, tuple[FoundWorld, ...]]:
     """The worlds of each split, in an order that follows from their hashes.
 
     Worlds with the same map or the same origin belong to a group, and so do those that
     are linked by others. The hash of its name decides where a group goes, so further
     files do not move it.
+
+    Args:
+        worlds: All worlds.
+        splits: The splits.
+        tests: Names of the worlds of `test`, if they are given; the groups of these
+            worlds go there, and no other.
+
+    Raises:
+        ValueError: There is no world of a name.
     """
     shared: dict[AnySplit, list[FoundWorld]] = {split: [] for split in splits}
-    for world, group in zip(worlds, groups(worlds), strict=True):
-        shared[_split_of(group, splits)].append(world)
+    named = groups(worlds)
+    pairs = list(zip(worlds, named, strict=True))
+    chosen = {group for world, group in pairs if world.name in tests}
+    if unknown := set(tests) - {world.name for world in worlds}:
+        raise ValueError(f"`tests`: there is no world {min(unknown)!r}")
+    others = [split for split in splits if split != "test"] if tests else splits
+    for world, group in pairs:
+        split = "test" if group in chosen else _split_of(group, others)
+        shared[split].append(world)
     return {
         split: tuple(sorted(found, key=lambda world: world.sha256))
         for split, found in shared.items()

@@ -30,6 +30,7 @@ class FileWorlds:
         hidden_folder: Folder of the split `hidden`, if there is one; it is no part of
             the other attributes but `splits`.
         hidden_sha256: Hash of its worlds.
+        runs: Episodes of each world.
     """
 
     splits: Mapping[AnySplit, tuple[FoundWorld, ...]]
@@ -37,11 +38,22 @@ class FileWorlds:
     sha256: str
     hidden_folder: Path | None = None
     hidden_sha256: str | None = None
+    runs: int = 1
 
     @property
     def counts(self) -> dict[str, int]:
-        """Number of worlds of each split."""
-        return {split: len(worlds) for split, worlds in self.splits.items()}
+        """Number of episodes of each split."""
+        return {s: len(worlds) * self.runs for s, worlds in self.splits.items()}
+
+    def of(self, split: str, index: int) -> FoundWorld:
+        """The world of an episode: all have their first run, then all their second.
+
+        Args:
+            split: The split, which has worlds.
+            index: Number of the episode, from 0.
+        """
+        worlds = next(own for name, own in self.splits.items() if name == split)
+        return worlds[index % len(worlds)]
 
     def with_hidden(
         self, folder: Path, spec: FilesSpec, radius: float, tolerance: float
@@ -57,7 +69,12 @@ class FileWorlds:
         Raises:
             TaskError: As `opened` does, or it has a map or an origin of the set.
         """
-        own = FilesSpec(folder=folder, splits=("test",), infeasible=spec.infeasible)
+        own = FilesSpec(
+            folder=folder,
+            splits=("test",),
+            infeasible=spec.infeasible,
+            runs=spec.runs,
+        )
         found = opened(own, radius, tolerance)
         worlds = found.splits["test"]
         public = set().union(*(links(each) for s in self.splits.values() for each in s))
@@ -138,4 +155,8 @@ def _opened(
         )
     joined = "".join(sorted(world.sha256 for world in feasible))
     digest = hashlib.sha256(joined.encode()).hexdigest()
-    return FileWorlds(shared_out(feasible, spec.splits), tuple(skipped), digest)
+    try:
+        splits = shared_out(feasible, spec.splits, spec.tests)
+    except ValueError as error:
+        raise TaskError(f"{spec.path}: {error}") from None
+    return FileWorlds(splits, tuple(skipped), digest, runs=spec.runs)

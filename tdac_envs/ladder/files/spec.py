@@ -35,6 +35,12 @@ class FilesSpec(BaseModel):
     splits: Annotated[tuple[FileSplit, ...], AfterValidator(_each_once)] = Field(
         FILE_SPLITS, min_length=1, description="Splits that share the worlds."
     )
+    tests: tuple[str, ...] = Field(
+        (), description="Names of the worlds of `test`; the others are for the rest."
+    )
+    runs: int = Field(
+        1, ge=1, le=1000, description="Episodes of each world, which differ in noise."
+    )
     infeasible: Literal["refuse", "skip"] = Field(
         "refuse", description="What happens if a task is not feasible."
     )
@@ -43,6 +49,8 @@ class FilesSpec(BaseModel):
     def _check(self) -> Self:
         if (self.folder is None) == (self.barn is None):
             raise ValueError("expected either `folder` or `barn`")
+        if self.tests and self.splits != FILE_SPLITS:
+            raise ValueError("`tests` needs the splits train, dev and test")
         return self
 
     @property

@@ -3,6 +3,7 @@
 import json
 import re
 import stat
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
 from tdac_agent.bench.bench import bench
+from tdac_agent.bench.compared import Driven
 from tdac_agent.bench.page import MOST_WORLDS
 from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, reveal
@@ -20,6 +22,7 @@ from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.set_file import BUILT_IN
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 AHEAD = "def policy(obs):\n    return 1.0, 1.0\n"
@@ -205,6 +208,26 @@ def test_seeds_of_a_training(judge, tmp_path, level, files):
     assert both.late + sum(both.contacts.values()) + both.errors == 6
     assert found.pairs[0].p_success is None
     assert still.files[0] in both.files
+
+
+def test_runs_on_the_same_world(judge, tmp_path, files):
+    """The unit is a world: a success rate with several runs has no exact interval."""
+    short = {"factor": 1.0, "least": 40, "most": 40}
+    barn = {"barn": str(BUILT_IN / "barn" / "worlds.json"), "splits": ["test"]}
+    barn |= {"tests": [], "runs": 2}
+    path = tmp_path / "twice.yaml"
+    path.write_text(
+        yaml.safe_dump({"worlds": barn, "goal_tolerance": 40, "horizon": short})
+    )
+    assert load_set(path).runs("test", 500) == 2
+    found = bench(files[:2], [path], "test", 3, out=tmp_path / "a", judge=judge)
+    assert {row.worlds for row in found.rows} == {3}
+    episodes = [SimpleNamespace(time_score=k, success=k > 2) for k in range(6)]
+    driven = Driven.of("one", [episodes], 2)
+    assert driven.time.tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert driven.success.tolist() == [[0, 0, 0], [1, 1, 1]]
+    with pytest.raises(TaskError, match="expected a multiple of 250"):
+        bench(files[:2], [path], "test", 300, out=tmp_path / "b", judge=judge)
 
 
 @pytest.mark.parametrize(

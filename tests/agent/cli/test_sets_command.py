@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tdac_envs import load_set
-from tdac_envs.ladder.set_file import set_names
+from tdac_envs.ladder.set_file import set_names, shipped_names
 
 FIGURES = ("gap", "steps", "detour", "in_sight", "density", "dead_ends", "excess")
 
@@ -26,8 +26,8 @@ def test_its_json_is_complete(tdac):
     code, out, _ = tdac("sets", "--json")
     records = json.loads(out)
     assert code == 0
-    assert [each["name"] for each in records] == list(set_names())
-    for each in records:
+    assert [each["name"] for each in records] == list(shipped_names())
+    for each in records[: len(set_names())]:
         assert each["sha256"] == load_set(each["name"]).sha256
         assert each["horizon"] == {"factor": 16.0, "least": 400, "most": 2000}
 

@@ -345,6 +345,55 @@ def test_a_missing_file_of_barn(tmp_path):
         load_set(path)
 
 
+def test_the_shipped_worlds_of_barn():
+    """50 worlds with a log are for tests; a world has ten runs with their own noise."""
+    tasks = load_set("barn")
+    counts = tasks.files.counts
+    assert counts["test"] == 500
+    assert counts["train"] + counts["dev"] == 2000
+    labels = [tasks.label("test", index) for index in range(100)]
+    numbers = {int(label.removeprefix("barn ")) for label in labels}
+    assert labels[:50] == labels[50:]
+    assert numbers == set(range(0, 300, 6))
+    env = gym.make("TDAC-Ladder-v0", level="barn", split="test")
+    seen = [env.reset(options={"index": index})[0]["ranges"] for index in (3, 53)]
+    assert not np.array_equal(*seen)
+    assert np.allclose(*seen, rtol=0.2)
+    assert tasks.runs("test", 20) == tasks.runs("test", 50) == 1
+    assert tasks.runs("test", 150) == 3
+    with pytest.raises(TaskError, match="expected a multiple of 50"):
+        tasks.runs("test", 60)
+    with pytest.raises(TaskError, match="has 500 worlds in its split 'test'"):
+        tasks.world("test", 500)
+
+
+@pytest.mark.parametrize(
+    ("worlds", "message"),
+    [
+        ({"tests": ["other"]}, "`tests`: there is no world 'other'"),
+        ({"tests": ["wall"], "splits": ["test"]}, "needs the splits train, dev and"),
+        ({"runs": 0}, "runs"),
+    ],
+)
+def test_worlds_for_tests_that_are_refused(tmp_path, worlds, message):
+    barn_file(tmp_path / "worlds.json")
+    path = tmp_path / "barn.yaml"
+    path.write_text(yaml.safe_dump({"worlds": {"barn": "worlds.json", **worlds}}))
+    with pytest.raises(TaskError, match=message):
+        load_set(path)
+
+
+def test_named_worlds_are_for_tests(tmp_path):
+    barn_file(tmp_path / "worlds.json")
+    path = tmp_path / "barn.yaml"
+    worlds = {"barn": "worlds.json", "tests": ["wall"]}
+    path.write_text(yaml.safe_dump({"worlds": worlds, "goal_tolerance": 40}))
+    tasks = load_set(path)
+    assert tasks.label("test", 0) == "barn wall"
+    assert tasks.count("test") == 1
+    assert tasks.count("train") + tasks.count("dev") == 1
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not (REAL / "maps").is_dir(), reason="no folder of public maps")
 def test_public_maps(tmp_path):

@@ -271,6 +271,39 @@ def test_a_pool_is_finite_and_no_pool_is_not():
         make(train_pool=-1)
 
 
+@pytest.mark.parametrize("level", ["unknown", "moving", "epuck"])
+def test_training_may_begin_nearer_to_the_goal(level):
+    """At any distance up to the world's own, feasible, and apart from movers."""
+    own = make(level, split="train", train_pool=2)
+    near = make(level, split="train", train_pool=2, nearer_starts=1.0)
+    far = {}
+    for index in range(2):
+        own.reset(options={"index": index})
+        near.reset(options={"index": index})
+        task = own.unwrapped.task
+        assert near.unwrapped.task.start == task.start
+        far[task.goal] = task.shortest
+    shares = []
+    for seed in range(40):
+        near.reset(seed=seed)
+        task = near.unwrapped.task
+        shares.append(task.shortest / far[task.goal])
+        assert near.step(np.zeros(2, np.float32))[4]["collisions"] == 0
+    assert max(shares) <= 1.1
+    assert min(shares) < 0.35
+    assert max(shares) > 0.65
+    again = make(level, split="train", train_pool=2, nearer_starts=1.0)
+    again.reset(seed=39)
+    assert again.unwrapped.task.start == task.start
+
+
+def test_nearer_starts_are_for_training():
+    with pytest.raises(TaskError, match="is for the split 'train', not for 'dev'"):
+        make(split="dev", nearer_starts=0.5)
+    with pytest.raises(TaskError, match="expected nearer_starts from 0 to 1, got 2"):
+        make(split="train", nearer_starts=2)
+
+
 def test_hidden_worlds_need_a_salt(tmp_path):
     with pytest.raises(TaskError, match="split 'hidden' needs a salt"):
         make(split="hidden")

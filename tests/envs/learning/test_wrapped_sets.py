@@ -13,7 +13,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.learning.dead_reckoning import DeadReckoning, WheelReckoning
 
 LADDER = "TDAC-Ladder-v0"
-LEVELS = ["known", "unknown", "lost"]
+LEVELS = ["unknown", "lost"]
 SIZE = 3 + 2
 """Numbers besides the ranges: goal, wheel speeds."""
 
@@ -40,6 +40,9 @@ LOST = {
 }
 
 
+MAP = {"map": True, "frame": "map"}
+
+
 @pytest.mark.parametrize("level", LEVELS)
 def test_the_default_is_sensors_alone(level):
     """Flat, scaled, without guidance; the same space for one robot and for many."""
@@ -57,7 +60,7 @@ def test_the_default_is_sensors_alone(level):
 
 
 @pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
-@pytest.mark.parametrize("values", [{}, LOST])
+@pytest.mark.parametrize("values", [{}, LOST, MAP])
 def test_a_batch_tells_what_single_environments_tell(few, mode, values):
     """To the last bit, also at the ends of episodes and after them."""
     given = {"level": few(**values), "train_pool": 3}
@@ -117,6 +120,39 @@ def test_poses_do_not_move_twice_in_a_step():
     # A half circle of length 2 has the diameter 4 / pi.
     assert np.allclose(first, [0.0, 4.0 / np.pi, np.pi])
     assert np.array_equal(reckoned.follow([1.0, 1.0], 0), np.zeros(3))
+
+
+def test_a_given_map_is_seen_around_the_robot():
+    """Clearance at points in the robot's frame, ahead first; beside the map it is 0."""
+    env = wrap_for_rl(gym.make(LADDER, level="known", split="dev"), ["map-view"])
+    for index in range(4):
+        view = env.reset(options={"index": index})[0]["map"]
+        plain = env.unwrapped
+        x, y, heading = plain.pose()
+        clear, radius = plain.task.terrain.clear, plain.task.body_radius
+        for scale, spacing in enumerate((0.5, 2.0)):
+            for row, column in np.ndindex(16, 16):
+                ahead = radius * spacing * (7.5 - row)
+                right = radius * spacing * (column - 7.5)
+                i = round(x + ahead * np.cos(heading) - right * np.sin(heading))
+                j = round(y + ahead * np.sin(heading) + right * np.cos(heading))
+                inside = 0 <= i < clear.shape[1] and 0 <= j < clear.shape[0]
+                expected = min(clear[j, i] / (3 * radius), 1.0) if inside else 0.0
+                assert view[scale, row, column] == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_view_of_a_map_needs_a_map(few):
+    """The default wrappers have it where there is one, and only there."""
+    for level, size in (("known", 3 + 512 + 18 + 2), (few(), 3 + 18 + 2)):
+        env = wrap_for_rl(gym.make(LADDER, level=level, split="dev"))
+        assert env.observation_space.shape == (size,)
+        assert env.reset(seed=1)[0] in env.observation_space
+    with pytest.raises(TaskError, match="leave out the wrapper 'map-view'"):
+        wrap_for_rl(gym.make(LADDER, level=few(), split="dev"), ["map-view"])
+    with pytest.raises(TaskError, match="leave out the wrapper 'map-view'"):
+        wrap_for_rl(gym.make("TDAC-Map2D-v0"), ["map-view"])
+    with pytest.raises(TaskError, match="expected observations in a Dict"):
+        wrap_for_rl(gym.make(LADDER, level="known"), ["flatten", "map-view"])
 
 
 @pytest.mark.parametrize("made", [gym.make, gym.make_vec])
