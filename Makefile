@@ -12,6 +12,8 @@
 #   make clients      A short training with each RL library of docs/clients.md, installed
 #                     in its own environment; prints a table. Selected libraries:
 #                     make clients CLIENTS="sb3 skrl"
+#   make results-rl  The trainings of results/ladder/learned: hours, not part of CI;
+#                     after an interruption it goes on.
 #   make lint         Style, types and import rules.
 PYTHON ?= python3
 VENV ?= .venv
@@ -23,7 +25,8 @@ SAMPLE ?= 1
 # After a crash, a new process would wait for ever for the files of the old one.
 PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
-.PHONY: synth test test-all slow slow-sample lint bench portability clients clean
+.PHONY: synth test test-all slow slow-sample lint bench portability clients results-rl \
+	clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
@@ -48,6 +51,10 @@ clients:
 bench: $(VENV)/.installed
 	$(BIN)/pip install --quiet -e ".[bench]"
 	$(BIN)/python -m benchmarks
+
+results-rl: $(VENV)/.installed
+	$(BIN)/pip install --quiet -e ".[sb3]"
+	$(BIN)/python -m benchmarks.ladder_trainings runs/results-rl --keep results/ladder/learned
 
 lint: $(VENV)/.lint-installed
 	$(BIN)/ruff check .

@@ -56,10 +56,11 @@ def train_all(names: list[str], runs: Path) -> None:
 
 def trained(runs: Path) -> dict[str, Path]:
     """The policy files of the finished trainings in a folder."""
-    return {name: runs / name / POLICY for name in TRAININGS if _done(runs / name)}
+    return {name: runs / name / POLICY for name in TRAININGS if finished(runs / name)}
 
 
-def _done(folder: Path) -> bool:
+def finished(folder: Path) -> bool:
+    """Whether the training in a folder has run to its end."""
     curve = read_curve(folder)
     return bool(curve) and curve[-1].steps >= read_plan(folder).steps
 

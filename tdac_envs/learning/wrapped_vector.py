@@ -22,6 +22,7 @@ from tdac_envs.learning.guidance import Route, look_ahead, route_to_goal
 from tdac_envs.learning.map_view import MapViews, check_map_view, viewed_space
 from tdac_envs.learning.wrappers import (
     Frame,
+    check_closeness,
     check_guidance,
     check_wrappers,
     guided_space,
@@ -166,6 +167,9 @@ class WrappedVectorEnv(VectorWrapper):
                 made = SOURCES[self._source](self.num_envs)
                 self._reckoned = self._reckoned or made
             return lambda seen, _: frame.goal_relative(seen)
+        if name == "closeness":
+            check_closeness(own)
+            return lambda seen, _: frame.closeness(seen)
         if name == "guidance":
             check_guidance(self.batch.setups[0])
             self._space = guided_space(own)

@@ -107,6 +107,13 @@ class Frame:
             own[self.readings] = np.clip(readings, 0.0, 1.0)
         return own
 
+    def closeness(self, observation: Observation) -> Observation:
+        """Converts relative observations, or a batch, as `Closeness` does."""
+        ranges = observation["ranges"] * np.asarray(self.largest, np.float32)
+        radius = np.asarray(self.radius, np.float32)
+        near = radius / np.maximum(ranges, radius)
+        return {**observation, "ranges": near.astype(np.float32)}
+
     def guidance(self, route: Route, poses: ArrayLike) -> NDArray[np.float32]:
         """The `guidance` of one route at poses of shape (n, 3)."""
         return self.guidance_to(route.ahead(poses), poses, route.reach)
@@ -166,6 +173,19 @@ def check_guidance(setup: Any) -> None:
         )
 
 
+def check_closeness(own: spaces.Space[Any]) -> None:
+    """Checks that observations have ranges as `GoalRelativeObservation` gives them.
+
+    Raises:
+        TaskError: They have not.
+    """
+    found = own.spaces.get("ranges") if isinstance(own, spaces.Dict) else None
+    if not isinstance(found, spaces.Box) or found.high.max() > 1.0:
+        raise TaskError(
+            f"expected ranges in a Dict, after the wrapper goal-relative, got {own}"
+        )
+
+
 def guided_space(own: spaces.Space[Any]) -> spaces.Dict:
     """An observation space with `guidance` added.
 
@@ -222,6 +242,35 @@ class GoalRelativeObservation(
         return self.frame.goal_relative({**observation, "pose": pose})
 
 
+class Closeness(
+    gym.ObservationWrapper[Observation, NDArray[np.float32], Observation],
+    gym.utils.RecordConstructorArgs,
+):
+    """Ranges as closeness: body radius / distance, which is 1 at contact.
+
+    | key | shape | range | content |
+    |---|---|---|---|
+    | `ranges` | (n,) | [0, 1] | body radius / distance from the robot's centre |
+
+    A wall that is one pixel nearer changes it the more, the nearer the wall is. As a
+    share of the largest range, distances at which a narrow passage is driven hardly
+    differ.
+
+    Args:
+        env: An environment with ranges, wrapped in `GoalRelativeObservation`.
+    """
+
+    def __init__(self, env: Env) -> None:
+        gym.utils.RecordConstructorArgs.__init__(self)
+        gym.ObservationWrapper.__init__(self, env)
+        check_closeness(env.observation_space)
+        self.frame = Frame.of(env)
+
+    def observation(self, observation: Observation) -> Observation:
+        """See the class."""
+        return self.frame.closeness(observation)
+
+
 class Guidance(
     gym.ObservationWrapper[Observation, NDArray[np.float32], Observation],
     gym.utils.RecordConstructorArgs,
@@ -270,6 +319,7 @@ class Guidance(
 
 WRAPPERS: dict[str, Callable[[Env], Env]] = {
     "goal-relative": GoalRelativeObservation,
+    "closeness": Closeness,
     "guidance": Guidance,
     "map-view": MapView,
     "flatten": FlattenObservation,

@@ -38,9 +38,8 @@ LOST = {
     "observed": ["odometry", "goal", "wheel_speeds", "ranges"],
     "disturbances": {"odometry_scale": 0.05, "odometry_noise": 0.05, "delay": 1},
 }
-
-
 MAP = {"map": True, "frame": "map"}
+CLOSE = ("goal-relative", "closeness", "flatten")
 
 
 @pytest.mark.parametrize("level", LEVELS)
@@ -60,13 +59,17 @@ def test_the_default_is_sensors_alone(level):
 
 
 @pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
-@pytest.mark.parametrize("values", [{}, LOST, MAP])
-def test_a_batch_tells_what_single_environments_tell(few, mode, values):
+@pytest.mark.parametrize(
+    ("values", "names"),
+    [({}, None), (LOST, None), (MAP, None), ({}, CLOSE)],
+)
+def test_a_batch_tells_what_single_environments_tell(few, mode, values, names):
     """To the last bit, also at the ends of episodes and after them."""
     given = {"level": few(**values), "train_pool": 3}
-    single = [lambda: wrap_for_rl(gym.make(LADDER, **given)) for _ in range(3)]
+    single = [lambda: wrap_for_rl(gym.make(LADDER, **given), names) for _ in range(3)]
     many = SyncVectorEnv(single, autoreset_mode=mode)
-    ours = wrap_for_rl(gym.make_vec(LADDER, 3, autoreset_mode=mode, **given))
+    batch = gym.make_vec(LADDER, 3, autoreset_mode=mode, **given)
+    ours = wrap_for_rl(batch, names)
     np.testing.assert_array_equal(many.reset(seed=5)[0], ours.reset(seed=5)[0])
     random, ends = np.random.default_rng(1), 0
     for _ in range(30):
@@ -153,6 +156,23 @@ def test_a_view_of_a_map_needs_a_map(few):
         wrap_for_rl(gym.make("TDAC-Map2D-v0"), ["map-view"])
     with pytest.raises(TaskError, match="expected observations in a Dict"):
         wrap_for_rl(gym.make(LADDER, level="known"), ["flatten", "map-view"])
+
+
+def test_closeness_is_one_at_contact():
+    """Body radius / distance; it needs ranges that are shares of the largest."""
+    env = wrap_for_rl(gym.make(LADDER, level="unknown", split="dev"), CLOSE[:2])
+    seen, _ = env.reset(options={"index": 0})
+    plain, _ = env.unwrapped.reset(options={"index": 0})
+    radius = env.unwrapped.task.body_radius
+    assert np.allclose(seen["ranges"], radius / plain["ranges"], rtol=1e-5)
+    near = {"ranges": np.array([0.0, radius / 120.0, 1.0], np.float32)}
+    closeness = env.frame.closeness(near)["ranges"]
+    assert np.allclose(closeness, [1.0, 1.0, radius / 120.0])
+    for made in (gym.make, gym.make_vec):
+        with pytest.raises(TaskError, match="after the wrapper goal-relative"):
+            wrap_for_rl(made(LADDER, level="unknown", split="dev"), ["closeness"])
+    with pytest.raises(TaskError, match="expected ranges"):
+        wrap_for_rl(gym.make(LADDER, level="epuck", split="dev"), CLOSE)
 
 
 @pytest.mark.parametrize("made", [gym.make, gym.make_vec])

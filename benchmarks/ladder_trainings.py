@@ -1,0 +1,65 @@
+"""Trains the learned entrants of `results/ladder` (`make results-rl`).
+
+    python -m benchmarks.ladder_trainings OUT [NAME...] [--keep results/ladder/learned]
+
+NAME is `ALGO-LEVEL-SEED`, by default all of them, in the order of `TRAININGS`: PPO with
+five seeds on `known`, `unknown` and `crowd`, RecurrentPPO with five on `unknown`,
+`lost` and `moving`, and one seed of PPO on the other levels. OUT has a folder for each;
+finished ones are left as they are, and an interrupted one goes on from its last
+evaluation. `--keep` copies policies, facts and learning curves of the finished ones to
+a folder that is small enough to be kept.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+from pathlib import Path
+
+from benchmarks.baseline_trainings import finished
+from tdac_agent.training.curve import CURVE_FILE, PLAN_FILE
+from tdac_agent.training.policy_files import FACTS, POLICY
+from tdac_agent.training.set_plan import make_set_plan
+from tdac_agent.training.train import train
+
+SEEDS = range(5)
+TRAININGS = [
+    *(
+        ("ppo", level, seed)
+        for seed in SEEDS
+        for level in ("unknown", "known", "crowd")
+    ),
+    *(
+        ("recurrent-ppo", level, seed)
+        for seed in SEEDS
+        for level in ("unknown", "lost", "moving")
+    ),
+    *(("ppo", level, 0) for level in ("lost", "moving", "epuck")),
+]
+"""Algorithm, level and seed."""
+NAMES = {"-".join(map(str, each)): each for each in TRAININGS}
+KEPT = POLICY, FACTS, PLAN_FILE, CURVE_FILE
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.ladder_trainings")
+    parser.add_argument("out", type=Path)
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    parser.add_argument("--keep", type=Path)
+    options = parser.parse_args()
+    for name in options.names or NAMES:
+        algo, level, seed = NAMES[name]
+        folder = options.out / name
+        plan = make_set_plan(level, algo, seed=seed)
+        points = train(plan, folder)
+        best = max(points, key=lambda point: point.worth)
+        print(name, f"{best.steps} steps, reached {best.success_rate:.2f}", flush=True)
+        if options.keep is not None and finished(folder):
+            kept = options.keep / name
+            kept.mkdir(parents=True, exist_ok=True)
+            for file in KEPT:
+                shutil.copyfile(folder / file, kept / file)
+
+
+if __name__ == "__main__":
+    main()
