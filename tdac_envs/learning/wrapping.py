@@ -12,10 +12,6 @@ from tdac_envs.learning.wrappers import Env, wrap
 
 FOR_RL = ("goal-relative", "guidance", "flatten")
 """The wrappers of `tdac train` on tasks, innermost first."""
-FOR_SETS = ("goal-relative", "flatten")
-"""Those on task sets, where a policy has its sensors alone."""
-WITH_MAP = ("goal-relative", "map-view", "flatten")
-"""Those on task sets that give the map."""
 
 
 @overload
@@ -49,15 +45,15 @@ def wrap_for_rl(
 
     Guidance is computed from the whole map; `names=("goal-relative", "flatten")` omits
     it, for policies that use only sensors and the goal. On a task set
-    (`TDAC-Ladder-v0`) there is no guidance. By default, a set that gives the map adds
-    the view of it; where the robot has no pose, the goal is relative to the pose that
-    its odometry adds up to. Rewards,
+    (`TDAC-Ladder-v0`) there is no guidance. There, ranges are closeness by default, and
+    a set that gives the map adds the view of it; where the robot has no pose, the goal
+    is relative to the pose that its odometry adds up to. Rewards,
     actions and the ends of episodes do not change. `tdac train` uses this function.
 
     Args:
         env: An environment, single or batched, with its original observations.
         names: Names in `tdac_envs.wrappers.WRAPPERS`, innermost first. By default
-            `FOR_RL`; on a task set `FOR_SETS`, or `WITH_MAP` if it gives the map.
+            those of `default_wrappers`.
 
     Raises:
         TaskError: `env` is not from `tdac_envs`, a name is unknown, or a
@@ -71,10 +67,18 @@ def wrap_for_rl(
 
 
 def default_wrappers(env: Env | VectorEnv[Any, Any, Any]) -> tuple[str, ...]:
-    """The names that `wrap_for_rl` chooses for an environment, single or batched."""
+    """The names that `wrap_for_rl` chooses for an environment, single or batched.
+
+    Returns:
+        `FOR_RL`; on a task set `goal-relative` and `flatten`, with `closeness` if the
+        robot has ranges, and with `map-view` if it is given the map.
+    """
     plain: Any = env.unwrapped
     setups = getattr(plain, "setups", None) or [getattr(plain, "setup", None)]
     source = getattr(setups[0], "source", None)
     if source is None:
         return FOR_RL
-    return WITH_MAP if source.gives_map else FOR_SETS
+    seen: Any = getattr(env, "single_observation_space", env.observation_space)
+    ranges = ("closeness",) if "ranges" in seen.spaces else ()
+    view = ("map-view",) if source.gives_map else ()
+    return "goal-relative", *ranges, *view, "flatten"

@@ -39,12 +39,12 @@ LOST = {
     "disturbances": {"odometry_scale": 0.05, "odometry_noise": 0.05, "delay": 1},
 }
 MAP = {"map": True, "frame": "map"}
-CLOSE = ("goal-relative", "closeness", "flatten")
+SHARES = ("goal-relative", "flatten")
 
 
 @pytest.mark.parametrize("level", LEVELS)
 def test_the_default_is_sensors_alone(level):
-    """Flat, scaled, without guidance; the same space for one robot and for many."""
+    """Flat, closeness, no guidance; the same space for one robot and for many."""
     env = wrap_for_rl(gym.make(LADDER, level=level, split="dev"))
     rays = env.unwrapped.observation_space["ranges"].shape[0]
     assert env.observation_space.shape == (SIZE + rays,)
@@ -54,14 +54,14 @@ def test_the_default_is_sensors_alone(level):
     assert seen in env.observation_space
     plain, _ = env.unwrapped.reset(options={"index": 1})
     assert np.array_equal(seen[-2:], plain["wheel_speeds"])
-    assert np.allclose(seen[3:-2], plain["ranges"] / env.unwrapped.task.robot.range_max)
+    assert np.allclose(seen[3:-2], env.unwrapped.task.body_radius / plain["ranges"])
     batch.close()
 
 
 @pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
 @pytest.mark.parametrize(
     ("values", "names"),
-    [({}, None), (LOST, None), (MAP, None), ({}, CLOSE)],
+    [({}, None), (LOST, None), (MAP, None), ({}, SHARES)],
 )
 def test_a_batch_tells_what_single_environments_tell(few, mode, values, names):
     """To the last bit, also at the ends of episodes and after them."""
@@ -158,9 +158,12 @@ def test_a_view_of_a_map_needs_a_map(few):
         wrap_for_rl(gym.make(LADDER, level="known"), ["flatten", "map-view"])
 
 
+CLOSE = ("goal-relative", "closeness")
+
+
 def test_closeness_is_one_at_contact():
     """Body radius / distance; it needs ranges that are shares of the largest."""
-    env = wrap_for_rl(gym.make(LADDER, level="unknown", split="dev"), CLOSE[:2])
+    env = wrap_for_rl(gym.make(LADDER, level="unknown", split="dev"), CLOSE)
     seen, _ = env.reset(options={"index": 0})
     plain, _ = env.unwrapped.reset(options={"index": 0})
     radius = env.unwrapped.task.body_radius
