@@ -144,16 +144,28 @@ def folder_of(place: Path, name: str, sha256: str) -> Path:
     return place / name / sha256[:16]
 
 
+def place_of(arena: Arena, tasks: TaskSet, member: Member) -> Path:
+    """Folder of what a file does on a set in this arena."""
+    place = SEALED if arena.split == "hidden" else DRIVEN
+    return folder_of(arena.out / place, tasks.name, member.sha256)
+
+
+def is_driven(arena: Arena, tasks: TaskSet, member: Member) -> bool:
+    """Whether a file has driven on all worlds of a set."""
+    return _kept(arena, tasks, member) is not None
+
+
+def _kept(arena: Arena, tasks: TaskSet, member: Member) -> SetReport | None:
+    folder, own = place_of(arena, tasks, member), (member.sha256, tasks.sha256)
+    return kept_report(folder, *own, arena.split, arena.count, arena.salt_sha256)
+
+
 def _report(
     arena: Arena, part: Part, member: Member
 ) -> tuple[SetReport, tuple[WorldEpisode, ...]]:
     """The report of a file, and its episodes."""
-    tasks, split, count = part.tasks, arena.split, arena.count
-    place = SEALED if split == "hidden" else DRIVEN
-    folder = folder_of(arena.out / place, tasks.name, member.sha256)
-    report = kept_report(
-        folder, member.sha256, tasks.sha256, split, count, arena.salt_sha256
-    )
+    tasks, folder = part.tasks, place_of(arena, part.tasks, member)
+    report = _kept(arena, tasks, member)
     if report is None:
 
         def watch(episodes: int, successes: int) -> None:
@@ -162,8 +174,8 @@ def _report(
 
         watch(0, 0)
         folder.mkdir(parents=True, exist_ok=True)
-        worlds = Worlds(tasks, split, count, arena.salt_file, arena.tier)
-        report = drive(member, worlds, folder, arena.judge, watch)
+        own = tasks, arena.split, arena.count, arena.salt_file, arena.tier
+        report = drive(member, Worlds(*own), folder, arena.judge, watch)
     if report.episodes or report.refused:
         return report, report.episodes
     return report, sealed_episodes(folder, member.sha256)

@@ -21,11 +21,13 @@ from tdac_agent.bench.arena import (
 from tdac_agent.bench.compared import overall_of, pairs_of
 from tdac_agent.bench.entrants import named
 from tdac_agent.bench.figures import draw_figures
+from tdac_agent.bench.jobs import Drive, drive_all, drives_of
 from tdac_agent.bench.page import write_page
 from tdac_agent.bench.record import Bench, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.salt import SEALED, drawn_salt
 from tdac_agent.evaluation.set_verify import MOST_EPISODES
+from tdac_agent.executors.executor import Executor
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.provenance import versions
@@ -54,6 +56,8 @@ def bench(
     tier: str = "auto",
     judge: WarmJudge | None = None,
     watch: Watch | None = None,
+    executor: Executor[str, Drive] | None = None,
+    workers: int = 1,
 ) -> Bench:
     """Drives entrants on the first worlds of a split of each set.
 
@@ -73,6 +77,9 @@ def bench(
         tier: Sandbox tier.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with set, entrant, episodes and successes so far.
+        executor: Distributes the files, each on each set, over `workers` processes. By
+            default they drive one after another, each on all cores.
+        workers: Number of processes of the executor.
 
     Raises:
         TaskError: An argument is not valid.
@@ -82,6 +89,7 @@ def bench(
     """
     one_of("split", split, SPLITS)
     whole_number("worlds", worlds, 1, MOST_EPISODES)
+    whole_number("workers", workers, 1)
     if salt_file is not None and split != "hidden":
         raise TaskError("a salt file needs the split hidden")
     wanted, tasks = named(entrants), [load_set(name) for name in sets]
@@ -97,6 +105,10 @@ def bench(
             (out / SEALED).mkdir(0o700, exist_ok=True)
         warm = judge or stack.enter_context(WarmJudge())
         arena = Arena(split, worlds, salt_file, tier, out, warm, watch)
+        if executor is not None:
+            given = [name for name in sets for _ in wanted]
+            drives = drives_of(arena, list(zip(given, parts, strict=True)))
+            drive_all(arena, drives, executor, workers)
         rows = [row_of(arena, part) for part in parts]
         found = Bench(
             versions=dict(versions()),

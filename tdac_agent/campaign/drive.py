@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tdac_agent.campaign.config import CampaignError
-from tdac_agent.campaign.executor import Ended, Executor, Update
-from tdac_agent.campaign.perform import RUNS, Outcome, Terms, read_outcome
+from tdac_agent.campaign.perform import RUNS, Outcome, Terms, read_outcome, work_of
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
-from tdac_agent.campaign.progress import Progress
+from tdac_agent.campaign.progress import Progress, RunEnded, RunUpdate
+from tdac_agent.executors.executor import Ended, Executor
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.locks import hold
 
 CONFIG_FILE = "campaign.yaml"
-Watch = Callable[[Update], None]
+Watch = Callable[[RunUpdate], None]
 
 
 @dataclass(slots=True)
@@ -41,12 +41,12 @@ class _Queue:
         self.progress.take_back(planned, outcome)
         return planned
 
-    def ended(self, update: Ended) -> None:
+    def ended(self, update: RunEnded) -> None:
         """Queues a run for a retry when a fault ends it for the first time."""
-        name = update.planned.name
+        name = update.job.name
         if update.outcome.status == "fault" and name not in self._retried:
             self._retried.add(name)
-            self.retries.append((update.planned, update.outcome))
+            self.retries.append((update.job, update.outcome))
 
 
 def read_progress(
@@ -67,7 +67,7 @@ def run_all(
     progress: Progress,
     left: list[PlannedRun],
     terms: Terms,
-    run: Executor,
+    run: Executor[Outcome, PlannedRun],
     watch: Watch,
 ) -> None:
     """Executes the runs that are left; a run that fails does not stop the others.
@@ -82,7 +82,7 @@ def run_all(
         watch: Called with each update, after `progress` is updated.
     """
     queue = _Queue(progress, deque(left))
-    with closing(run(terms, queue.next)) as updates:
+    with closing(run(work_of(terms), queue.next)) as updates:
         for update in updates:
             progress.update(update)
             if isinstance(update, Ended):

@@ -14,6 +14,7 @@ from typing import Any
 from tdac_agent.campaign.gate import gated
 from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.errors import Fault
+from tdac_agent.executors.executor import Work
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.retry import RetryPolicy
@@ -29,6 +30,8 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 PATIENCE = RetryPolicy(seconds=4 * 3600.0)
 """Longer than for a single run, since no user is waiting."""
+REPORTED_EVENTS = frozenset({"call.intent", "call.fault", "verify.start"})
+REPORTED_KEYS = ("event", "kind", "k", "j", "fault")
 RUNS = "runs"
 """Folder of the runs, inside the campaign folder."""
 KEPT = frozenset({RUN_FILE, JOURNAL, TASK_FILE, "controller.py", "report.json"})
@@ -126,6 +129,31 @@ def perform(
     if terms.keep == "records" and run.finished:
         _thin_out(run.folder)
     return _outcome(planned.name, run)
+
+
+def perform_job(
+    job: str, terms: dict[str, Any], judge: WarmJudge, tell: Tell
+) -> dict[str, Any]:
+    """Executes a run for an executor; see `executors.executor.Work`."""
+
+    def report(record: dict[str, Any]) -> None:
+        if record.get("event") in REPORTED_EVENTS:
+            tell({name: record[name] for name in REPORTED_KEYS if name in record})
+
+    planned = PlannedRun.from_json(job)
+    return perform(planned, Terms(**terms), judge, report).to_json()
+
+
+def work_of(terms: Terms) -> Work[Outcome]:
+    """The runs of a campaign as work for an executor."""
+    return Work(
+        module=__name__,
+        terms=asdict(terms),
+        workers=terms.workers,
+        folder=Path(terms.folder),
+        read=lambda found: Outcome(**found),
+        failed=lambda name, reason: Outcome(name, "error", reason),
+    )
 
 
 def _synthesize(

@@ -7,10 +7,12 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from tdac_agent.campaign.executor import Begun, Died, Ended, RecordReported, Update
 from tdac_agent.campaign.perform import Outcome
 from tdac_agent.campaign.plan import Cell, Plan, PlannedRun, Shard
+from tdac_agent.executors.executor import Begun, Died, Ended, Reported, Update
 
+RunEnded = Ended[PlannedRun, Outcome]
+RunUpdate = Update[PlannedRun, Outcome]
 REASONS = 50
 """Number of different reasons that are counted separately."""
 
@@ -132,13 +134,13 @@ class Progress:
         self.tallies[planned.cell.folder].add(outcome, -1)
         self.problems -= Counter([_problem(outcome)])
 
-    def update(self, update: Update) -> None:
+    def update(self, update: RunUpdate) -> None:
         """Applies an update of an executor."""
-        name = update.planned.name
+        name = update.job.name
         match update:
             case Begun():
-                self.doing[name] = Doing(update.planned, time.monotonic())
-            case RecordReported() if name in self.doing:
+                self.doing[name] = Doing(update.job, time.monotonic())
+            case Reported() if name in self.doing:
                 self.doing[name].said = _activity(update.record)
             case Died():
                 self.deaths += 1
@@ -147,9 +149,9 @@ class Progress:
                 self.doing.pop(name, None)
                 self._ended(update)
 
-    def _ended(self, update: Ended) -> None:
+    def _ended(self, update: RunEnded) -> None:
         outcome = update.outcome
-        self.tallies[update.planned.cell.folder].add(outcome)
+        self.tallies[update.job.cell.folder].add(outcome)
         self.now += outcome.finished
         self.exhausted |= outcome.status == "budget"
         if not outcome.finished:

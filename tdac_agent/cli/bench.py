@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections.abc import Sequence
@@ -21,9 +22,11 @@ from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.synth import next_folder
+from tdac_agent.executors.executor import executor_of
 from tdac_agent.metrics.paired import LEAST_P
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.errors import TaskError
 
 NONE = "–"
 # Widest name of an entrant, so that a table fits into 80 columns.
@@ -45,10 +48,14 @@ def run(
     out: Path | None,
     salt_file: Path | None,
     tier: str,
+    executor: str | None,
+    workers: int | None,
     as_json: bool,
 ) -> int:
     """Drives the entrants and prints the results; returns the exit code."""
     check_tier(tier)
+    if workers is not None and executor is None:
+        raise TaskError("--workers needs --executor local or --executor ray")
     folder = out or next_folder("bench")
     console = Console(stderr=as_json)
     bar = policy_bar(console)
@@ -71,6 +78,8 @@ def run(
             tier=tier,
             judge=judge,
             watch=watch,
+            executor=None if executor is None else executor_of(executor),
+            workers=workers or len(os.sched_getaffinity(0)),
         )
     if as_json:
         sys.stdout.write(found.model_dump_json(indent=2) + "\n")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated, Literal, Optional
 
 import typer
 
 from tdac_agent.cli.options import Json, Tier, dir_flag, file_flag, number_flag
 
+ExecutorName = Literal["local", "ray"]
 bench_app = typer.Typer(
     help="Drive programs and learned policies on the same unseen worlds.",
     no_args_is_help=True,
@@ -65,6 +66,22 @@ def run_command(
         ),
     ] = None,
     tier: Tier = "auto",
+    executor: Annotated[
+        Optional[ExecutorName],  # noqa: UP045
+        typer.Option(
+            help="Drive several files at a time: in processes of this machine (local), "
+            "or on the Ray cluster in RAY_ADDRESS, which shares the folder (ray).  "
+            "[default: one after another, each on all cores]",
+        ),
+    ] = None,
+    workers: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            "--workers",
+            min=1,
+            help="Files at a time with --executor.  [default: one per core]",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Drive entrants on the same worlds of task sets, and compare them.
@@ -74,8 +91,9 @@ def run_command(
     """
     from tdac_agent.cli import bench
 
+    spread = executor, workers
     raise typer.Exit(
-        bench.run(entrants, sets, split, worlds, out, salt_file, tier, as_json)
+        bench.run(entrants, sets, split, worlds, out, salt_file, tier, *spread, as_json)
     )
 
 

@@ -20,7 +20,6 @@ from tdac_agent.campaign.drive import (
     run_all,
     unplanned_folders,
 )
-from tdac_agent.campaign.executor import Executor
 from tdac_agent.campaign.perform import Terms
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
 from tdac_agent.campaign.progress import Progress
@@ -28,6 +27,7 @@ from tdac_agent.cli.campaign_live import LiveView
 from tdac_agent.cli.campaign_table import make_console, progress_line
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.executors.executor import executor_of
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.provider import Provider
@@ -154,17 +154,7 @@ def _run_remaining(
     console: Console,
 ) -> None:
     with LiveView(console, progress, terms) as view:
-        run_all(progress, remaining, terms, _executor(executor), view.saw)
-
-
-def _executor(name: str) -> Executor:
-    if name == "ray":
-        from tdac_agent.campaign.on_ray import run_on_ray
-
-        return run_on_ray
-    from tdac_agent.campaign.local import run_locally
-
-    return run_locally
+        run_all(progress, remaining, terms, executor_of(executor), view.saw)
 
 
 def _print_heading(

@@ -12,9 +12,8 @@ from rich.padding import Padding
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from tdac_agent.campaign.executor import Died, Ended, Update
 from tdac_agent.campaign.perform import Outcome, Terms
-from tdac_agent.campaign.progress import Doing, Progress, Tally
+from tdac_agent.campaign.progress import Doing, Progress, RunUpdate, Tally
 from tdac_agent.cli.campaign_table import (
     COLOURS,
     format_duration,
@@ -24,6 +23,7 @@ from tdac_agent.cli.campaign_table import (
 )
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.executors.executor import Died, Ended
 
 FRAME_LINES = 10
 """Screen lines outside the rows of the table."""
@@ -56,11 +56,11 @@ class LiveView:
         if self._console.is_terminal:
             self._live.stop()
 
-    def saw(self, update: Update) -> None:
+    def saw(self, update: RunUpdate) -> None:
         """Prints the lines that stay on the screen."""
         match update:
             case Died():
-                death = f"the process of {update.planned.name} died: {update.reason}"
+                death = f"the process of {update.job.name} died: {update.reason}"
                 print_sentences(
                     self._console, f"{death}; a new one continues its run", "yellow"
                 )

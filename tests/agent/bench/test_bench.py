@@ -3,6 +3,7 @@
 import json
 import re
 import stat
+from importlib.util import find_spec
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,13 +13,14 @@ import yaml
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
-from tdac_agent.bench.bench import bench
+from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, bench
 from tdac_agent.bench.compared import Driven
 from tdac_agent.bench.page import MOST_WORLDS
 from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, reveal
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.executors.executor import executor_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
@@ -190,6 +192,39 @@ def test_folders_together(judge, tmp_path, level, files):
     bench(files[1:2], [level], worlds=3, out=tmp_path / "3", **given)
     with pytest.raises(RunError, match="'few' differs in the version"):
         merged([tmp_path / "0", tmp_path / "3"])
+
+
+def test_processes_of_an_executor(tdac, judge, tmp_path, level, files, monkeypatch):
+    """The same bytes as one after another; a broken file is a row here, too."""
+    monkeypatch.chdir(tmp_path)
+    words = ["builtin", *files, "lost.zip"]
+    (tmp_path / "lost.zip").write_bytes(b"")
+    bench(words, [level], worlds=2, out=tmp_path / "alone", judge=judge)
+    given = ("--set", str(level), "-n", "2", "--out", str(tmp_path / "spread"))
+    spread = ("--executor", "local", "--workers", "2")
+    code, out, err = tdac("bench", *words, *given, *spread)
+    assert code == 0, err
+    assert "lost.zip" in out
+    for name in (RESULTS, WORLD_TABLE):
+        one, other = (tmp_path / part / name for part in ("alone", "spread"))
+        assert one.read_bytes() == other.read_bytes()
+    code, _, err = tdac("bench", "builtin", *given, "--workers", "2")
+    assert code == 2
+    assert "--workers needs --executor" in err
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
+def test_a_ray_cluster(judge, tmp_path, level, files):
+    """As without one."""
+    found = [
+        bench(["builtin", *files], [level], worlds=2, out=tmp_path / name, **spread)
+        for name, spread in (
+            ("alone", {"judge": judge}),
+            ("ray", {"executor": executor_of("ray"), "workers": 2}),
+        )
+    ]
+    assert found[0] == found[1]
 
 
 def test_seeds_of_a_training(judge, tmp_path, level, files):

@@ -5,8 +5,8 @@ import stat
 
 import pytest
 
-from tdac_agent.campaign.cores import core_locks, own_core
 from tdac_agent.errors import Fault
+from tdac_agent.executors.cores import core_locks, own_core
 
 NAME = f"tdac-cores-{os.geteuid()}"
 

@@ -4,10 +4,10 @@ import pytest
 
 from tdac_agent.campaign.config import CampaignError
 from tdac_agent.campaign.drive import campaign_folder, run_all
-from tdac_agent.campaign.executor import MOST_DEATHS, Begun, Died, Ended, RetryQueue
-from tdac_agent.campaign.perform import Outcome, Terms
+from tdac_agent.campaign.perform import Outcome, Terms, work_of
 from tdac_agent.campaign.plan import WHOLE, Cell, Plan
 from tdac_agent.campaign.progress import Progress
+from tdac_agent.executors.executor import MOST_DEATHS, Begun, Died, Ended, RetryQueue
 
 TERMS = Terms("none", 1, None, None, "all")
 
@@ -28,7 +28,7 @@ def carried_out(plan, come_of):
     """
     made = []
 
-    def run(terms, next_run):
+    def run(work, next_run):
         while (planned := next_run()) is not None:
             made.append(planned.name)
             yield Begun(planned)
@@ -82,7 +82,7 @@ def test_an_exhausted_budget_stops_what_may_cost_and_nothing_else():
 def test_a_run_whose_processes_die_is_given_up_at_last():
     """It comes before all others, and is told after so many deaths."""
     runs = list(plan_of("builtin").all())
-    bereaved = RetryQueue(iter(runs[1:]).__next__)
+    bereaved = RetryQueue(work_of(TERMS), iter(runs[1:]).__next__)
     for _ in range(MOST_DEATHS - 1):
         assert bereaved.died(runs[0], "why") == Died(runs[0], "why")
         assert bereaved.next() == runs[0]

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 import pytest
 from killing import check_same_in_the_end, ray_workers
 
-from tdac_agent.campaign.on_ray import _start
+from tdac_agent.executors.on_ray import _start
 
 ray = pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
 

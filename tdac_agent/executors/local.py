@@ -11,38 +11,39 @@ import sys
 import time
 from collections.abc import Generator, Iterator
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import IO, Any
 
-from tdac_agent.campaign.cores import core_locks
-from tdac_agent.campaign.executor import (
+from tdac_agent.executors.cores import core_locks
+from tdac_agent.executors.executor import (
     Begun,
     Ended,
+    J,
+    Job,
     Next,
-    RecordReported,
+    O,
+    Reported,
     RetryQueue,
     Update,
+    Work,
 )
-from tdac_agent.campaign.perform import Outcome, Terms
-from tdac_agent.campaign.plan import PlannedRun
 
 ERRORS = "errors.log"
 EXIT_SECONDS = 15.0
 """Time for interrupted workers to save their progress."""
-MOST_RUNS = 500
-"""Maximum number of runs of one process, in case its memory grows."""
+MOST_JOBS = 500
+"""Maximum number of jobs of one process, in case its memory grows."""
 CHUNK = 1 << 16
 ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "VECLIB_MAXIMUM")
 
 
 @dataclass(slots=True, eq=False)
 class _Worker:
-    """A worker process, and its current run."""
+    """A worker process, and its current job."""
 
     process: subprocess.Popen[bytes]
-    planned: PlannedRun | None = None
-    runs: int = 0
+    job: Any = None
+    jobs: int = 0
     reported_death: str = ""
     _partial: bytes = b""
 
@@ -51,13 +52,13 @@ class _Worker:
         assert self.process.stdout is not None
         return self.process.stdout
 
-    def begin(self, planned: PlannedRun) -> None:
-        """Sends a run; a dead process is noticed when its answers are read."""
+    def begin(self, job: Job) -> None:
+        """Sends a job; a dead process is noticed when its answers are read."""
         assert self.process.stdin is not None
-        self.planned = planned
-        self.runs += 1
+        self.job = job
+        self.jobs += 1
         with suppress(BrokenPipeError):
-            self.process.stdin.write(planned.to_json().encode() + b"\n")
+            self.process.stdin.write(job.to_json().encode() + b"\n")
             self.process.stdin.flush()
 
     def messages(self) -> list[dict[str, Any]] | None:
@@ -87,9 +88,9 @@ class _Worker:
 
 @dataclass(slots=True)
 class _Pool:
-    """The workers of a campaign."""
+    """All workers."""
 
-    terms: Terms
+    work: Work[Any]
     errors: IO[bytes]
     selector: selectors.BaseSelector = field(default_factory=selectors.DefaultSelector)
 
@@ -99,16 +100,16 @@ class _Pool:
 
     @property
     def busy(self) -> list[_Worker]:
-        return [worker for worker in self.workers if worker.planned is not None]
+        return [worker for worker in self.workers if worker.job is not None]
 
     def idle(self) -> _Worker | None:
         """An idle worker, or a new one; None if all workers are busy."""
         for worker in self.workers:
-            if worker.planned is None and worker.runs < MOST_RUNS:
+            if worker.job is None and worker.jobs < MOST_JOBS:
                 return worker
-            if worker.planned is None:
+            if worker.job is None:
                 self.dismiss(worker)
-        if len(self.workers) < self.terms.workers:
+        if len(self.workers) < self.work.workers:
             return self._start()
         return None
 
@@ -117,9 +118,9 @@ class _Pool:
         worker.end()
 
     def _start(self) -> _Worker:
-        arguments = [str(os.getpid()), json.dumps(asdict(self.terms))]
+        arguments = [str(os.getpid()), self.work.module, json.dumps(self.work.terms)]
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tdac_agent.campaign.worker", *arguments],
+            [sys.executable, "-P", "-m", "tdac_agent.executors.worker", *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self.errors,
@@ -137,7 +138,7 @@ class _Pool:
             worker.process.send_signal(signal.SIGINT)
         deadline = time.monotonic() + EXIT_SECONDS
         for worker in self.workers:
-            if worker.planned is not None:
+            if worker.job is not None:
                 with suppress(subprocess.TimeoutExpired):
                     worker.process.wait(max(0.0, deadline - time.monotonic()))
                 worker.process.kill()
@@ -145,56 +146,58 @@ class _Pool:
         self.selector.close()
 
 
-def run_locally(terms: Terms, next_run: Next) -> Generator[Update]:
-    """Executes runs in worker processes, `terms.workers` at a time.
+def run_locally(work: Work[O], next_job: Next[J]) -> Generator[Update[J, O]]:
+    """Executes jobs in worker processes, `work.workers` at a time.
 
     Args:
-        terms: Settings that all runs share.
-        next_run: Returns the next run.
+        work: What all jobs have in common.
+        next_job: Returns the next job.
 
     Raises:
         Fault: There is no private folder for the core locks.
     """
     core_locks()  # fails here once instead of in every worker
-    runs = RetryQueue(next_run)
-    with (Path(terms.folder) / ERRORS).open("ab") as errors:
-        pool = _Pool(terms, errors)
+    jobs = RetryQueue(work, next_job)
+    with (work.folder / ERRORS).open("ab") as errors:
+        pool = _Pool(work, errors)
         try:
-            yield from _hand_out(pool, runs)
+            yield from _hand_out(pool, jobs)
             while pool.busy:
                 for key, _ in pool.selector.select():
-                    yield from _receive(pool, key.data, runs)
-                yield from _hand_out(pool, runs)
+                    yield from _receive(pool, key.data, jobs)
+                yield from _hand_out(pool, jobs)
         finally:
             pool.close()
 
 
-def _hand_out(pool: _Pool, runs: RetryQueue) -> Iterator[Update]:
-    """Gives each idle worker a run, while there are runs."""
-    while len(pool.busy) < pool.terms.workers:
-        planned = runs.next()
-        worker = None if planned is None else pool.idle()
-        if planned is None or worker is None:
+def _hand_out(pool: _Pool, jobs: RetryQueue[J, O]) -> Iterator[Update[J, O]]:
+    """Gives each idle worker a job, while there are jobs."""
+    while len(pool.busy) < pool.work.workers:
+        job = jobs.next()
+        worker = None if job is None else pool.idle()
+        if job is None or worker is None:
             return
-        worker.begin(planned)
-        yield Begun(planned)
+        worker.begin(job)
+        yield Begun(job)
 
 
-def _receive(pool: _Pool, worker: _Worker, runs: RetryQueue) -> Iterator[Update]:
+def _receive(
+    pool: _Pool, worker: _Worker, jobs: RetryQueue[J, O]
+) -> Iterator[Update[J, O]]:
     """The updates in a worker's messages, or its death."""
-    planned, messages = worker.planned, worker.messages()
+    job, messages = worker.job, worker.messages()
     if messages is None:
         pool.dismiss(worker)
-        if planned is not None:
-            yield runs.died(planned, worker.death)
+        if job is not None:
+            yield jobs.died(job, worker.death)
         return
     for message in messages:
         if "death" in message:
             worker.reported_death = message["death"]
             continue
-        assert planned is not None
+        assert job is not None
         if "outcome" in message:
-            worker.planned = None
-            yield Ended(planned, Outcome(**message["outcome"]))
+            worker.job = None
+            yield Ended(job, jobs.work.read(message["outcome"]))
         else:
-            yield RecordReported(planned, message["record"])
+            yield Reported(job, message["record"])

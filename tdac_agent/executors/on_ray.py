@@ -1,7 +1,7 @@
 """The executor `ray`: tasks on an existing Ray cluster, or on a new local one.
 
-All machines must share the campaign folder under the same path, and the environment of
-Ray's processes must have the API keys.
+All machines must share the folder of the jobs under the same path, and Ray's processes
+must have the API keys in their environment.
 """
 
 from __future__ import annotations
@@ -9,13 +9,21 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Generator
+from importlib import import_module
 from typing import Any
 
-from tdac_agent.campaign.cores import own_core
-from tdac_agent.campaign.executor import Begun, Ended, Next, RetryQueue, Update
-from tdac_agent.campaign.perform import Outcome, Terms, perform
-from tdac_agent.campaign.plan import PlannedRun
 from tdac_agent.errors import Fault, ProviderError
+from tdac_agent.executors.cores import own_core
+from tdac_agent.executors.executor import (
+    Begun,
+    Ended,
+    J,
+    Next,
+    O,
+    RetryQueue,
+    Update,
+    Work,
+)
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.extras import install_command
 
@@ -24,59 +32,63 @@ STORE_BYTES = 96 << 20
 WAIT_SECONDS = 1.0
 
 
-def run_on_ray(terms: Terms, next_run: Next) -> Generator[Update]:
-    """Executes runs as Ray tasks of one CPU each, `terms.workers` at a time.
+def run_on_ray(work: Work[O], next_job: Next[J]) -> Generator[Update[J, O]]:
+    """Executes jobs as Ray tasks of one CPU each, `work.workers` at a time.
 
     Args:
-        terms: Settings that all runs share.
-        next_run: Returns the next run.
+        work: What all jobs have in common.
+        next_job: Returns the next job.
 
     Raises:
         ProviderError: Ray is not installed.
         Fault: Ray does not start, or cannot be reached.
     """
-    ray = _start(terms.workers)
+    ray = _start(work.workers)
     # No retries by Ray: `RetryQueue` repeats a task whose process has died.
     task = ray.remote(num_cpus=1, max_retries=0)(_in_task)
-    runs = RetryQueue(next_run)
-    pending: dict[Any, PlannedRun] = {}
+    jobs = RetryQueue(work, next_job)
+    pending: dict[Any, J] = {}
     try:
         while True:
-            while len(pending) < terms.workers:
-                planned = runs.next()
-                if planned is None:
+            while len(pending) < work.workers:
+                job = jobs.next()
+                if job is None:
                     break
-                pending[task.remote(planned, terms)] = planned
-                yield Begun(planned)
+                pending[task.remote(job.to_json(), work.module, work.terms)] = job
+                yield Begun(job)
             if not pending:
                 return
             done, _ = ray.wait(list(pending), timeout=WAIT_SECONDS)
             for reference in done:
-                yield _update(ray, reference, pending.pop(reference), runs)
+                yield _update(ray, reference, pending.pop(reference), jobs)
     finally:
         for reference in pending:
             ray.cancel(reference, force=True)
         ray.shutdown()
 
 
-def _update(ray: Any, reference: Any, planned: PlannedRun, runs: RetryQueue) -> Update:
+def _update(ray: Any, reference: Any, job: J, jobs: RetryQueue[J, O]) -> Update[J, O]:
     try:
-        outcome: Outcome = ray.get(reference)
+        outcome, problem = ray.get(reference)
     except ray.exceptions.WorkerCrashedError as error:
-        return runs.died(planned, " ".join(str(error).split())[:300])
+        return jobs.died(job, " ".join(str(error).split())[:300])
     except ray.exceptions.RayError as error:
-        reason = " ".join(str(error).split())[:300]
-        return Ended(planned, Outcome(planned.name, "error", reason))
-    return Ended(planned, outcome)
+        outcome, problem = None, " ".join(str(error).split())[:300]
+    if outcome is None:
+        return Ended(job, jobs.work.failed(job.name, problem))
+    return Ended(job, jobs.work.read(outcome))
 
 
-def _in_task(planned: PlannedRun, terms: Terms) -> Outcome:
-    """Executes one run, in a process of Ray."""
+def _in_task(
+    job: str, module: str, terms: dict[str, Any]
+) -> tuple[dict[str, Any] | None, str]:
+    """Executes one job in a process of Ray; the outcome, or why there is none."""
     try:
+        perform_job = import_module(module).perform_job
         with own_core() as turn, WarmJudge(turn=turn) as judge:
-            return perform(planned, terms, judge)
+            return perform_job(job, terms, judge, lambda _: None), ""
     except Fault as fault:
-        return Outcome(planned.name, "error", str(fault))
+        return None, str(fault)
 
 
 def _start(workers: int) -> Any:

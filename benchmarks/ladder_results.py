@@ -1,0 +1,146 @@
+"""Drives everything that `results/ladder/arena` shows, and draws its figures.
+
+    python -m benchmarks.ladder_results drive OUT [--levels L...] [--kinds K...]
+                                        [--split test] [-n 100] [--salt-file F]
+    python -m benchmarks.ladder_results show RESULTS OUT
+
+`drive` benches the entrants of each kind on each level, in OUT/KIND-LEVEL:
+
+- `programs`: `builtin` and the classical planners,
+- `answers`: the recorded first answers of `results/ladder/genuine`, as one entrant. Its
+  files are resampled like the seeds of a training: no best answer is chosen,
+- `learned`: the policies of `results/ladder/learned`, with all their seeds.
+
+After an interruption the same command goes on. `show` puts folders of such folders
+together and writes `scores.svg`, the other figures, and `table.md`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+
+from tdac_agent.bench.bench import WORLD_TABLE, bench
+from tdac_agent.bench.figures import draw_figures
+from tdac_agent.bench.record import Bench, BenchRow, Interval
+from tdac_agent.bench.rivals import levels_of, rival_names
+from tdac_agent.bench.shown import merged
+from tdac_agent.prompting.extract import extract_source
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.ladder.set_file import set_names
+
+RESULTS = Path(__file__).parents[1] / "results" / "ladder"
+KINDS = "programs", "answers", "learned"
+ANSWERS = "first-answers"
+
+
+def entrants(kind: str, level: str, out: Path) -> list[str]:
+    """The words of `tdac bench` for the entrants of a kind."""
+    if kind == "programs":
+        rivals = [name for name in rival_names() if level in levels_of(name)]
+        return ["builtin", *rivals]
+    if kind == "answers":
+        files = [str(file) for file in _answers(level, out / "answers" / level)]
+        return [f"{ANSWERS}={','.join(files)}"] if files else []
+    found = []
+    for algo in ("ppo", "recurrent-ppo"):
+        folders = sorted((RESULTS / "learned").glob(f"{algo}-{level}-*"))
+        files = [str(folder / "policy.zip") for folder in folders]
+        found += [f"{algo}={','.join(files)}"] if files else []
+    return found
+
+
+def _answers(level: str, folder: Path) -> Iterator[Path]:
+    """The files in the recorded first answers of a level."""
+    for reply in sorted((RESULTS / "genuine" / level).glob("*/reply.md")):
+        source = extract_source(reply.read_text(encoding="utf-8"))
+        if source is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            file = folder / f"{reply.parent.name}.py"
+            file.write_text(source, encoding="utf-8")
+            yield file
+
+
+def drive(options: argparse.Namespace) -> None:
+    """Benches all kinds of entrants on all levels."""
+    with WarmJudge() as judge:
+        for level in options.levels or set_names():
+            for kind in options.kinds or KINDS:
+                words = entrants(kind, level, options.out)
+                if not words:
+                    continue
+                found = bench(
+                    words,
+                    [level],
+                    options.split,
+                    options.n,
+                    out=options.out / f"{kind}-{level}",
+                    salt_file=options.salt_file,
+                    judge=judge,
+                )
+                for row in found.rows:
+                    score = row.time.value if row.time else row.problem
+                    print(level, row.entrant, score, flush=True)
+
+
+def show(options: argparse.Namespace) -> None:
+    """Draws the figures of several folders together, and writes their table."""
+    folders = sorted(path.parent for path in options.results.glob("*/bench.json"))
+    found = merged(folders)
+    options.out.mkdir(parents=True, exist_ok=True)
+    table = pd.concat([pd.read_csv(folder / WORLD_TABLE) for folder in folders])
+    draw_figures(found, table, options.out)
+    write_atomic(options.out / "table.md", _table(found))
+
+
+def _table(found: Bench) -> str:
+    """The time score of each entrant on each set, in Markdown."""
+    names = [each.name for each in found.sets]
+    names.sort(key=set_names().index)
+    lines = [
+        f"| entrant | knows | {' | '.join(f'`{name}`' for name in names)} |",
+        f"|---|---|{'---|' * len(names)}",
+    ]
+    for entrant in found.entrants:
+        rows = {row.set: row for row in found.rows if row.entrant == entrant}
+        knows = " or ".join(dict.fromkeys(r.knows for r in rows.values() if r.knows))
+        cells = [_cell(rows[name]) if name in rows else "" for name in names]
+        lines.append(f"| {entrant} | {knows} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(row: BenchRow) -> str:
+    if row.time is None or row.success is None:
+        return row.problem or ""
+    return f"{_interval(row.time)}; {row.success.value:.0%}"
+
+
+def _interval(found: Interval) -> str:
+    return f"{found.value:.3f} ({found.low:.3f} to {found.high:.3f})"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.ladder_results")
+    commands = parser.add_subparsers(required=True)
+    driving = commands.add_parser("drive")
+    driving.add_argument("out", type=Path)
+    driving.add_argument("--levels", nargs="*", choices=set_names())
+    driving.add_argument("--kinds", nargs="*", choices=KINDS)
+    driving.add_argument("--split", default="test")
+    driving.add_argument("-n", type=int, default=100)
+    driving.add_argument("--salt-file", type=Path)
+    driving.set_defaults(run=drive)
+    showing = commands.add_parser("show")
+    showing.add_argument("results", type=Path)
+    showing.add_argument("out", type=Path)
+    showing.set_defaults(run=show)
+    options = parser.parse_args()
+    options.run(options)
+
+
+if __name__ == "__main__":
+    main()
