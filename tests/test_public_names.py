@@ -14,6 +14,7 @@ import tdac_envs
 ROOT = Path(__file__).parents[1]
 MODULES = {
     "tdac_agent",
+    "tdac_agent.bench",
     "tdac_agent.budget",
     "tdac_agent.html_report",
     "tdac_agent.metrics",

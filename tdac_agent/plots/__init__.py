@@ -1,5 +1,6 @@
 """Matplotlib figures of runs and metrics, safe for colour-blind readers."""
 
+from tdac_agent.plots.arena import plot_difficulty, plot_scores
 from tdac_agent.plots.baselines import (
     plot_generalisation,
     plot_learning_curves,
@@ -21,10 +22,12 @@ __all__ = [
     "plot_breakdown",
     "plot_cumulative_panels",
     "plot_cumulative_success",
+    "plot_difficulty",
     "plot_failures",
     "plot_generalisation",
     "plot_learning_curves",
     "plot_preprocessing",
+    "plot_scores",
     "plot_success_by_policy",
     "plot_success_rates",
     "plot_timeline",
