@@ -16,6 +16,9 @@ from tdac_agent.executors.executor import Ended, Executor, Reported, Work
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.ladder.task_sets import load_set
 
+Driven = int | None
+"""Episodes that reached the goal, or None if the file did not drive."""
+
 
 @dataclass(frozen=True, slots=True)
 class Drive:
@@ -68,7 +71,7 @@ def drives_of(
 def drive_all(
     arena: Arena,
     drives: Iterator[Drive],
-    executor: Executor[str, Drive],
+    executor: Executor[Driven, Drive],
     workers: int,
 ) -> None:
     """Executes drives. A problem is not raised here: `row_of` meets it again."""
@@ -84,20 +87,20 @@ def drive_all(
         terms=terms,
         workers=workers,
         folder=arena.out,
-        read=lambda found: str(found["problem"]),
-        failed=lambda _, reason: reason,
+        read=lambda found: found["reached"],
+        failed=lambda *_: None,
     )
     with closing(executor(work, lambda: next(drives, None))) as updates:
         for update in updates:
-            if arena.watch is None:
-                continue
-            job = update.job
-            name = load_set(job.set).name
             if isinstance(update, Reported):
-                done, reached = update.record["episodes"], update.record["successes"]
-                arena.watch(name, job.entrant, done, reached)
-            elif isinstance(update, Ended):
-                arena.watch(name, job.entrant, arena.count, 0)
+                done, reached = update.record["episodes"], update.record["reached"]
+            elif isinstance(update, Ended) and update.outcome is not None:
+                done, reached = arena.count, update.outcome
+            else:
+                continue
+            if arena.watch is not None:
+                name = load_set(update.job.set).name
+                arena.watch(name, update.job.entrant, done, reached)
 
 
 def perform_job(
@@ -119,11 +122,11 @@ def perform_job(
     )
 
     def watch(episodes: int, successes: int) -> None:
-        tell({"episodes": episodes, "successes": successes})
+        tell({"episodes": episodes, "reached": successes})
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        drive(member_of(own.word, tasks), worlds, folder, judge, watch)
-    except ControllerFileError as error:
-        return {"problem": str(error)}
-    return {"problem": ""}
+        report = drive(member_of(own.word, tasks), worlds, folder, judge, watch)
+    except ControllerFileError:
+        return {"reached": None}
+    return {"reached": None if report.refused else report.successes}

@@ -57,8 +57,8 @@ def run(
     if workers is not None and executor is None:
         raise TaskError("--workers needs --executor local or --executor ray")
     folder = out or next_folder("bench")
-    console = Console(stderr=as_json)
-    bar = policy_bar(console)
+    console, progress = Console(stderr=as_json), Console(stderr=True)
+    bar = policy_bar(progress)
     row = bar.add_task("", total=worlds, successes=0, doing="preparing")
 
     def watch(name: str, entrant: str, episodes: int, successes: int) -> None:
@@ -66,6 +66,9 @@ def run(
         bar.update(
             row, completed=episodes, successes=successes, doing=doing, refresh=True
         )
+        if episodes == worlds and not progress.is_terminal:
+            line = f"{doing}, {successes} of {worlds} reached"
+            progress.print(line, highlight=False, soft_wrap=True)
 
     with ChildPool() as child_pool, WarmJudge(child_pool) as judge, bar:
         found = bench(

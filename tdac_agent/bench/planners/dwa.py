@@ -53,8 +53,8 @@ MEMORY = 1000.0
 
 SLACK = 0.5
 """By how much the plan may come too near to obstacles, px."""
-THIN = 0.3
-"""Hits nearer than this to known obstacles are not added, px."""
+THIN = 0.3 + 100.0 * PARAMS["disturbances"]["range_noise"]
+"""Hits nearer than this to known obstacles are not added, px; more among noise."""
 CLEAR = 4.0
 """A hit is cleared if the rays beside it go further by so much, px."""
 CELL = 2

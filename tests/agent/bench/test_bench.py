@@ -293,8 +293,9 @@ def test_the_command(tdac, tmp_path, level, files):
     """`run` may be left out; `show` prints the same again."""
     out = tmp_path / "out"
     words = (*files, "--set", level, "--split", "dev", "-n", "2", "--out", out)
-    code, said, _ = tdac("bench", *words)
+    code, said, progress = tdac("bench", *words)
     assert code == 0
+    assert "few: still, 0 of 2 reached" in progress
     for text in ("worlds 0 to 1 of dev", "raises did not drive", "wrote bench.json"):
         assert text in said
     assert tdac("bench", "run", *words)[1] == said
