@@ -104,7 +104,7 @@ def driven(source: str, level: str, worlds: int, out: Path) -> list[dict[str, An
     file.parent.mkdir(parents=True, exist_ok=True)
     text = file.read_text(encoding="utf-8") if file.exists() else ""
     rows = [json.loads(line) for line in text.splitlines()]
-    with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as pool:
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
         for index in range(FIRST + len(rows), FIRST + worlds):
             rows.append(pool.apply(drive, (source, level, index)))
             with file.open("a", encoding="utf-8") as lines:
@@ -113,7 +113,7 @@ def driven(source: str, level: str, worlds: int, out: Path) -> list[dict[str, An
 
 
 def drive(source: str, level: str, index: int) -> dict[str, Any]:
-    """Drives an episode in this process, which is used for nothing else."""
+    """Drives an episode with a fresh module, in a process for such episodes."""
     env = make(level, split="train", privileged=True)
     observation, _ = env.reset(seed=0, options={"index": index})
     with tempfile.TemporaryDirectory(prefix="tdac-tune-") as name:

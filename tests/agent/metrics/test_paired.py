@@ -1,5 +1,8 @@
 """Paired statistics over worlds: against closed forms, scipy and other libraries."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -11,6 +14,9 @@ from tdac_agent.metrics.paired import (
     over_sets,
     probability_of_improvement,
 )
+
+RLIABLE = Path(__file__).with_name("rliable.json")
+"""Scores of runs on tasks, and what `rliable.metrics` says of them."""
 
 
 @pytest.fixture
@@ -94,6 +100,15 @@ def test_probability_of_improvement():
     assert probability_of_improvement(one + 5, other) == 1.0
     back = probability_of_improvement(other, one)
     assert probability_of_improvement(one, other) + back == 1.0
+
+
+@pytest.mark.parametrize("case", json.loads(RLIABLE.read_text()))
+def test_beside_rliable(case):
+    """Where runs are unpaired, figures are those of rliable 1.2.0 (Agarwal et al.)."""
+    one, other = np.array(case["one"]), np.array(case["other"])
+    assert bootstrap({"": one})[""].mean == pytest.approx(case["mean"])
+    assert interquartile_mean([one]) == pytest.approx(case["iqm"])
+    assert probability_of_improvement(one, other) == pytest.approx(case["better"])
 
 
 def test_holm():
