@@ -13,7 +13,9 @@ a folder that is small enough to be kept.
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import shutil
+import sys
 from pathlib import Path
 
 from benchmarks.baseline_trainings import finished
@@ -47,18 +49,27 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
+    # A process for each, since its thousands of worlds take gigabytes.
+    processes = multiprocessing.get_context("spawn")
     for name in options.names or NAMES:
-        algo, level, seed = NAMES[name]
-        folder = options.out / name
-        plan = make_set_plan(level, algo, seed=seed)
-        points = train(plan, folder)
-        best = max(points, key=lambda point: point.worth)
-        print(name, f"{best.steps} steps, reached {best.success_rate:.2f}", flush=True)
-        if options.keep is not None and finished(folder):
-            kept = options.keep / name
-            kept.mkdir(parents=True, exist_ok=True)
-            for file in KEPT:
-                shutil.copyfile(folder / file, kept / file)
+        arguments = name, options.out / name, options.keep
+        process = processes.Process(target=train_one, args=arguments)
+        process.start()
+        process.join()
+        if process.exitcode != 0:
+            sys.exit(f"{name} ended with exit code {process.exitcode}")
+
+
+def train_one(name: str, folder: Path, keep: Path | None) -> None:
+    """Runs a training, or what is left of it, and keeps what came out."""
+    algo, level, seed = NAMES[name]
+    points = train(make_set_plan(level, algo, seed=seed), folder)
+    best = max(points, key=lambda point: point.worth)
+    print(name, f"{best.steps} steps, reached {best.success_rate:.2f}", flush=True)
+    if keep is not None and finished(folder):
+        (keep / name).mkdir(parents=True, exist_ok=True)
+        for file in KEPT:
+            shutil.copyfile(folder / file, keep / name / file)
 
 
 if __name__ == "__main__":
