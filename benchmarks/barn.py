@@ -2,12 +2,11 @@
 
     python -m benchmarks.barn RESULTS...
 
-RESULTS are folders of `tdac bench ... --set barn -n 500` (or of `barn-slow.yaml`), with
-ten runs on each of the 50 worlds of the log. For each entrant: the mean of the
-challenge's metric, `success * OT / clip(AT, 2 OT, 8 OT)`, with an interval by
-resampling worlds, and Spearman's correlation of its means of the worlds with those of
-the log. What two halves of the log have in common with each other, five runs a world
-each, is the most that a correlation with the log can be expected to reach.
+RESULTS are folders of `tdac bench ... --set barn,barn-slow -n 500`, with ten runs on
+each of the 50 worlds of the log. For each entrant: the mean of the challenge's metric,
+`success * OT / clip(AT, 2 OT, 8 OT)`, with an interval by resampling worlds, and
+Spearman's correlation of its means of the worlds with those of the log. The correlation
+of two halves of the log, five runs a world each, is about the most that can be reached.
 
 It is about geometry only: here are neither Gazebo nor the dynamics of the Jackal, so no
 figure ranks anything in the challenge.

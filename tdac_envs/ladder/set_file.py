@@ -327,7 +327,7 @@ def set_names() -> tuple[str, ...]:
 
 def shipped_names() -> tuple[str, ...]:
     """Names of all sets that come with the package: the levels, then others."""
-    return *set_names(), "barn"
+    return *set_names(), "barn", "barn-slow"
 
 
 def find_set_file(name: str | Path) -> SetFile:
