@@ -24,7 +24,7 @@ from pathlib import Path
 import pandas as pd
 
 from tdac_agent.bench.bench import WORLD_TABLE, bench
-from tdac_agent.bench.figures import draw_figures
+from tdac_agent.bench.figures import draw_figures, frame_of
 from tdac_agent.bench.record import Bench, BenchRow, Interval
 from tdac_agent.bench.rivals import levels_of, rival_names
 from tdac_agent.bench.shown import merged
@@ -98,25 +98,26 @@ def show(options: argparse.Namespace) -> None:
 
 
 def _table(found: Bench) -> str:
-    """The time score of each entrant on each set, in Markdown."""
+    """Time score and success of each entrant on each set, in Markdown."""
     names = [each.name for each in found.sets]
     names.sort(key=set_names().index)
+    mean = frame_of(found).groupby("entrant")["time"].mean()
     lines = [
-        f"| entrant | knows | {' | '.join(f'`{name}`' for name in names)} |",
-        f"|---|---|{'---|' * len(names)}",
+        f"| entrant | {' | '.join(f'`{name}`' for name in names)} |",
+        f"|---|{'---|' * len(names)}",
     ]
-    for entrant in found.entrants:
+    for entrant in mean.sort_values(ascending=False, kind="stable").index:
         rows = {row.set: row for row in found.rows if row.entrant == entrant}
-        knows = " or ".join(dict.fromkeys(r.knows for r in rows.values() if r.knows))
         cells = [_cell(rows[name]) if name in rows else "" for name in names]
-        lines.append(f"| {entrant} | {knows} | {' | '.join(cells)} |")
+        lines.append(f"| {entrant} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 
 
 def _cell(row: BenchRow) -> str:
     if row.time is None or row.success is None:
         return row.problem or ""
-    return f"{_interval(row.time)}; {row.success.value:.0%}"
+    files = f"; {len(row.files)} files" if len(row.files) > 1 else ""
+    return f"{_interval(row.time)}; {row.success.value:.0%}{files}"
 
 
 def _interval(found: Interval) -> str:
