@@ -79,11 +79,10 @@ class MapViews:
         """Stores the map of a robot, with a border of zeros."""
         clear = task.terrain.clear
         height, width = clear.shape[0] + 2, clear.shape[1] + 2
-        more = [
-            (0, max(0, own - now))
-            for own, now in zip((height, width), self._clear.shape[1:], strict=True)
-        ]
-        self._clear = np.pad(self._clear, [(0, 0), *more])
+        most = self._clear.shape[1:]
+        if height > most[0] or width > most[1]:
+            more = max(height - most[0], 0), max(width - most[1], 0)
+            self._clear = np.pad(self._clear, [(0, 0), (0, more[0]), (0, more[1])])
         self._clear[i] = 0.0
         scaled = clear / np.float32(CLEAR * task.body_radius)
         self._clear[i, 1 : height - 1, 1 : width - 1] = np.minimum(scaled, 1.0)
