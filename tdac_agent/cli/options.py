@@ -28,8 +28,8 @@ VARIATION = (
     "jittered or any (mixed), any start and goal (random)."
 )
 WRAPPER = (
-    "Observation wrapper, innermost first; repeatable: `goal-relative`, `guidance`, "
-    "`flatten`, or `none`."
+    "Observation wrapper, innermost first; repeatable: `goal-relative`, `closeness`, "
+    "`guidance`, `map-view`, `flatten`, or `none`."
 )
 VIDEO = "Write a .mp4 or .gif video"
 Speed = Annotated[
