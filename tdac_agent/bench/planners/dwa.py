@@ -53,8 +53,12 @@ MEMORY = 1000.0
 
 SLACK = 0.5
 """By how much the plan may come too near to obstacles, px."""
-THIN = 0.3 + 100.0 * PARAMS["disturbances"]["range_noise"]
-"""Hits nearer than this to known obstacles are not added, px; more among noise."""
+THIN = 0.3
+"""Hits nearer than this to known obstacles are not added, px."""
+NOISE = PARAMS["disturbances"]["range_noise"]
+"""Standard deviation of a range, as a share of it; THIN is wider by as much."""
+MARKED = min(RANGE - 1e-3, 1.0 / max(NOISE, 1e-9))
+"""Ranges from here on mark nothing: there is no hit, or it is not known to a px."""
 CLEAR = 4.0
 """A hit is cleared if the rays beside it go further by so much, px."""
 CELL = 2
@@ -176,16 +180,17 @@ class Grid:
                 gone |= now - self.points[:, 2] > MEMORY
             if gone.any():
                 self.remove(gone)
-        hit = ranges < RANGE - 1e-3
+        hit = ranges < MARKED
         ends = np.column_stack(
             [
                 x + ranges[hit] * np.cos(heading + FAN[hit]),
                 y + ranges[hit] * np.sin(heading + FAN[hit]),
             ]
         )
-        new = []
-        for a, b in ends[self.clearance(ends[:, 0], ends[:, 1]) > THIN].tolist():
-            if self.near[self.entry(a, b)] > THIN * THIN:
+        new, thin = [], THIN + NOISE * ranges[hit]
+        far = self.clearance(ends[:, 0], ends[:, 1]) > thin
+        for (a, b), least in zip(ends[far].tolist(), thin[far].tolist(), strict=True):
+            if self.near[self.entry(a, b)] > least * least:
                 self.stamp(a, b)
                 new.append((a, b, now))
         if new:
