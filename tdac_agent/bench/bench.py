@@ -35,6 +35,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 WORLDS = 100
@@ -92,6 +93,8 @@ def bench(
     whole_number("workers", workers, 1)
     if salt_file is not None and split != "hidden":
         raise TaskError("a salt file needs the split hidden")
+    if salt_file is not None:
+        read_salt(salt_file)  # fails here, before there is a folder
     wanted, tasks = named(entrants), [load_set(name) for name in sets]
     _check_sets(tasks, split, worlds)
     parts = [part_of(each, own) for own in tasks for each in wanted]

@@ -113,10 +113,15 @@ def overall_of(sets: Mapping[str, Sequence[Driven]]) -> tuple[BenchOverall, ...]
         own = [
             each for driven in sets.values() for each in driven if each.entrant == name
         ]
+        time = _interval(over_sets([means[each][name] for each in sets]))
+        if not any(each.success.any() for each in own):
+            # As for one set: resamples of zeros would claim to know it exactly.
+            highs = [exact_interval(0, each.success.size)[1] for each in own]
+            time = time.model_copy(update={"high": fmean(highs)})
         found.append(
             BenchOverall(
                 entrant=name,
-                time=_interval(over_sets([means[each][name] for each in sets])),
+                time=time,
                 middle=interquartile_mean(each.time for each in own),
                 success=fmean(float(each.success.mean()) for each in own),
             )

@@ -31,6 +31,8 @@ from tdac_envs.core.errors import TaskError
 NONE = "–"
 # Widest name of an entrant, so that a table fits into 80 columns.
 WIDEST = 14
+FEW = 20
+"""Worlds below which a bootstrap claims too much."""
 LEGEND = (
     "time: mean of success x OT / T (SCT), with a 95 % interval by bootstrap over "
     "worlds (and seeds). reached: with the exact 95 % interval; by bootstrap if there "
@@ -136,7 +138,16 @@ def show(found: Bench, console: Console) -> None:
     if found.overall:
         console.print(_overall(found))
         console.print()
+        there = {each.entrant for each in found.overall}
+        if absent := [name for name in found.entrants if name not in there]:
+            note = f"not on all sets, and so not above: {', '.join(absent)}"
+            print_sentences(console, note, indent=2)
     print_sentences(console, LEGEND)
+    if any(own.worlds < FEW for own in found.sets):
+        print_sentences(
+            console,
+            f"With fewer than {FEW} worlds, intervals by bootstrap are too narrow.",
+        )
     first = found.entrants[0]
     pairs = [pair for pair in found.pairs if first in (pair.one, pair.other)]
     if pairs:

@@ -178,8 +178,7 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
         "observed": f"{', '.join(file.observed)}, in {frame}"
         + ("; the map is given" if file.map else ""),
         "disturbed": _disturbed(file) or "nothing",
-        "horizon": f"{file.horizon.factor:g} OT, {file.horizon.least} to "
-        f"{file.horizon.most} steps",
+        "horizon": _horizon(file),
         "verified": f"if {file.bar:g} fits the success rate much better than "
         f"{file.bar - MARGIN:g} (sequential test)",
     }
@@ -202,11 +201,20 @@ def _worlds(tasks: TaskSet) -> str:
     counts = ", ".join(
         f"{count} {split}" for split, count in tasks.files.counts.items()
     )
-    text = f"{counts}; of {tasks.file.files.path}"
+    runs = tasks.files.runs
+    times = f" ({runs} runs on each world)" if runs > 1 else ""
+    text = f"{counts}{times}; of {tasks.file.files.path}"
     skipped = tasks.files.skipped
     if skipped:
         text += f"; {len(skipped)} left out, such as {skipped[0]}"
     return text
+
+
+def _horizon(file: SetFile) -> str:
+    own = file.horizon
+    if own.least == own.most:
+        return f"{own.most} steps"
+    return f"{own.factor:g} OT, {own.least} to {own.most} steps"
 
 
 def _robot(file: SetFile) -> str:

@@ -40,10 +40,12 @@ class Bootstrap:
     Attributes:
         mean: The mean.
         resampled: Shape (`RESAMPLES`,).
+        worlds: Number of worlds.
     """
 
     mean: float
     resampled: Array
+    worlds: int
 
     def estimate(self) -> Estimate:
         """The mean and its percentile interval."""
@@ -53,13 +55,19 @@ class Bootstrap:
 
     def minus(self, other: Bootstrap) -> Bootstrap:
         """The difference of two means."""
-        return Bootstrap(self.mean - other.mean, self.resampled - other.resampled)
+        resampled = self.resampled - other.resampled
+        return Bootstrap(self.mean - other.mean, resampled, self.worlds)
 
     def p_value(self) -> float:
-        """Two-sided p-value of the hypothesis that the mean is 0."""
+        """Two-sided p-value of the hypothesis that the mean is 0.
+
+        It is at least that of an exact test by the signs of so many worlds: a bootstrap
+        of a few worlds would claim more than they can tell.
+        """
         below = int((self.resampled <= 0.0).sum())
         above = int((self.resampled >= 0.0).sum())
-        return min(1.0, 2.0 * (min(below, above) + 1) / (len(self.resampled) + 1))
+        found = 2.0 * (min(below, above) + 1) / (len(self.resampled) + 1)
+        return min(1.0, max(found, 2.0 ** (1 - self.worlds)))
 
 
 def bootstrap(scores: Mapping[str, Array], seed: int = 0) -> dict[str, Bootstrap]:
@@ -70,18 +78,19 @@ def bootstrap(scores: Mapping[str, Array], seed: int = 0) -> dict[str, Bootstrap
             worlds.
         seed: Seed of the resampling.
     """
-    worlds = {each.shape[1] for each in scores.values()}
-    if len(worlds) > 1:
-        raise ValueError(f"expected scores on the same worlds, got {sorted(worlds)}")
-    if not worlds:
+    counts = {each.shape[1] for each in scores.values()}
+    if len(counts) > 1:
+        raise ValueError(f"expected scores on the same worlds, got {sorted(counts)}")
+    if not counts:
         return {}
-    rng = np.random.default_rng(seed)
-    of_worlds = _weights(rng, worlds.pop())
+    rng, worlds = np.random.default_rng(seed), counts.pop()
+    of_worlds = _weights(rng, worlds)
     found = {}
     for name, each in scores.items():
         # Independent of the other entrants: they share no seeds.
         chosen = _weights(rng, each.shape[0]) @ each
-        found[name] = Bootstrap(float(each.mean()), (chosen * of_worlds).sum(axis=1))
+        means = (chosen * of_worlds).sum(axis=1)
+        found[name] = Bootstrap(float(each.mean()), means, worlds)
     return found
 
 
@@ -90,6 +99,7 @@ def over_sets(parts: Sequence[Bootstrap]) -> Bootstrap:
     return Bootstrap(
         float(np.mean([each.mean for each in parts])),
         np.mean([each.resampled for each in parts], axis=0),
+        sum(each.worlds for each in parts),
     )
 
 

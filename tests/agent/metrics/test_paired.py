@@ -71,6 +71,16 @@ def test_intervals_cover_the_mean():
     assert 180 <= inside <= 198
 
 
+def test_a_few_worlds_cannot_tell_much():
+    """p is at least that of an exact test by signs."""
+    rng = np.random.default_rng(1)
+    for worlds in (1, 5, 8):
+        one = rng.uniform(0.5, 1.0, (1, worlds))
+        found = bootstrap({"one": one, "none": np.zeros((1, worlds))})
+        p = found["one"].minus(found["none"]).p_value()
+        assert p == stats.binomtest(worlds, worlds).pvalue
+
+
 def test_sets_weigh_the_same():
     small, large = np.zeros((1, 10)), np.ones((1, 90))
     parts = [bootstrap({"a": each})["a"] for each in (small, large)]
