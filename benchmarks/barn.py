@@ -119,6 +119,10 @@ def main() -> None:
                 f"| {name} | {own['success'].mean():.3f} | {interval(found)} "
                 f"| {correlation(found, log)} |"
             )
+    first = driven(folders[0])
+    for column, label in (("gap", "narrowest gap"), ("density", "occupied floor")):
+        figure = first.groupby("world")[column].first()[worlds].to_numpy(np.float64)
+        print(f"| {label} of the world | | | {correlation(figure[None], log)} |")
 
 
 if __name__ == "__main__":
