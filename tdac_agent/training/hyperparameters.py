@@ -103,17 +103,19 @@ def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
 def _wrapper_names(paths: list[str] | str) -> tuple[str, ...] | None:
     if paths == _CHOSEN:
         return None
-    known = {f"{w.__module__}.{w.__qualname__}": name for name, w in WRAPPERS.items()}
-    # The public module `wrappers` of a package may re-export its wrappers.
-    known |= {
+    # The public module `wrappers` of a package re-exports its wrappers.
+    public = {
         f"{w.__module__.partition('.')[0]}.wrappers.{w.__qualname__}": name
         for name, w in WRAPPERS.items()
     }
+    full = {f"{w.__module__}.{w.__qualname__}": name for name, w in WRAPPERS.items()}
+    known = full | public
     wanted = [paths] if isinstance(paths, str) else paths
     wrong = [path for path in wanted if path not in known]
     if wrong:
         raise ValueError(
-            f"env_wrapper: expected {_CHOSEN}, or some of {list(known)}, got {wrong[0]}"
+            f"env_wrapper: expected {_CHOSEN}, or some of {', '.join(public)}; got "
+            f"{wrong[0]}"
         )
     return tuple(known[path] for path in wanted)
 
