@@ -353,7 +353,7 @@ def test_wrong_hyperparameters_are_refused(tmp_path, small, config):
     plan = make_plan((small,), **given, config=config(learning_rate="lin_x"))
     with pytest.raises(TaskError, match="expected learning_rate as in lin_1e-3"):
         train(plan, tmp_path / "rate")
-    with pytest.raises(TaskError, match="env_wrapper: expected .* some of"):
+    with pytest.raises(TaskError, match=r"env_wrapper: expected .* some of"):
         make_plan((small,), config=config(env_wrapper=["gymnasium.wrappers.Other"]))
     with pytest.raises(TaskError, match="goal is set by the task; leave it out"):
         make_plan((small,), config=config(env_kwargs={"goal": [1, 2]}))
