@@ -12,7 +12,7 @@
 #   make clients      A short training with each RL library of docs/clients.md, installed
 #                     in its own environment; prints a table. Selected libraries:
 #                     make clients CLIENTS="sb3 skrl"
-#   make results-rl  The trainings of results/ladder/learned: hours, not part of CI;
+#   make results-rl   The trainings of results/ladder/learned: hours, not part of CI;
 #                     after an interruption it goes on.
 #   make lint         Style, types and import rules.
 PYTHON ?= python3

@@ -23,6 +23,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
+from tdac_agent.metrics.paired import bootstrap
 from tdac_envs.ladder.set_file import BUILT_IN
 from tdac_envs.ladder.task_sets import load_set
 
@@ -61,11 +62,8 @@ def by_world(table: pd.DataFrame, worlds: list[str]) -> Array:
 
 def interval(values: Array) -> str:
     """Mean, and its 95 % interval by resampling worlds."""
-    rng = np.random.default_rng(0)
-    means = values.mean(axis=0)
-    draws = means[rng.integers(len(means), size=(RESAMPLES, len(means)))].mean(axis=1)
-    low, high = np.quantile(draws, (0.025, 0.975))
-    return f"{means.mean():.3f} ({low:.3f} to {high:.3f})"
+    found = bootstrap({"": values.mean(axis=0)[None]})[""].estimate()
+    return f"{found.value:.3f} ({found.low:.3f} to {found.high:.3f})"
 
 
 def correlation(one: Array, other: Array) -> str:

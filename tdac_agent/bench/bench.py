@@ -21,7 +21,7 @@ from tdac_agent.bench.arena import (
 from tdac_agent.bench.compared import overall_of, pairs_of
 from tdac_agent.bench.entrants import named
 from tdac_agent.bench.figures import draw_figures
-from tdac_agent.bench.jobs import Drive, Driven, drive_all, drives_of
+from tdac_agent.bench.jobs import Drive, Reached, drive_all, drives_of
 from tdac_agent.bench.page import write_page
 from tdac_agent.bench.record import Bench, BenchSet
 from tdac_agent.errors import RunError
@@ -57,7 +57,7 @@ def bench(
     tier: str = "auto",
     judge: WarmJudge | None = None,
     watch: Watch | None = None,
-    executor: Executor[Driven, Drive] | None = None,
+    executor: Executor[Reached, Drive] | None = None,
     workers: int = 1,
 ) -> Bench:
     """Drives entrants on the first worlds of a split of each set.

@@ -95,10 +95,15 @@ def figures_of(driven: Driven, parts: Episodes) -> dict[str, Any]:
 def _time_of(driven: Driven, success: Interval) -> Interval:
     """The mean time score, which is at most the rate of success."""
     found = _interval(bootstrap({"": driven.time})[""])
-    if driven.success.any():
-        return found
-    # Resamples of zeros would claim to know it exactly.
-    return found.model_copy(update={"high": success.high})
+    return found if driven.success.any() else _up_to(found, success.high)
+
+
+def _up_to(found: Interval, high: float) -> Interval:
+    """The interval of an entrant without a success.
+
+    Resamples of zeros would claim to know it exactly.
+    """
+    return found.model_copy(update={"high": high})
 
 
 def overall_of(sets: Mapping[str, Sequence[Driven]]) -> tuple[BenchOverall, ...]:
@@ -115,9 +120,8 @@ def overall_of(sets: Mapping[str, Sequence[Driven]]) -> tuple[BenchOverall, ...]
         ]
         time = _interval(over_sets([means[each][name] for each in sets]))
         if not any(each.success.any() for each in own):
-            # As for one set: resamples of zeros would claim to know it exactly.
             highs = [exact_interval(0, each.success.size)[1] for each in own]
-            time = time.model_copy(update={"high": fmean(highs)})
+            time = _up_to(time, fmean(highs))
         found.append(
             BenchOverall(
                 entrant=name,

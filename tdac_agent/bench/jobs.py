@@ -16,7 +16,7 @@ from tdac_agent.executors.executor import Ended, Executor, Reported, Work
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.ladder.task_sets import load_set
 
-Driven = int | None
+Reached = int | None
 """Episodes that reached the goal, or None if the file did not drive."""
 
 
@@ -26,12 +26,14 @@ class Drive:
 
     Attributes:
         set: Name of the set, or path of its file.
+        named: Name of the set.
         entrant: Name of the entrant.
         word: The file, as for `entrants.named`.
         folder: Folder of what it does.
     """
 
     set: str
+    named: str
     entrant: str
     word: str
     folder: str
@@ -65,13 +67,14 @@ def drives_of(
             # Workers have another working folder.
             file = str(Path(word).resolve()) if Path(word).exists() else word
             name = str(Path(given).resolve()) if Path(given).exists() else str(given)
-            yield Drive(name, part.entrant.name, file, str(folder.resolve()))
+            own = part.tasks.name, part.entrant.name
+            yield Drive(name, *own, file, str(folder.resolve()))
 
 
 def drive_all(
     arena: Arena,
     drives: Iterator[Drive],
-    executor: Executor[Driven, Drive],
+    executor: Executor[Reached, Drive],
     workers: int,
 ) -> None:
     """Executes drives. A problem is not raised here: `row_of` meets it again."""
@@ -99,8 +102,7 @@ def drive_all(
             else:
                 continue
             if arena.watch is not None:
-                name = load_set(update.job.set).name
-                arena.watch(name, update.job.entrant, done, reached)
+                arena.watch(update.job.named, update.job.entrant, done, reached)
 
 
 def perform_job(
