@@ -40,7 +40,7 @@ from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.tasks.task import Task, called, lay_out, load_task
 from tdac_agent.verification.diagnosis.measures import Measured
-from tdac_agent.verification.judge.kept_episodes import kept_episodes
+from tdac_agent.verification.judge.kept_episodes import KeptEpisode, kept_episodes
 from tdac_agent.verification.judge.seeded import SeededJob
 from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -163,10 +163,10 @@ def evaluate(
             overlays = []
             for number, entrant in enumerate(entrants):
                 at = job.model_copy(update={"out": folder / f"results-{number}"})
-                result, calls, poses = _compete(entrant, task, at, warm, watch)
+                result, calls, kept = _compete(entrant, task, at, warm, watch)
                 results.append(result)
                 timings.append(timing_of(task.name, entrant.name, calls))
-                overlays.append(Overlay.of(result, poses))
+                overlays.append(Overlay.of(result, kept))
             if out is not None:
                 draw_overlay(task, overlays, out / f"{task.name}.png")
         found = Evaluation(
@@ -212,8 +212,8 @@ def load_tasks(tasks: Sequence[Task | str | Path]) -> list[Task]:
 
 def _compete(
     entrant: Entrant, task: Task, job: SeededJob, judge: WarmJudge, watch: Watch | None
-) -> tuple[Result, NDArray[np.float32], list[NDArray[np.float32]]]:
-    """Runs a policy on a task; returns the result, call times in s, and poses.
+) -> tuple[Result, NDArray[np.float32], list[KeptEpisode]]:
+    """Runs a policy on a task; returns the result, call times in s, and episodes.
 
     Episodes that `job.keep` has already are not driven again.
     """
@@ -259,7 +259,7 @@ def _compete(
         note=note,
     )
     calls = np.concatenate([each.calls for each in episodes])
-    return result, calls, [each.poses for each in episodes]
+    return result, calls, episodes
 
 
 def _about_task(task: Task) -> EvaluatedTask:

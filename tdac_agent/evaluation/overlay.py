@@ -14,9 +14,12 @@ from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.evaluation.evaluation_report import Result
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import write_png
+from tdac_agent.verification.judge.kept_episodes import KeptEpisode
+from tdac_envs.drawing.backdrop import discs_on
 from tdac_envs.drawing.canvas import (
     GREY,
     INK,
+    MOVER,
     PAPER,
     Canvas,
     Colour,
@@ -24,6 +27,7 @@ from tdac_envs.drawing.canvas import (
     blank,
     write_text,
 )
+from tdac_envs.drawing.marks import draw_movers
 
 # Okabe and Ito's colour-blind-safe palette, without black and yellow.
 COLOURS: tuple[Colour, ...] = (
@@ -47,20 +51,23 @@ class Overlay:
         label: Name of the policy, and number of successes.
         ways: Poses of each episode, shape (T + 1, 3).
         collided: Whether each episode had a contact.
+        movers: Moving obstacles at the end of the first episode; see `KeptEpisode`.
     """
 
     label: str
     ways: Sequence[NDArray[np.float32]]
     collided: Sequence[bool]
+    movers: NDArray[np.float32]
 
     @classmethod
-    def of(cls, result: Result, ways: Sequence[NDArray[np.float32]]) -> Overlay:
+    def of(cls, result: Result, kept: Sequence[KeptEpisode]) -> Overlay:
         """The overlay of a result."""
         reached = sum(episode.success for episode in result.episodes)
         label = f"{result.policy}: {reached} of {len(result.episodes)}"
         ascii_label = label.encode("ascii", "replace").decode()
         touched = [episode.collisions > 0 for episode in result.episodes]
-        return cls(ascii_label, ways, touched)
+        ways = [episode.poses for episode in kept]
+        return cls(ascii_label, ways, touched, kept[0].movers)
 
 
 def draw_overlay(task: Task, overlays: Sequence[Overlay], path: Path) -> None:
@@ -71,10 +78,12 @@ def draw_overlay(task: Task, overlays: Sequence[Overlay], path: Path) -> None:
 def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
     """The map or world with all trajectories and a legend, uint8 RGB.
 
-    The first policy is on top; a dot marks a contact.
+    The first policy is on top; a dot marks a contact. Moving obstacles are those at
+    the end of the first policy's first episode.
     """
     chart = pictures_of(task.setting).backdrop().whole()
-    canvas = chart.canvas
+    canvas, movers = chart.canvas, overlays[0].movers.astype(np.float64)
+    draw_movers(canvas, [discs_on(chart, discs) for discs in movers])
     for number, overlay in reversed(list(enumerate(overlays))):
         colour = COLOURS[number % len(COLOURS)]
         places = [
@@ -83,7 +92,10 @@ def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
         ]
         _draw_paths(canvas.image, places, colour)
         _draw_contacts(canvas.image, places, overlay.collided, colour)
-    return np.vstack([canvas.image, _legend(overlays, canvas.image.shape[1])])
+    others = [(GREY, "shortest path")]
+    if movers.size:
+        others.append((MOVER, "movers at the end (first episode)"))
+    return np.vstack([canvas.image, _legend(overlays, others, canvas.image.shape[1])])
 
 
 def _draw_paths(
@@ -115,10 +127,12 @@ def _draw_contacts(
             cv2.circle(image, (x, y), 52, colour, cv2.FILLED, cv2.LINE_AA, 4)
 
 
-def _legend(overlays: Sequence[Overlay], width: int) -> Image:
+def _legend(
+    overlays: Sequence[Overlay], others: Sequence[tuple[Colour, str]], width: int
+) -> Image:
     """Colours and labels, in as many rows as they need."""
     entries = [(COLOURS[n % len(COLOURS)], o.label) for n, o in enumerate(overlays)]
-    entries.append((GREY, "shortest path"))
+    entries.extend(others)
     rows: list[list[tuple[int, Colour, str]]] = [[]]
     x = 10
     for colour, text in entries:

@@ -56,3 +56,9 @@ class Backdrop(Protocol):
 
     def close_up(self, window: Window) -> Chart:
         """A chart of a part, `CLOSE_UP` px wide."""
+
+
+def discs_on(chart: Chart, discs: Points) -> Points:
+    """Discs of a map or world, shape (n, 3): x, y, radius, in canvas coordinates."""
+    radii = discs[:, 2] * chart.scale / chart.canvas.scale
+    return np.column_stack([chart.at(discs[:, :2]), radii])

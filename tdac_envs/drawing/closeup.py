@@ -10,7 +10,14 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from tdac_envs.drawing.backdrop import CLOSE_UP, Backdrop, Chart, Points, Window
+from tdac_envs.drawing.backdrop import (
+    CLOSE_UP,
+    Backdrop,
+    Chart,
+    Points,
+    Window,
+    discs_on,
+)
 from tdac_envs.drawing.canvas import (
     FREE,
     GREEN,
@@ -94,7 +101,7 @@ def _draw_run(
     canvas, places = chart.canvas, chart.at(poses[:, :2])
     if show_path and event.way is not None:
         canvas.line(chart.at(event.way), GREEN, 2, 0.9, dash=6)
-    draw_movers(canvas, [_on_canvas(chart, discs) for discs in event.movers])
+    draw_movers(canvas, [discs_on(chart, discs) for discs in event.movers])
     body = max(radius * chart.scale, _SMALLEST_BODY)
     canvas.disc(places[0], 4, FREE)
     canvas.disc(places[0], 4, EARLY, width=2)
@@ -109,12 +116,6 @@ def _draw_run(
         size, contact = max(0.3 * body, 6.0), chart.at(np.array([event.contact]))
         canvas.disc(contact, size, FREE, 0.9, 5)
         canvas.disc(contact, size, EVENT, width=3)
-
-
-def _on_canvas(chart: Chart, discs: Points) -> Points:
-    """Discs, shape (n, 3), in canvas coordinates."""
-    radii = discs[:, 2] * chart.scale / chart.canvas.scale
-    return np.column_stack([chart.at(discs[:, :2]), radii])
 
 
 def _draw_trail(canvas: Canvas, places: Points) -> None:

@@ -38,6 +38,8 @@ class KeptEpisode:
         late: Whether the policy timed out.
         poses: Shape (T + 1, 3), float32.
         calls: Durations of the policy's calls, s, shape (T,), float32.
+        movers: Moving obstacles in the last steps, oldest first, shape (t, n, 3),
+            float32: x, y, radius, px; without any, t or n is 0.
     """
 
     figures: Measured
@@ -45,6 +47,7 @@ class KeptEpisode:
     late: bool
     poses: NDArray[np.float32]
     calls: NDArray[np.float32]
+    movers: NDArray[np.float32]
 
 
 def keep_episode(folder: Path, episode: KeptEpisode) -> None:
@@ -56,7 +59,13 @@ def keep_episode(folder: Path, episode: KeptEpisode) -> None:
     about = _Record(figures=episode.figures, tier=episode.tier, late=episode.late)
     raw = np.frombuffer(about.model_dump_json().encode(), np.uint8)
     content = io.BytesIO()
-    np.savez(content, about=raw, poses=episode.poses, calls=episode.calls)
+    np.savez(
+        content,
+        about=raw,
+        poses=episode.poses,
+        calls=episode.calls,
+        movers=episode.movers,
+    )
     write_atomic(_file(folder, episode.figures.seed), content.getvalue(), lasting=False)
 
 
@@ -76,8 +85,13 @@ def _read(file: Path) -> KeptEpisode | None:
         with np.load(io.BytesIO(raw), allow_pickle=False) as arrays:
             about = _Record.model_validate_json(arrays["about"].tobytes())
             poses, calls = arrays["poses"], arrays["calls"]
+            movers = arrays["movers"]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
-    if file.stem != str(about.figures.seed) or poses.ndim != 2 or calls.ndim != 1:
+    if file.stem != str(about.figures.seed) or (
+        poses.ndim,
+        calls.ndim,
+        movers.ndim,
+    ) != (2, 1, 3):
         return None
-    return KeptEpisode(about.figures, about.tier, about.late, poses, calls)
+    return KeptEpisode(about.figures, about.tier, about.late, poses, calls, movers)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from tdac_agent.episodes.episode import not_driven
-from tdac_agent.episodes.trajectory import Outcome
+from tdac_agent.episodes.trajectory import Outcome, Trajectory
 from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
@@ -105,6 +105,9 @@ class JobEnding(PrintableRecord):
     problem: str | None = None
 
 
+NO_MOVERS = np.zeros((0, 0, 3), np.float32)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class EpisodeSummary:
     """What is kept of an episode.
@@ -124,6 +127,7 @@ class EpisodeSummary:
     is_retryable: bool
     poses: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 3), "f4"))
     calls: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, "f4"))
+    movers: NDArray[np.float32] = field(default_factory=lambda: NO_MOVERS)
 
 
 def judge_seeds(job: SeededJob, child_pool: ChildPool) -> None:
@@ -163,7 +167,9 @@ def judge_seeds(job: SeededJob, child_pool: ChildPool) -> None:
 
 
 def _lasting(kept: EpisodeSummary, figures: Measured) -> KeptEpisode:
-    return KeptEpisode(figures, kept.tier, kept.late, kept.poses, kept.calls)
+    return KeptEpisode(
+        figures, kept.tier, kept.late, kept.poses, kept.calls, kept.movers
+    )
 
 
 def _in_order(setup: EpisodeSetup, job: SeededJob) -> Generator[EpisodeSummary]:
@@ -189,7 +195,14 @@ def _run_episode(
         rollout.is_retryable,
         rollout.trajectory.poses.astype(np.float32),
         rollout.calls.astype(np.float32),
+        _last_movers(rollout.trajectory),
     )
+
+
+def _last_movers(trajectory: Trajectory) -> NDArray[np.float32]:
+    """Moving obstacles in the last steps, shape (t, n, 3)."""
+    ghosts = trajectory.ghosts(trajectory.steps)
+    return np.array(ghosts, np.float32) if ghosts else NO_MOVERS
 
 
 def _skipped(setup: EpisodeSetup, seed: int) -> SeededResult:

@@ -41,6 +41,7 @@ from tdac_agent.verification.diagnosis.measures import (
 from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.driving import EpisodeSetup, drive_seed
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drawing.canvas import MOVER
 from tdac_envs.learning.wrappers import wrap
 from tdac_envs.map2d.env import Map2DEnv
 
@@ -438,6 +439,16 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
     assert code == 0
     assert again == (out / "evaluation.json").read_text()
     assert json.loads(again)["rows"][0]["interval"]["method"] == "Clopper-Pearson"
+
+
+def test_the_picture_has_the_movers(tmp_path):
+    """They are drawn where they were at the end of the first episode."""
+    post = {"kind": "route", "points": [[110, 30]], "radius": 5}
+    task, out = write_small_task(tmp_path / "task", movers=[post]), tmp_path / "out"
+    evaluate(["go-to-goal"], [task], episodes=1, out=out)
+    picture = cv2.cvtColor(cv2.imread(str(out / "small.png")), cv2.COLOR_BGR2RGB)
+    above_the_legend = picture[: -picture.shape[0] // 8].astype(int)
+    assert (np.abs(above_the_legend - MOVER).max(axis=2) < 40).sum() > 40
 
 
 def test_a_folder_whose_name_is_not_utf_8(tdac, tmp_path):
