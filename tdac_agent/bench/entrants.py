@@ -6,6 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from tdac_agent.bench.privileged import (
+    PRIVILEGED,
+    check_movers,
+    plan_worlds,
+    planner_sha256,
+)
 from tdac_agent.bench.record import Kind
 from tdac_agent.bench.rivals import rival_names, rival_on
 from tdac_agent.errors import ControllerFileError
@@ -61,8 +67,8 @@ class Member:
     """A file that drives on a set.
 
     Attributes:
-        kind: `builtin`, a classical `planner`, any other `controller`, or `learned`
-            with stable-baselines3.
+        kind: `builtin`, a classical `planner`, any other `controller`, `learned` with
+            stable-baselines3, or `privileged`, a planner that knows the true world.
         sha256: Its hash.
         source: The file, if it is a program.
         lineage: Id of the run that wrote the program, if one did.
@@ -104,7 +110,7 @@ def named(words: Sequence[str]) -> tuple[Named, ...]:
         if not each.name or not each.words:
             raise TaskError(f"expected NAME=FILE, got {each.name!r} and {each.words}")
         for word in each.words:
-            if word not in rival_names():
+            if word not in (*rival_names(), PRIVILEGED):
                 _check(word)
     return found
 
@@ -141,6 +147,9 @@ def member_of(word: str, tasks: TaskSet) -> Member:
         TaskError: There is none for this set.
         ControllerFileError: It is broken, or was trained elsewhere.
     """
+    if word == PRIVILEGED:
+        check_movers(tasks)
+        return Member("privileged", planner_sha256())
     if word in rival_names():
         rival = rival_on(word, tasks)
         source = rival.source.encode()
@@ -172,8 +181,13 @@ def drive(
         TaskError: The ledger of hidden evaluations cannot be used.
         Fault: The sandbox is broken.
     """
+    salt_file = worlds.salt_file
+    if member.kind == "privileged":
+        own = worlds.tasks, worlds.split, worlds.count, salt_file
+        report = plan_worlds(*own, folder)
+        watch(report.worlds, report.successes)
+        return report
     if member.learned is not None:
-        salt_file = worlds.salt_file
         runs = LearnedRuns.of(member.learned, worlds.tasks, worlds.split, salt_file)
         return runs.report(worlds.count, folder, watch)
     assert member.source is not None
@@ -182,7 +196,7 @@ def drive(
         worlds.tasks,
         worlds.split,
         worlds.count,
-        salt_file=worlds.salt_file,
+        salt_file=salt_file,
         lineage=member.lineage,
         tier=worlds.tier,
         out=folder,
@@ -193,6 +207,8 @@ def drive(
 
 def knows(member: Member, tasks: TaskSet) -> str:
     """What a file may use."""
+    if member.kind == "privileged":
+        return "all"
     if member.learned is None:
         return "+ map" if tasks.file.map else "sensors"
     return "+ map" if "map-view" in member.learned.policy.wrappers else "sensors"

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field
 from tdac_agent.metrics.paired import Estimate
 from tdac_agent.storage.printable_record import PrintableRecord
 
-Kind = Literal["builtin", "planner", "controller", "learned"]
+Kind = Literal["builtin", "planner", "controller", "learned", "privileged"]
 """What an entrant is."""
 
 
@@ -124,18 +124,17 @@ class Bench(_Record):
     pairs: tuple[BenchPair, ...] = ()
 
     def of_set(self, name: str) -> tuple[BenchRow, ...]:
-        """The rows of a set, the best time score first; at the end what did not drive.
+        """The rows of a set, the best time score first.
+
+        At the end are those that did not drive, and the privileged ones.
 
         Args:
             name: Name of the set.
         """
         rows = [row for row in self.rows if row.set == name]
-        best = sorted(
-            (row for row in rows if row.time), key=lambda row: -_value(row.time)
-        )
-        return (*best, *(row for row in rows if not row.time))
+        return tuple(sorted(rows, key=_place))
 
 
-def _value(interval: Interval | None) -> float:
-    assert interval is not None
-    return interval.value
+def _place(row: BenchRow) -> tuple[bool, bool, float]:
+    score = 0.0 if row.time is None else row.time.value
+    return row.kind == "privileged", row.time is None, -score

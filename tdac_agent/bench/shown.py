@@ -45,7 +45,7 @@ def merged(folders: Sequence[Path]) -> Bench:
                     "the folders before; rename one (NAME=FILE)"
                 )
             rows[key] = row
-            if row.time is not None:
+            if row.time is not None and row.kind != "privileged":
                 driven[row.set][row.entrant] = _driven(table, row)
     both = {name: list(each.values()) for name, each in driven.items()}
     return Bench(

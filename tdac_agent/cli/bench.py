@@ -139,6 +139,7 @@ def show(found: Bench, console: Console) -> None:
         console.print(_overall(found))
         console.print()
         there = {each.entrant for each in found.overall}
+        there |= {row.entrant for row in found.rows if row.kind == "privileged"}
         if absent := [name for name in found.entrants if name not in there]:
             note = f"not on all sets, and so not above: {', '.join(absent)}"
             print_sentences(console, note, indent=2)
@@ -200,6 +201,11 @@ def _notes(row: BenchRow, knows_map: bool) -> list[str]:
     notes = []
     if row.problem is not None:
         notes.append(f"{row.entrant} did not drive: {row.problem}")
+    if row.kind == "privileged" and row.time is not None:
+        notes.append(
+            f"{row.entrant} knows the true world and all movers: not compared with "
+            "others"
+        )
     if row.knows == "sensors" and knows_map:
         notes.append(f"{row.entrant} does not get the map")
     if row.tuned is False:

@@ -30,7 +30,8 @@ def run_command(
             metavar="ENTRANT...",
             help="Controller files, run folders, .zip files of stable-baselines3, "
             "`builtin`, or a classical planner: `go-to-goal`, `tangent-bug`, "
-            "`follow-the-gap`, `dwa`, `mppi`, `orca`. NAME=FILE gives it a name; "
+            "`follow-the-gap`, `dwa`, `mppi`, `orca`; `privileged` is a planner that "
+            "knows all movers. NAME=FILE gives it a name; "
             "NAME=FILE,FILE are seeds of one training.",
         ),
     ],

@@ -34,6 +34,7 @@ _KINDS = {
     "planner": "classical planner",
     "controller": "controller file",
     "learned": "learned",
+    "privileged": "knows the true world",
 }
 _COLUMNS = 3
 # Inches that the labels below and above the panels need.

@@ -7,6 +7,7 @@ with a crowd is admitted if it arrives; its time is a reference for results.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,13 @@ FACING = 0.5
 _BESIDE = 3  # pixels around the robot in which its way may begin
 
 
+class Drive(NamedTuple):
+    """A drive to the goal: its duration, steps, and its length, px."""
+
+    steps: int
+    driven: float
+
+
 class OrcaDriver:
     """Chooses the actions of an episode from the whole state of an environment.
 
@@ -85,8 +93,8 @@ class OrcaDriver:
 
 def drive_by_orca(
     task: Map2DTask, disturbances: Disturbances, noise: np.random.Generator
-) -> int | None:
-    """Steps in which the driver reaches the goal; None if it does not.
+) -> Drive | None:
+    """The driver's way to the goal; None if it does not reach it.
 
     Args:
         task: The task with its movers, which are only read.
@@ -110,11 +118,12 @@ def drive_by_orca(
     )
     env.np_random = noise
     env.reset()
-    driver = OrcaDriver(env)
+    driver, driven, last = OrcaDriver(env), 0.0, env.pose()
     for step in range(1, task.horizon + 1):
         _, _, terminated, _, info = env.step(driver.action())
+        driven, last = driven + math.dist(env.pose()[:2], last[:2]), env.pose()
         if terminated:
-            return step if info["is_success"] else None
+            return Drive(step, driven) if info["is_success"] else None
     return None
 
 

@@ -25,6 +25,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import BUILT_IN
+from tdac_envs.ladder.space_time import earliest_arrival
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 AHEAD = "def policy(obs):\n    return 1.0, 1.0\n"
@@ -243,6 +244,28 @@ def test_seeds_of_a_training(judge, tmp_path, level, files):
     assert both.late + sum(both.contacts.values()) + both.errors == 6
     assert found.pairs[0].p_success is None
     assert still.files[0] in both.files
+
+
+def test_a_privileged_planner_stands_apart(judge, tmp_path, files, monkeypatch):
+    """It plans on the same worlds, after the others, and is compared with none."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    given = {"worlds": 2, "judge": judge}
+    words, tasks = ["privileged", files[0]], load_set("moving")
+    found = bench(words, ["moving", "known"], split="dev", out=tmp_path / "a", **given)
+    first, last = found.of_set("moving")
+    assert (last.entrant, last.kind, last.knows) == ("privileged", "privileged", "all")
+    assert first.kind == "controller"
+    assert not [pair for pair in found.pairs if pair.set == "moving"]
+    assert "1 by definition" in found.of_set("known")[-1].problem
+    table = pd.read_csv(tmp_path / "a/worlds.csv").set_index(["set", "entrant"])
+    for index, row in enumerate(table.loc[("moving", "privileged")].itertuples()):
+        arrival = earliest_arrival(tasks.task("dev", index))
+        assert row.steps == arrival.steps
+        assert row.time_score == pytest.approx(row.least_steps / arrival.steps)
+    again = bench(words, ["moving"], split="dev", out=tmp_path / "b", **given)
+    assert merged([tmp_path / "b"]) == again
+    hidden = bench(words[:1], ["crowd"], split="hidden", out=tmp_path / "c", **given)
+    assert hidden.rows[0].worlds == 2
 
 
 def test_runs_on_the_same_world(judge, tmp_path, files):

@@ -193,19 +193,21 @@ class TestDriver:
         env = gym.make("TDAC-Ladder-v0", level="crowd", split="dev").unwrapped
         tasks = env.set
         env.reset(options={"index": 1})
-        steps = drive_by_orca(env.task, tasks.file.errors, tasks.noise("dev", 1))
+        found = drive_by_orca(env.task, tasks.file.errors, tasks.noise("dev", 1))
         driver, ended, count = OrcaDriver(env), False, 0
         while not ended:
             _, _, terminated, truncated, info = env.step(driver.action())
             ended, count = terminated or truncated, count + 1
         assert info["is_success"]
-        assert count == steps
+        assert count == found.steps
 
     def test_nobody_in_the_way(self):
         env = Map2DEnv(**TestPlanner.OPTIONS)
         env.reset(seed=0)
-        steps = drive_by_orca(env.task, Disturbances(), np.random.default_rng(0))
-        assert steps == pytest.approx((160 - env.task.goal_tolerance) / 4, abs=3)
+        found = drive_by_orca(env.task, Disturbances(), np.random.default_rng(0))
+        far = 160 - env.task.goal_tolerance
+        assert found.steps == pytest.approx(far / 4, abs=3)
+        assert found.driven == pytest.approx(far, abs=4)
 
     def test_where_there_is_no_way(self):
         """It waits in front of a mover that fills the corridor."""
