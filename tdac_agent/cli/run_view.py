@@ -10,6 +10,7 @@ from rich.padding import Padding
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
+from tdac_agent.library.listing import resume_command
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import Attempt, Run
 
@@ -72,14 +73,6 @@ def usage_of(run: Run) -> str:
         if run.max_tokens is not None:
             tokens += ": each answer counts as the full amount reserved for it"
     return f"{tokens}; {cost}"
-
-
-def resume_command(run: Run) -> str:
-    """The command that continues a run; empty if the run has finished."""
-    if run.finished:
-        return ""
-    more = f" {run.enough}" if run.enough else ""
-    return f"tdac synth --resume {shlex.quote(str(run.folder))}{more}"
 
 
 def _attempts(run: Run) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from tdac_agent.cli.flags import TaskFlags, check_tier
 from tdac_agent.cli.progress import Progress
 from tdac_agent.cli.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault, RunError
+from tdac_agent.library.listing import next_folder
 from tdac_agent.runs.resume import check_own, existing_run, resume_arguments
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.synthesis.loop import synthesize
@@ -168,12 +168,3 @@ def _remarks(task: Task) -> list[str]:
     lines = [f"\n{escape(line)}" for line in setting.remarks()]
     notes = [*setting.params.notes, *(f"left out: {name}" for name in setting.left_out)]
     return lines + [f"\n[yellow]note: {escape(note)}[/]" for note in notes]
-
-
-def next_folder(name: str) -> Path:
-    """`runs/NAME-N` with the first free number N."""
-    for number in itertools.count(1):
-        folder = Path("runs") / f"{name}-{number}"
-        if not folder.exists():
-            return folder
-    raise AssertionError("unreachable")

@@ -16,10 +16,11 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.progress import Progress
 from tdac_agent.cli.run_view import print_budget_end, usage_of
-from tdac_agent.cli.synth import next_folder, read_text
+from tdac_agent.cli.synth import read_text
 from tdac_agent.cli.synth_set_flags import SynthSetFlags
 from tdac_agent.errors import Fault
 from tdac_agent.evaluation.set_report import SetReport
+from tdac_agent.library.listing import next_folder
 from tdac_agent.models.choice import check_name
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt

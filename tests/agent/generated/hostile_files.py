@@ -22,7 +22,7 @@ import yaml
 
 from tdac_agent.builtin.scripted import Script
 from tdac_agent.campaign.config import read_config
-from tdac_agent.cli import runs as runs_command
+from tdac_agent.library.listing import row_of
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.rules import _histories
 from tdac_agent.cli.run_view import show_run
@@ -127,7 +127,7 @@ def _tell(task: Task) -> None:
 
 def use_run(folder: Path) -> None:
     """Lists a run, shows it, and reads all that is left of it."""
-    row = runs_command._row(folder)
+    row = row_of(folder)
     json.dumps(row).encode()
     with contextlib.redirect_stdout(io.StringIO()):
         console = Console()
@@ -166,7 +166,7 @@ def use_parameters(folder: Path) -> None:
 
 def use_training(folder: Path) -> None:
     """Lists a training."""
-    runs_command._row(folder)
+    row_of(folder)
     read_plan(folder)
     read_curve(folder)
 

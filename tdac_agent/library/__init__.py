@@ -1,0 +1,1 @@
+"""What a folder has: runs, trainings, campaigns, benches."""

@@ -1,0 +1,136 @@
+"""Lists the runs and trainings in a folder."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import shlex
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.errors import RunError
+from tdac_agent.runs.run_record import (
+    JOURNAL,
+    RUN_FILE,
+    Run,
+    at_work,
+    load_run,
+    status_now,
+)
+from tdac_agent.training.curve import PLAN_FILE, read_curve
+
+DEEPEST = 6
+"""Levels of subfolders that are searched for runs."""
+
+
+def folders_of(folder: Path) -> list[Path]:
+    """The run and training folders in a folder, itself included, at any usual depth.
+
+    A campaign has its runs three levels below its folder. Nothing is searched below a
+    run, in hidden folders, or behind symbolic links to folders.
+
+    Raises:
+        OSError: The folder cannot be read.
+    """
+    with os.scandir(folder):
+        pass  # `os.walk` would report no error
+    found = []
+    for name, below, _ in os.walk(folder):
+        place = Path(name)
+        if _is_run(place):
+            found.append(place)
+        depth = len(place.relative_to(folder).parts)
+        if depth == DEEPEST or (depth and place in found[-1:]):
+            below.clear()
+        below[:] = [each for each in below if not each.startswith(".")]
+    return found
+
+
+def _is_run(place: Path) -> bool:
+    try:
+        return any((place / name).is_file() for name in (RUN_FILE, JOURNAL, PLAN_FILE))
+    except OSError:
+        return False
+
+
+def _training(folder: Path) -> dict[str, Any]:
+    from tdac_agent.training.plan import read_plan  # imports Gymnasium
+
+    try:
+        plan, points = read_plan(folder), read_curve(folder)
+    except RunError as error:
+        return {"run": str(folder), "status": "unreadable", "reason": str(error)}
+    last = max((point.steps for point in points), default=0)
+    best = max(points, key=lambda point: point.worth, default=None)
+    done = last >= plan.steps
+    return {
+        "run": str(folder),
+        "task": plan.worlds,
+        "learner": plan.algo,
+        "status": "trained" if done else "not at its end",
+        "steps": last,
+        "of_steps": plan.steps,
+        "success_rate": None if best is None else best.success_rate,
+        "started": datetime.fromtimestamp(
+            (folder / PLAN_FILE).stat().st_mtime, UTC
+        ).isoformat(),
+        "go_on": "" if done else shlex.join(["tdac", "train", "--resume", str(folder)]),
+    }
+
+
+def row_of(folder: Path) -> dict[str, Any]:
+    """The record of a run or training folder, also of a damaged one."""
+    if (folder / PLAN_FILE).is_file():
+        return _training(folder)
+    before = at_work(folder)
+    try:
+        run = load_run(folder)
+    except RunError as error:
+        reason = str(error).removeprefix(f"{folder} is not a run folder: ")
+        return {"run": str(folder), "status": "unreadable", "reason": reason}
+    status = status_now(run, before=before)
+    return {
+        "run": str(folder),
+        "task": run.task,
+        "learner": run.learner,
+        "optimizer": run.optimizer,
+        "status": status,
+        "k": _begun(run),
+        "iterations": run.iterations,
+        "tau": run.tau,
+        "tokens_in": run.tokens_in,
+        "tokens_out": run.tokens_out,
+        "cost": run.cost,
+        "cost_lost": run.cost_lost,
+        "started": run.started,
+        "seconds": run.seconds,
+        "censored": run.censored,
+        "reason": run.reason,
+        "go_on": "" if status == "running" else resume_command(run),
+    }
+
+
+def _begun(run: Run) -> int:
+    """The iteration that was begun last, though its candidate may not be judged yet."""
+    folders = (run.folder / "iterations").glob("k*/")
+    names = [folder.name[1:] for folder in folders]
+    begun = [int(name) for name in names if name.isascii() and name.isdecimal()]
+    return max([*begun, *(attempt.k for attempt in run.attempts)], default=0)
+
+
+def resume_command(run: Run) -> str:
+    """The command that continues a run; empty if the run has finished."""
+    if run.finished:
+        return ""
+    more = f" {run.enough}" if run.enough else ""
+    return f"tdac synth --resume {shlex.quote(str(run.folder))}{more}"
+
+
+def next_folder(name: str, place: Path = Path()) -> Path:
+    """`runs/NAME-N` with the first free number N, relative to `place`."""
+    for number in itertools.count(1):
+        folder = Path("runs") / f"{name}-{number}"
+        if not (place / folder).exists():
+            return folder
+    raise AssertionError("unreachable")
