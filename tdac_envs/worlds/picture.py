@@ -85,6 +85,11 @@ class View:
         x, y = np.asarray(points, np.float64).reshape(-1, 2).T
         return np.column_stack([x - self._left, self._high - y]) * self.scale - 0.5
 
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        """The point of the world, m, at canvas coordinates."""
+        over, down = (x + 0.5) / self.scale, (y + 0.5) / self.scale
+        return self._left + over, self._high - down
+
     def fill(self, shape: Footprint, colour: Colour, alpha: float = 1.0) -> None:
         """Paints a footprint."""
         if isinstance(shape, Disc):
@@ -147,7 +152,7 @@ def draw_world(world: World) -> Image:
     Parts that the robot cannot hit are pale: they are above or below it, or not solid.
     Unmodelled nodes that may be solid are marked with a cross.
     """
-    view = View(_bounds(world))
+    view = View(bounds_of(world))
     draw_things(view, world, bodies(world))
     if world.goal is not None:
         _draw_goal(view, world.goal)
@@ -181,7 +186,7 @@ def colour_of(kind: str) -> Colour:
     return _KINDS.get(kind, STEEL)
 
 
-def _bounds(world: World) -> tuple[float, float, float, float]:
+def bounds_of(world: World) -> tuple[float, float, float, float]:
     """Bounds of everything; a square metre around the origin for an empty world."""
     edges = [arena.inside.bounds for arena in world.arenas]
     edges += [part.shape.bounds for thing in bodies(world) for part in thing.solid]

@@ -23,6 +23,10 @@
     cell.addEventListener("click", () => unfold(cell.hash));
   }
   reveal();
+  if (location.hash === "#play" && players.size) {
+    document.querySelector(".player").scrollIntoView();
+    [...players.values()][0].play();
+  }
 
   function read(id) {
     return JSON.parse(document.getElementById(id).textContent);
@@ -213,6 +217,6 @@
     background.addEventListener("load", draw);
     // The last candidate of a run is the verified one, if there is one.
     show([...first.values()].at(player.dataset.begin === "last" ? -1 : 0), false);
-    return { show };
+    return { show, play: start };
   }
 })();

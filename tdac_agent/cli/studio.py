@@ -1,0 +1,27 @@
+"""`tdac studio`: a page in the browser for everything that the command line does."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+from tdac_envs.core.errors import TaskError
+from tdac_envs.core.extras import install_command
+
+
+def run(port: int, open_it: bool) -> None:
+    """Serves the studio for the current folder until it is interrupted."""
+    if find_spec("nicegui") is None:
+        raise TaskError(f"the studio needs an extra: {install_command('studio')}")
+    from tdac_agent.studio.serve import serve
+
+    def announce(address: str) -> None:
+        print(address, flush=True)
+        text = "the studio is open for this browser alone; Ctrl-C ends it, not its runs"
+        print(text, file=sys.stderr)
+
+    try:
+        serve(Path(), port, announce, open_it=open_it)
+    except OSError as error:
+        raise TaskError(f"--port {port}: {error.strerror}; give another one") from error

@@ -1,0 +1,1 @@
+"""A page in the browser for everything that the command line does."""

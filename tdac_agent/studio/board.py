@@ -1,0 +1,203 @@
+"""The picture of a map or world on which a user clicks start and goal."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image
+
+from tdac_envs.drawing.canvas import Image as Picture
+from tdac_envs.grid.grid import BoolGrid, clearance
+from tdac_envs.mapping.bundled import bundled_map, bundled_maps
+from tdac_envs.mapping.image import MapImage, load_image
+from tdac_envs.mapping.params import ReadingOptions
+from tdac_envs.mapping.preprocessing import preprocess_with_candidates
+from tdac_envs.mapping.score import widest_radius
+from tdac_envs.mapping.wording import obstacles_text, scale_text
+from tdac_envs.worlds.bodies import bodies
+from tdac_envs.worlds.bundled import bundled_worlds, world_file
+from tdac_envs.worlds.picture import View, bounds_of, draw_things
+from tdac_envs.worlds.wbt.reader import load_world
+
+Kind = Literal["map", "world"]
+Place = tuple[float, float]
+WIDTH = 900
+"""Small maps are enlarged to about this width, large ones reduced to twice that, px."""
+OCCUPIED = 24, 90, 150
+SHARE = 0.62
+"""Opacity of the occupied grid over the picture."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Board:
+    """A picture, and the conversion between its pixels and places.
+
+    Attributes:
+        kind: Of what it is a picture.
+        png: The picture.
+        width: Its width, px.
+        height: Its height, px.
+        unit: Unit of places, `px` or `m`.
+        scale: Picture px per unit.
+        place: Place at a point of the picture.
+        at: Points of the picture for places, shape (n, 2).
+        reading: How it was read, in a sentence.
+        notes: What the reader is to know.
+        start: Where the robot of the file starts, with its heading, if it says so.
+        goal: Where the file has its goal.
+        widest: Largest body radius that gets from one place to another, in the unit;
+            negative for none. None for worlds, whose robot has one size.
+    """
+
+    kind: Kind
+    png: bytes
+    width: int
+    height: int
+    unit: str
+    scale: float
+    place: Callable[[float, float], Place]
+    at: Callable[[ArrayLike], NDArray[np.float64]]
+    reading: str
+    notes: tuple[str, ...] = ()
+    start: tuple[float, float, float] | None = None
+    goal: Place | None = None
+    radius: float | None = None
+    widest: Callable[[Place, Place], float] | None = None
+
+
+def names_of(kind: Kind) -> tuple[str, ...]:
+    """Names of the bundled maps or worlds."""
+    return tuple(bundled_maps() if kind == "map" else bundled_worlds())
+
+
+def board_of(kind: Kind, source: str, polarity: str | None = None) -> Board:
+    """The board of a bundled map or world, or of a file.
+
+    Args:
+        kind: Which of them.
+        source: Name, or path.
+        polarity: Which pixels of a map image are obstacles, if the user has said it.
+
+    Raises:
+        MapError: The map cannot be used.
+        WorldError: The world cannot be used.
+        TaskError: The map may be read in two ways, and `polarity` is None.
+    """
+    if kind == "world":
+        return _of_world(source)
+    return _of_map(source, polarity)
+
+
+def _of_map(source: str, polarity: str | None) -> Board:
+    bundled = bundled_map(source) if source in bundled_maps() else None
+    image = load_image(bundled.image if bundled else Path(source))
+    said = ReadingOptions(None if image.occupied is not None else polarity, None)  # type: ignore[arg-type]
+    grid, params, _ = preprocess_with_candidates(
+        image, None, None, 15.0, preset="default", snap=False, heading=0.0, said=said
+    )
+    zoom = _zoom(grid.cells)
+    picture = _laid_over(image, grid.cells, zoom)
+
+    def place(x: float, y: float) -> Place:
+        return x / zoom - 0.5, y / zoom - 0.5
+
+    def at(points: ArrayLike) -> NDArray[np.float64]:
+        return (np.asarray(points, np.float64).reshape(-1, 2) + 0.5) * zoom
+
+    def widest(start: Place, goal: Place) -> float:
+        ends = [_pixel(grid.cells, each) for each in (start, goal)]
+        return float(widest_radius(clearance(grid.cells), *ends))
+
+    size = f"{params.width} x {params.height} px"
+    text = f"{size}: {obstacles_text(params)}; {scale_text(params.resolution)}"
+    return Board(
+        "map",
+        _encoded(picture),
+        picture.shape[1],
+        picture.shape[0],
+        "px",
+        zoom,
+        place,
+        at,
+        text,
+        tuple(params.notes),
+        (*bundled.start, bundled.heading) if bundled else None,
+        bundled.goal if bundled else None,
+        bundled.robot_radius if bundled else None,
+        widest,
+    )
+
+
+def _of_world(source: str) -> Board:
+    world = load_world(world_file(source))
+    view = View(bounds_of(world), strip=0)
+    draw_things(view, world, bodies(world))
+    picture = view.canvas.image
+    solid = [node.name or node.kind for node in world.unmodelled if node.may_be_solid]
+    notes = [*world.notes]
+    if solid:
+        notes.append(
+            f"not modelled, perhaps solid: {', '.join(solid)}; the world is refused "
+            "unless they are ignored"
+        )
+    robot = next(iter(world.robots), None)
+
+    def place(x: float, y: float) -> Place:
+        return view.place(x - 0.5, y - 0.5)
+
+    def at(points: ArrayLike) -> NDArray[np.float64]:
+        return view.at(points) + 0.5
+
+    text = f"Webots {world.version}: {len(world.obstacles)} obstacles; places in metres"
+    return Board(
+        "world",
+        _encoded(picture),
+        picture.shape[1],
+        picture.shape[0],
+        "m",
+        view.scale,
+        place,
+        at,
+        text,
+        tuple(notes),
+        (robot.x, robot.y, robot.heading) if robot else None,
+        world.goal,
+    )
+
+
+def _zoom(cells: BoolGrid) -> float:
+    """Picture px per map px: a whole number, or the inverse of one."""
+    width = int(cells.shape[1])
+    if width < WIDTH:
+        return float(max(1, WIDTH // width))
+    return 1.0 / max(1, -(-width // (2 * WIDTH)))
+
+
+def _laid_over(image: MapImage, cells: BoolGrid, zoom: float) -> Picture:
+    """The map's picture, with the occupied pixels in colour."""
+    pale = 0.5 * image.colour.astype(np.float64) + 127.0
+    tint = SHARE * np.array(OCCUPIED) + (1.0 - SHARE) * pale
+    mixed = np.where(cells[..., None], tint, pale).astype(np.uint8)
+    if zoom >= 1.0:
+        return np.repeat(np.repeat(mixed, int(zoom), 0), int(zoom), 1)
+    size = (round(cells.shape[1] * zoom), round(cells.shape[0] * zoom))
+    return np.asarray(Image.fromarray(mixed).resize(size, Image.Resampling.BOX))
+
+
+def _pixel(cells: BoolGrid, place: Place) -> tuple[int, int]:
+    """The pixel at a place, or the nearest one of the map."""
+    rows, columns = cells.shape
+    x, y = (round(value) for value in place)
+    return min(max(x, 0), columns - 1), min(max(y, 0), rows - 1)
+
+
+def _encoded(picture: Picture) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(picture)).save(stream, "PNG")
+    return stream.getvalue()

@@ -1,0 +1,171 @@
+"""A task that is being put together by clicks, and whether a robot can drive it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tdac_agent.studio.board import Board, Kind, Place
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task_file import TaskFile
+from tdac_envs.core.errors import TdacError
+from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.map2d.task import Map2DTask
+
+DIGITS = {"px": 1, "m": 3}
+"""Decimals of clicked places."""
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """What has been chosen so far.
+
+    Attributes:
+        kind: Whether the source is a map or a world.
+        source: Bundled name, or path of a file, relative to the studio's folder.
+        start: Start, px or m.
+        goal: Goal.
+        heading: Start heading, rad, from +x towards +y; None for that of the file.
+        radius: Body radius, px; of a map only.
+        polarity: Which pixels of the map are obstacles; None to infer it.
+        ignore: Nodes of the world that are ignored.
+    """
+
+    kind: Kind
+    source: str
+    start: Place | None = None
+    goal: Place | None = None
+    heading: float | None = None
+    radius: float | None = None
+    polarity: str | None = None
+    ignore: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, board: Board, source: str, polarity: str | None = None) -> Draft:
+        """The task of the file itself, as far as it has one."""
+        start = None if board.start is None else (board.start[0], board.start[1])
+        heading = None if board.start is None else board.start[2]
+        radius = board.radius or (15.0 if board.kind == "map" else None)
+        return cls(board.kind, source, start, board.goal, heading, radius, polarity)
+
+    def words(self) -> list[str]:
+        """The flags of the command line that name this task."""
+        return list(self._words())
+
+    def _words(self) -> Iterator[str]:
+        yield from (f"--{self.kind}", self.source)
+        for name in self.ignore:
+            yield from ("--ignore", name)
+        for flag, place in (("--start", self.start), ("--goal", self.goal)):
+            if place is not None:
+                yield from (flag, *(f"{value:g}" for value in place))
+        if self.heading is not None and self.start is not None:
+            yield from ("--heading", f"{self.heading:g}")
+        if self.radius is not None:
+            yield from ("--robot-radius", f"{self.radius:g}")
+        if self.polarity is not None:
+            yield from ("--polarity", self.polarity)
+
+    def with_start(self, place: Place, unit: str) -> Draft:
+        """The draft with a clicked start."""
+        return replace(self, start=_rounded(place, unit))
+
+    def with_goal(self, place: Place, unit: str) -> Draft:
+        """The draft with a clicked goal."""
+        return replace(self, goal=_rounded(place, unit))
+
+    def facing(self, place: Place) -> Draft:
+        """The draft with a robot that faces a place; without a start, unchanged."""
+        if self.start is None or place == self.start:
+            return self
+        over, down = place[0] - self.start[0], place[1] - self.start[1]
+        return replace(self, heading=round(math.atan2(down, over), 3))
+
+    def task_file(self) -> TaskFile:
+        """The same as a task file."""
+        start: tuple[float, ...] | None = self.start
+        if start is not None and self.heading is not None:
+            start = (*start, self.heading)
+        given: dict[str, Any] = {"start": start, "goal": self.goal}
+        if self.kind == "world":
+            given |= {"env": "TDAC-EPuck-v0", "world": self.source}
+            return TaskFile(**given, ignore=self.ignore)
+        given |= {"map": self.source, "robot": {"radius": self.radius}}
+        return TaskFile(**given, polarity=self.polarity)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Checked:
+    """Whether a robot can drive a draft.
+
+    Attributes:
+        task: The task, if it can.
+        problem: Why not.
+        path: Shortest path, shape (n, 2).
+        narrowest: The place on it that is nearest to an obstacle.
+        clearance: Distance from there to the obstacle.
+        widest: Largest body radius that gets through, px; None if it is not known.
+    """
+
+    task: Task | None
+    problem: str = ""
+    path: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
+    narrowest: Place | None = None
+    clearance: float = 0.0
+    widest: float | None = None
+
+
+def check(draft: Draft, board: Board, place: Path) -> Checked:
+    """Loads the task of a draft, as the command would.
+
+    Args:
+        draft: The draft; it must have a goal, and a start unless the world has one.
+        board: Its board.
+        place: Folder of the studio.
+    """
+    widest = None
+    if board.widest is not None and draft.start and draft.goal:
+        widest = board.widest(draft.start, draft.goal)
+    try:
+        task = load_task(draft.task_file(), base=place)
+    except (TdacError, ValueError) as error:
+        return Checked(None, " ".join(str(error).split()), widest=widest)
+    nominal = task.nominal
+    path = np.asarray(nominal.shortest_path(nominal.start), np.float64)
+    narrowest, clearance = _narrowest(nominal, path)
+    return Checked(task, "", path, narrowest, clearance, widest)
+
+
+def _narrowest(nominal: Any, path: np.ndarray) -> tuple[Place | None, float]:
+    """The place of a path that is nearest to an obstacle, and how near it is."""
+    if len(path) < 2:
+        return None, 0.0
+    dense = _dense(path, nominal.full_step)
+    if isinstance(nominal, EPuckTask):
+        gaps = np.array([nominal.ground.gap(x, y) for x, y in dense])
+    elif isinstance(nominal, Map2DTask):
+        columns, rows = np.rint(dense).astype(int).T
+        gaps = nominal.terrain.clear[rows, columns]
+    else:
+        return None, 0.0
+    at = int(gaps.argmin())
+    return (float(dense[at, 0]), float(dense[at, 1])), float(gaps[at])
+
+
+def _dense(path: np.ndarray, step: float) -> np.ndarray:
+    """A path with points at most a step apart."""
+    legs = np.hypot(*np.diff(path, axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(legs)])
+    count = max(2, math.ceil(along[-1] / max(step, 1e-6)) + 1)
+    places = np.linspace(0.0, along[-1], count)
+    return np.column_stack([np.interp(places, along, path[:, k]) for k in (0, 1)])
+
+
+def _rounded(place: Place, unit: str) -> Place:
+    digits = DIGITS[unit]
+    return round(float(place[0]), digits), round(float(place[1]), digits)

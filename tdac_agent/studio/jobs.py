@@ -1,0 +1,174 @@
+"""Commands that the studio starts, as processes of their own.
+
+They outlive the studio. Each has a folder with its command (`job.json`) and its output
+(`output.txt`), by which another studio in the same folder finds it again.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from tdac_agent.storage.files import write_atomic
+from tdac_envs.core.intake import read_file
+
+STATE = ".studio"
+"""Folder of the studio in the folder where it was started."""
+JOBS, ABOUT, OUTPUT, ENDING = "jobs", "job.json", "output.txt", "exit"
+MOST_BYTES = 1 << 20
+TAIL = 4000
+"""Characters of an output that are shown."""
+_STARTED: list[subprocess.Popen[bytes]] = []
+# Writes the exit code when the command has ended, also after the studio has. An
+# interrupt is for the command, which has work to save.
+_WRAPPED = """
+import pathlib, subprocess, sys
+process, code = subprocess.Popen(sys.argv[2:]), None
+while code is None:
+    try:
+        code = process.wait()
+    except KeyboardInterrupt:
+        pass
+pathlib.Path(sys.argv[1]).write_text(str(code))
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A command that was started.
+
+    Attributes:
+        folder: Its folder.
+        words: The words after `tdac`.
+        started: When, ISO 8601.
+        pid: Process group.
+        born: Start time of the process, which tells it from a later one with its pid.
+        about: What it works on: a run folder, or a folder of results.
+    """
+
+    folder: Path
+    words: tuple[str, ...]
+    started: str
+    pid: int
+    born: str
+    about: str
+
+    @property
+    def command(self) -> str:
+        """The command as a user would type it."""
+        return shlex.join(["tdac", *self.words])
+
+    @property
+    def running(self) -> bool:
+        """Whether it still runs."""
+        for process in list(_STARTED):
+            if process.poll() is not None:
+                _STARTED.remove(process)
+        return bool(self.born) and _born(self.pid) == self.born
+
+    @property
+    def code(self) -> int | None:
+        """Its exit code; None while it runs, or if it was killed."""
+        try:
+            return int(read_file(self.folder / ENDING, 16))
+        except (OSError, ValueError):
+            return None
+
+    def output(self) -> str:
+        """The end of what it has printed."""
+        try:
+            data = read_file(self.folder / OUTPUT, MOST_BYTES)
+        except OSError:
+            return ""
+        return data.decode("utf-8", "replace")[-TAIL:]
+
+    def stop(self) -> None:
+        """Interrupts it, as Ctrl-C does."""
+        if self.running:
+            os.killpg(self.pid, signal.SIGINT)
+
+
+def start(place: Path, words: Sequence[str], about: str) -> Job:
+    """Starts `tdac` with some words.
+
+    Args:
+        place: Folder of the studio, and of the process.
+        words: The words after `tdac`.
+        about: What it works on.
+
+    Raises:
+        OSError: The folder cannot be written.
+    """
+    folder = _new_folder(place / STATE / JOBS)
+    command = [sys.executable, "-m", "tdac_agent", *words]
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "100"}
+    with (folder / OUTPUT).open("wb") as output:
+        process = subprocess.Popen(
+            [sys.executable, "-c", _WRAPPED, str(folder / ENDING), *command],
+            cwd=place,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            env=environment,
+        )
+    _STARTED.append(process)
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    job = Job(folder, tuple(words), now, process.pid, _born(process.pid), about)
+    facts = {
+        "words": job.words,
+        "started": job.started,
+        "pid": job.pid,
+        "born": job.born,
+        "about": job.about,
+    }
+    write_atomic(folder / ABOUT, json.dumps(facts) + "\n")
+    return job
+
+
+def jobs(place: Path) -> list[Job]:
+    """The jobs that were started in a folder, the newest first."""
+    found = []
+    for file in (place / STATE / JOBS).glob(f"*/{ABOUT}"):
+        try:
+            facts = json.loads(read_file(file, MOST_BYTES))
+            words = tuple(map(str, facts.pop("words")))
+            found.append(Job(folder=file.parent, words=words, **facts))
+        except (OSError, ValueError, TypeError, KeyError):
+            continue
+    return sorted(found, key=lambda job: (job.started, job.folder.name), reverse=True)
+
+
+def job_of(place: Path, about: str) -> Job | None:
+    """The newest job that works on something."""
+    return next((job for job in jobs(place) if job.about == about), None)
+
+
+def _new_folder(parent: Path) -> Path:
+    parent.mkdir(parents=True, exist_ok=True)
+    number = 1
+    while True:
+        folder = parent / f"{number:05}"
+        try:
+            folder.mkdir(0o700)
+        except FileExistsError:
+            number += 1
+        else:
+            return folder
+
+
+def _born(pid: int) -> str:
+    """Start time of a process in clock ticks since boot; empty if it is gone."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return ""
+    return "" if fields[0] == "Z" else fields[19]

@@ -1,0 +1,346 @@
+"""The first page: a map or world, start and goal by clicks, and who writes."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import itertools
+import math
+import re
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import fastapi
+from nicegui import events, ui
+from PIL import Image
+
+from tdac_agent.library.listing import next_folder
+from tdac_agent.studio.board import Board, Kind, Place, board_of, names_of
+from tdac_agent.studio.draft import Checked, Draft, check
+from tdac_agent.studio.jobs import STATE, start
+from tdac_agent.studio.pages.layout import (
+    address_of,
+    framed,
+    safe_name,
+    shown_command,
+    shown_first,
+)
+from tdac_agent.studio.pages.overlay import overlay
+from tdac_agent.studio.pages.writers import Writers
+from tdac_envs.core.errors import PolarityError, TdacError
+
+UPLOADS = f"{STATE}/files"
+MOST_BYTES = 64 << 20
+YAML = ".yaml", ".yml"
+PICTURES = ".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".tif", ".tiff", ".webp"
+OWN = (*PICTURES, *YAML, ".map", ".npy", ".wbt")
+MOST_FILES = 200
+FIRST = "map: maze"
+
+
+def add(application: fastapi.FastAPI, place: Path) -> None:
+    """Adds the page."""
+    del application
+
+    @ui.page("/")
+    async def page(source: str = FIRST) -> None:
+        with framed("New controller"):
+            await Choosing(place).show(source)
+
+
+class Choosing:
+    """The state of one opened page.
+
+    Args:
+        place: Folder of the studio.
+    """
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+        self._board: Board | None = None
+        self._draft: Draft | None = None
+        self._checked: Checked | None = None
+        self._turn = 0  # number of the newest choice: the work on older ones is dropped
+
+    async def show(self, source: str) -> None:
+        """Builds the page."""
+        with ui.row().classes("w-full gap-6 items-start"):
+            with ui.column().classes("w-full lg:w-[26rem] gap-3"):
+                self._build_source(source)
+                self._build_task()
+                self._build_start()
+            with ui.column().classes("beside grow min-w-[18rem] lg:max-w-[64%] gap-2"):
+                self._image = ui.interactive_image(
+                    on_mouse=self._clicked, cross="#d55e00"
+                ).classes("board")
+                self._image.props('alt="The map or world"')
+                self._reading = ui.label().classes("note text-sm")
+                self._notes = ui.column().classes("gap-0")
+        await shown_first()
+        await self._open(source)
+
+    def _build_source(self, source: str) -> None:
+        ui.label("1. Map or world").classes("text-lg font-bold")
+        options = _sources(self._place)
+        if source not in options:
+            options.append(source)
+        self._source = ui.select(
+            options,
+            value=source,
+            label="bundled, or a file of this folder",
+            with_input=True,
+            on_change=lambda event: self._open(event.value),
+        ).classes("w-full")
+        ui.upload(
+            label="or drop a file here: image, map.yaml + image, .map, .npy, .wbt",
+            multiple=True,
+            auto_upload=True,
+            max_file_size=MOST_BYTES,
+            on_upload=self._uploaded,
+            on_rejected=lambda: ui.notify(
+                f"a file may have at most {MOST_BYTES >> 20} MB", type="warning"
+            ),
+        ).classes("w-full").props('accept="{}"'.format(",".join(OWN)))
+        self._polarity = ui.toggle(
+            {"": "detect", "dark": "obstacles are dark", "light": "are light"},
+            value="",
+            on_change=lambda: self._open(self._source.value),
+        ).props("no-caps dense")
+
+    def _build_task(self) -> None:
+        ui.label("2. Start and goal").classes("text-lg font-bold")
+        self._mode = ui.toggle(
+            {"start": "click the start", "heading": "its heading", "goal": "the goal"},
+            value="start",
+        ).props("no-caps dense")
+        names = ("start x", "start y", "heading, rad", "goal x", "goal y")
+        self._numbers: dict[str, ui.number] = {}
+        with ui.grid(columns=3).classes("w-full gap-2"):
+            for name in names:
+                self._numbers[name] = (
+                    ui.number(name, format="%g")
+                    .on("change", self._typed)
+                    .on("keydown.enter", self._typed)
+                    .props("dense")
+                )
+        with ui.column().classes("w-full gap-0") as self._sized:
+            self._radius_text = ui.label("robot radius")
+            self._radius = ui.slider(min=1, max=40, step=0.5, value=15).props(
+                "label aria-label='robot radius, px'"
+            )
+            self._radius.on("change", self._resized)
+        self._told = ui.label().classes("text-sm").props("role=status")
+
+    def _build_start(self) -> None:
+        ui.label("3. Who writes").classes("text-lg font-bold")
+        self._writers = Writers(self._place, self._refresh_command)
+        self._go = ui.button("Write and verify a controller", on_click=self._begin)
+        ui.label("The same on the command line:").classes("note text-sm")
+        self._command = shown_command("")
+
+    async def _open(self, source: str) -> None:
+        """Reads another map or world."""
+        self._turn += 1
+        turn = self._turn
+        kind, _, name = source.partition(": ")
+        asked = self._polarity.value or None
+        try:
+            path = name if name in names_of(_kind(kind)) else str(self._place / name)
+            board = await asyncio.to_thread(board_of, _kind(kind), path, asked)
+        except PolarityError as error:
+            self._refuse(f"{error}. Choose which pixels are the obstacles.")
+            return
+        except (TdacError, OSError, ValueError) as error:
+            self._refuse(str(error))
+            return
+        if turn != self._turn:  # something else has been chosen meanwhile
+            return
+        kept = asked if kind == "map" else None
+        self._board, self._draft = board, Draft.of(board, name, kept)
+        self._image.set_source(Image.open(io.BytesIO(board.png)))
+        self._image.props(f'alt="{kind} {name}"')
+        self._reading.text = board.reading
+        self._notes.clear()
+        with self._notes:
+            for note in board.notes:
+                ui.label(note).classes("note text-sm")
+        self._sized.visible = self._polarity.visible = board.kind == "map"
+        self._radius.value = self._draft.radius or 15
+        self._mode.value = "start"
+        self._show_numbers(self._draft)
+        await self._check()
+
+    def _refuse(self, text: str) -> None:
+        self._checked, self._draft = None, None
+        self._image.set_source("")
+        self._image.content = ""
+        self._reading.text = ""
+        self._tell(text, good=False)
+        self._refresh_command()
+
+    async def _uploaded(self, event: events.UploadEventArguments) -> None:
+        """Keeps a file, and opens it if it is a map or a world."""
+        name = safe_name(event.file.name)
+        suffix = Path(name).suffix.lower()
+        if suffix not in OWN:
+            ui.notify(f"{name}: expected one of {', '.join(OWN)}", type="warning")
+            return
+        folder = self._place / UPLOADS
+        folder.mkdir(parents=True, exist_ok=True)
+        await event.file.save(folder / name)
+        if suffix in YAML and not _image_of(folder / name):
+            ui.notify(f"{name} is kept; drop its image, too", type="info")
+            return
+        kind = "world" if suffix == ".wbt" else "map"
+        source = f"{kind}: {UPLOADS}/{name}"
+        self._source.set_options(_sources(self._place))
+        self._source.value = source
+
+    async def _clicked(self, event: events.MouseEventArguments) -> None:
+        if self._board is None or self._draft is None:
+            return
+        unit = self._board.unit
+        place = self._board.place(event.image_x, event.image_y)
+        mode, nearest = self._mode.value, _on_pixel(place, unit)
+        if mode == "start":
+            self._draft = self._draft.with_start(nearest, unit)
+            self._mode.value = "heading"
+        elif mode == "heading":
+            self._draft = self._draft.facing(place)
+            self._mode.value = "goal"
+        else:
+            self._draft = self._draft.with_goal(nearest, unit)
+        self._show_numbers(self._draft)
+        await self._check()
+
+    async def _typed(self) -> None:
+        if self._draft is None:
+            return
+        values = [self._numbers[name].value for name in self._numbers]
+        x, y, heading, goal_x, goal_y = values
+        start = None if x is None or y is None else (x, y)
+        goal = None if goal_x is None or goal_y is None else (goal_x, goal_y)
+        self._draft = replace(self._draft, start=start, goal=goal, heading=heading)
+        await self._check()
+
+    async def _resized(self) -> None:
+        if self._draft is not None:
+            self._draft = replace(self._draft, radius=float(self._radius.value))
+            await self._check()
+
+    async def _check(self) -> None:
+        """Finds the path of the draft, or why there is none."""
+        draft, board = self._draft, self._board
+        assert draft is not None
+        assert board is not None
+        self._turn += 1
+        turn, self._checked = self._turn, None
+        if draft.goal is None or (draft.start is None and board.start is None):
+            self._tell("Click the start, its heading, and the goal.", good=True)
+        else:
+            checked = await asyncio.to_thread(check, draft, board, self._place)
+            if turn != self._turn:
+                return
+            self._checked = checked
+            self._tell(*_sentence(checked, board))
+        self._image.content = overlay(board, draft, self._checked)
+        self._show_radius(draft)
+        self._refresh_command()
+
+    def _show_numbers(self, draft: Draft) -> None:
+        places = (*(draft.start or (None, None)), draft.heading)
+        shown = (*places, *(draft.goal or (None, None)))
+        for number, value in zip(self._numbers.values(), shown, strict=True):
+            number.value = value
+
+    def _show_radius(self, draft: Draft) -> None:
+        text = f"robot radius {draft.radius:g} px" if draft.radius else ""
+        widest = self._checked.widest if self._checked else None
+        if widest is not None:
+            text += (
+                f"; the widest that gets through has {widest:g} px"
+                if widest > 0
+                else "; no robot gets through"
+            )
+        self._radius_text.text = text
+
+    def _tell(self, text: str, good: bool) -> None:
+        self._told.text = text
+        self._told.classes(
+            add="fine" if good else "problem", remove="problem" if good else "fine"
+        )
+
+    def _refresh_command(self) -> None:
+        words = self._words()
+        self._command.text = "tdac " + shlex.join(words) if words else ""
+        ready = self._checked is not None and self._checked.task is not None
+        self._go.set_enabled(ready and self._writers.problem() is None)
+
+    def _words(self) -> list[str]:
+        if self._draft is None:
+            return []
+        return ["synth", *self._draft.words(), *self._writers.words()]
+
+    async def _begin(self) -> None:
+        """Starts the run, and opens its page."""
+        if self._checked is None or self._checked.task is None:
+            return
+        folder = str(next_folder(self._checked.task.name, self._place))
+        words = [*self._words(), "--out", folder]
+        words = self._writers.with_folder(words, folder)
+        try:
+            start(self._place, words, folder)
+        except OSError as error:
+            ui.notify(f"cannot start: {error.strerror}", type="negative")
+            return
+        ui.navigate.to(address_of("/run", folder))
+
+
+def _sources(place: Path) -> list[str]:
+    """Bundled maps and worlds, and the files of the folder that may be one."""
+    found = [f"map: {name}" for name in names_of("map")]
+    found += [f"world: {name}" for name in names_of("world")]
+    folders = place, place / "maps", place / UPLOADS
+    files = [path for folder in folders for path in folder.glob("*")]
+    for path in sorted(files)[:MOST_FILES]:
+        suffix = path.suffix.lower()
+        if suffix in OWN and path.is_file():
+            if suffix in YAML and not _image_of(path):
+                continue
+            kind = "world" if suffix == ".wbt" else "map"
+            found.append(f"{kind}: {path.relative_to(place)}")
+    return found
+
+
+def _image_of(path: Path) -> bool:
+    """Whether a YAML file is that of a ROS map whose image is there."""
+    try:
+        text = path.read_text(encoding="utf-8")[:10_000]
+    except (OSError, ValueError):
+        return False
+    named = re.search(r"^image:\s*[\"']?([^\"'\n#]+)", text, re.MULTILINE)
+    return bool(named and (path.parent / named[1].strip()).is_file())
+
+
+def _kind(kind: str) -> Kind:
+    return "world" if kind == "world" else "map"
+
+
+def _on_pixel(place: Place, unit: str) -> Place:
+    """A clicked place; on a map, the middle of a pixel."""
+    return (round(place[0]), round(place[1])) if unit == "px" else place
+
+
+def _sentence(checked: Checked, board: Board) -> tuple[str, bool]:
+    """What was found, and whether it is good."""
+    if checked.task is None:
+        return checked.problem, False
+    length = sum(math.dist(a, b) for a, b in itertools.pairwise(checked.path))
+    text = f"A path of {length:.4g} {board.unit}"
+    if checked.narrowest is not None:
+        text += (
+            f"; its narrowest place is {checked.clearance:.3g} {board.unit} from an "
+            f"obstacle (ring)"
+        )
+    return f"{text}.", True

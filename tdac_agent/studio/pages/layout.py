@@ -1,0 +1,91 @@
+"""What all pages share: the frame, the style, and paths within the folder."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import quote
+
+from nicegui import ui
+
+STYLE = """
+body { font-family: system-ui, sans-serif; background: #f6f6f3; color: #23262e; }
+.q-header { background: #23262e; }
+.nicegui-content { max-width: 1500px; margin: 0 auto; width: 100%; }
+code.command { display: block; background: #eceae3; padding: .6em .8em;
+  border-radius: 6px; white-space: pre-wrap; overflow-wrap: anywhere;
+  font-size: .85rem; width: 100%; }
+.board { width: 100%; border: 1px solid #d4d2c8; border-radius: 6px; overflow: hidden; }
+.board img { width: 100%; cursor: crosshair; }
+@media (min-width: 1024px) { .beside { position: sticky; top: 4rem; } }
+.world { width: min(100%, 78vh); }
+.problem { color: #a3280f; } .fine { color: #12694a; } .note { color: #5d6068; }
+iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
+  height: 82vh; background: white; }
+.status { border-radius: 999px; padding: .1em .7em; font-weight: 600;
+  background: #e4e2da; }
+.status.verified, .status.selected, .status.trained { background: #cfe9dc; }
+.status.running { background: #d6e4f5; } .status.not-verified { background: #f4d9d2; }
+td a { color: #1d5fae; }
+pre.output { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .8rem;
+  max-height: 16rem; overflow: auto; width: 100%; margin: 0; }
+"""
+PATIENCE = 120.0
+"""Seconds that a browser may need to show a page."""
+LINKS = (("New controller", "/"), ("Runs", "/runs"), ("Worlds", "/worlds"))
+
+
+@contextmanager
+def framed(title: str) -> Generator[None]:
+    """The frame of a page, with links to the others."""
+    ui.add_css(STYLE)
+    ui.page_title(f"{title} – tdac studio")
+    with ui.header().classes("items-center gap-4 py-2"):
+        ui.label("tdac studio").classes("text-lg font-bold")
+        for name, address in LINKS:
+            ui.link(name, address).classes("text-white no-underline")
+    with ui.column().classes("w-full gap-3 px-1"):
+        yield
+
+
+async def shown_first() -> None:
+    """Waits until the browser shows what has been built: slow work comes after it."""
+    await ui.context.client.connected(timeout=PATIENCE)
+
+
+def shown_command(text: str) -> ui.label:
+    """A command as it would be typed, with a button to copy it."""
+    with ui.row().classes("w-full items-center no-wrap gap-2"):
+        code = ui.element("code").classes("command")
+        with code:
+            label = ui.label(text)
+        ui.button(
+            icon="content_copy", on_click=lambda: ui.clipboard.write(label.text)
+        ).props("flat dense aria-label='Copy the command'")
+    return label
+
+
+def address_of(page: str, at: str) -> str:
+    """Address of a page about something in the folder."""
+    return f"{page}?at={quote(at)}"
+
+
+def within(place: Path, at: str) -> Path | None:
+    """A path in the folder of the studio; None if it leads out of it."""
+    try:
+        found = (place / at).resolve()
+    except ValueError:  # a null byte
+        return None
+    return found if found.is_relative_to(place) else None
+
+
+def safe_name(name: str) -> str:
+    """A file name without anything that a path or a shell would read otherwise."""
+    return re.sub(r"[^\w.-]+", "-", Path(name).name).lstrip(".-") or "file"
+
+
+def status_badge(status: str) -> None:
+    """A status in its colour."""
+    ui.label(status).classes(f"status {status.replace(' ', '-')}")

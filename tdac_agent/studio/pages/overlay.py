@@ -1,0 +1,72 @@
+"""Start, goal and path as SVG over the picture of a map or world."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from tdac_agent.studio.board import Board
+from tdac_agent.studio.draft import Checked, Draft
+from tdac_envs.worlds.bodies import BODY_RADIUS
+
+PATH, ROBOT, GOAL, NARROW = "#5848c6", "#5848c6", "#12694a", "#d55e00"
+
+
+def overlay(board: Board, draft: Draft, checked: Checked | None) -> str:
+    """The marks of a draft."""
+    thick = max(board.width, board.height) / 400
+    parts = []
+    if checked is not None and len(checked.path) > 1:
+        parts.append(_polyline(board, checked.path, thick))
+    if checked is not None and checked.narrowest is not None:
+        ((x, y),) = board.at([checked.narrowest]).tolist()
+        radius = max(2.0 * checked.clearance * board.scale, 8 * thick)
+        parts.append(_circle(x, y, radius, "none", NARROW, 2 * thick))
+    if draft.goal is not None:
+        ((x, y),) = board.at([draft.goal]).tolist()
+        size = 5 * thick
+        parts.append(_circle(x, y, size, "none", GOAL, 1.6 * thick))
+        parts.append(_circle(x, y, 0.4 * size, GOAL, "none", 0))
+    start = draft.start or (board.start[:2] if board.start else None)
+    if start is not None:
+        parts += _robot(board, start, draft, thick)
+    return "".join(parts)
+
+
+def _robot(
+    board: Board, start: tuple[float, float], draft: Draft, thick: float
+) -> list[str]:
+    """The body at the start, with a line towards its heading."""
+    ((x, y),) = board.at([start]).tolist()
+    body = draft.radius if draft.radius is not None else BODY_RADIUS
+    radius = max(body * board.scale, 3 * thick)
+    heading = draft.heading or 0.0
+    ahead = np.add(start, [math.cos(heading), math.sin(heading)])
+    ((to_x, to_y),) = board.at([ahead]).tolist()
+    far = math.hypot(to_x - x, to_y - y) or 1.0
+    reach = 1.6 * radius / far
+    end = x + reach * (to_x - x), y + reach * (to_y - y)
+    return [
+        _circle(x, y, radius, f"{ROBOT}59", ROBOT, thick),
+        f'<line x1="{x:.1f}" y1="{y:.1f}" x2="{end[0]:.1f}" y2="{end[1]:.1f}" '
+        f'stroke="{ROBOT}" stroke-width="{1.6 * thick:.2f}" stroke-linecap="round"/>',
+    ]
+
+
+def _polyline(board: Board, path: Any, thick: float) -> str:
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in board.at(path).tolist())
+    return (
+        f'<polyline points="{points}" fill="none" stroke="{PATH}" '
+        f'stroke-width="{1.4 * thick:.2f}" stroke-dasharray="{5 * thick:.1f}"/>'
+    )
+
+
+def _circle(
+    x: float, y: float, radius: float, fill: str, stroke: str, width: float
+) -> str:
+    return (
+        f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{fill}" '
+        f'stroke="{stroke}" stroke-width="{width:.2f}"/>'
+    )

@@ -1,0 +1,115 @@
+"""Robustness of a verified controller, on request, with the worst seeds to watch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nicegui import ui
+
+from tdac_agent.evaluation.robust_report import RobustReport
+from tdac_agent.runs.run_record import Run, load_run
+from tdac_agent.studio.jobs import STATE, job_of, start
+from tdac_agent.studio.pages.layout import address_of
+from tdac_envs.core.errors import TdacError
+from tdac_envs.core.intake import RECORD_BYTES, read_file
+
+EPISODES = 200
+SHOWN = 6
+
+
+class Robustness:
+    """A part of the page of a run.
+
+    Args:
+        place: Folder of the studio.
+        at: The run, relative to it.
+    """
+
+    def __init__(self, place: Path, at: str) -> None:
+        self._place, self._at, self._seen = place, at, ""
+        self._out = f"{STATE}/robust/{at.replace('/', '-')}"
+        with ui.card().classes("w-full") as self._card:
+            ui.label("Robustness").classes("font-bold")
+            with ui.row().classes("items-center"):
+                self._count = ui.number("disturbed episodes", value=EPISODES, min=1)
+                self._go = ui.button("Measure", on_click=self._begin)
+                self._now = ui.label().classes("note")
+            self._found = ui.column().classes("w-full gap-1")
+            self._film = ui.column().classes("w-full")
+        self._card.visible = False
+
+    def look(self, folder: Path) -> None:
+        """Shows what has been measured, and which video is finished."""
+        if not self._card.visible:
+            self._card.visible = _is_verified(folder)
+            if not self._card.visible:
+                return
+        job = job_of(self._place, self._out)
+        running = job is not None and job.running
+        self._go.set_enabled(not running)
+        lines = job.output().strip().splitlines() if job else []
+        self._now.text = lines[-1] if running and lines else ""
+        path = self._place / self._out / "robust.json"
+        try:
+            text = read_file(path, RECORD_BYTES).decode()
+            report = RobustReport.model_validate_json(text)
+        except (OSError, ValueError):
+            return
+        if text != self._seen:
+            self._seen = text
+            self._show(report)
+
+    def _show(self, report: RobustReport) -> None:
+        self._found.clear()
+        with self._found:
+            text = f"{report.successes} of {report.episodes} episodes reached the goal"
+            if report.interval is not None:
+                low, high = report.interval.low, report.interval.high
+                text += f" (95 % interval {low:.3f} to {high:.3f})"
+            ui.label(f"{text}.")
+            with ui.row().classes("items-center gap-2"):
+                ui.label("The worst, to watch:")
+                for episode in report.worst[:SHOWN]:
+                    text = f"seed {episode.seed}: {episode.outcome}"
+                    ui.button(
+                        text, on_click=lambda _, seed=episode.seed: self._watch(seed)
+                    ).props("outline no-caps dense")
+
+    def _begin(self) -> None:
+        count = str(int(self._count.value or EPISODES))
+        words = ["verify", self._at, "--robust", count, "--out", self._out]
+        start(self._place, words, self._out)
+
+    def _watch(self, seed: int) -> None:
+        """Draws a video of an episode, and shows it."""
+        film = f"{self._out}/seed-{seed}.mp4"
+        if not (self._place / film).is_file():
+            (self._place / self._out).mkdir(parents=True, exist_ok=True)
+            words = ["play", self._at, "--seed", str(seed), "--video", film]
+            start(self._place, words, film)
+        self._film.clear()
+        with self._film:
+            label = ui.label(f"drawing the episode of seed {seed} …").classes("note")
+
+        def finished() -> None:
+            job = job_of(self._place, film)
+            if job is not None and job.running:
+                return
+            timer.deactivate()
+            label.text = f"seed {seed}"
+            if not (self._place / film).is_file():
+                label.text = job.output()[-300:] if job else "no video"
+                return
+            with self._film:
+                ui.video(address_of("/file", film)).classes("w-full max-w-3xl")
+
+        with self._film:
+            timer = ui.timer(0.5, finished)
+
+
+def _is_verified(folder: Path) -> bool:
+    try:
+        run: Run = load_run(folder)
+    except (TdacError, OSError):
+        return False
+    return run.verified and not run.on_set

@@ -1,0 +1,245 @@
+"""The page of a run: what it does now, what it found, and what can be done with it."""
+
+from __future__ import annotations
+
+import asyncio
+import shlex
+from pathlib import Path
+from typing import Any
+
+import fastapi
+from nicegui import ui
+
+from tdac_agent.library.listing import row_of
+from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
+from tdac_agent.runs.run_record import RUN_FILE, load_run
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.studio.jobs import Job, job_of, start
+from tdac_agent.studio.pages.layout import (
+    address_of,
+    framed,
+    shown_command,
+    shown_first,
+    status_badge,
+    within,
+)
+from tdac_agent.studio.pages.robustness import Robustness
+from tdac_envs.core.errors import TdacError
+
+SECONDS = 1.0
+"""Between two looks at the folder."""
+
+
+def add(application: fastapi.FastAPI, place: Path) -> None:
+    """Adds the pages of one run and of two side by side."""
+    del application
+
+    @ui.page("/run")
+    async def page(at: str = "") -> None:
+        with framed(at):
+            folder = within(place, at)
+            if folder is None or not at:
+                ui.label(f"{at!r} is not in this folder").classes("problem")
+                return
+            await Watching(place, at, folder).show()
+
+    @ui.page("/compare")
+    async def compare(one: str = "", other: str = "") -> None:
+        with framed("Two runs"), ui.row().classes("w-full no-wrap gap-3"):
+            for at in (one, other):
+                folder = within(place, at)
+                with ui.column().classes("w-1/2 gap-1"):
+                    ui.link(at, address_of("/run", at)).classes("font-bold")
+                    if folder is not None and (folder / RUN_FILE).is_file():
+                        _frame(at, "compare")
+                    else:
+                        ui.label("no such run").classes("problem")
+
+
+class Watching:
+    """The state of one opened page.
+
+    Args:
+        place: Folder of the studio.
+        at: The run, relative to it.
+        folder: Its folder.
+    """
+
+    def __init__(self, place: Path, at: str, folder: Path) -> None:
+        self._place, self._at, self._folder = place, at, folder
+        self._seen: Any = None
+        self._reported = ""
+        self._question: Path | None = None
+
+    async def show(self) -> None:
+        """Builds the page, and keeps it up to date."""
+        with ui.row().classes("w-full items-center gap-3"):
+            ui.label(self._at).classes("text-xl font-bold")
+            self._badge = ui.row()
+            self._now = ui.label().classes("note").props("role=status")
+        self._command = shown_command("")
+        with ui.row().classes("gap-2 items-center"):
+            self._stop = ui.button("Stop", icon="stop", on_click=self._interrupt)
+            self._resume = ui.button(
+                "Continue", icon="play_arrow", on_click=self._go_on
+            )
+            self._follow = ui.switch("show each new candidate", value=True)
+        self._wishes = ui.column().classes("w-full gap-1")
+        self._asked = ui.column().classes("w-full gap-1")
+        self._report = ui.column().classes("w-full")
+        self._robust = Robustness(self._place, self._at)
+        printed = ui.expansion("What the command printed").classes("w-full")
+        with printed, ui.element("pre").classes("output"):
+            self._output = ui.label()
+        await shown_first()
+        await self._look()
+        ui.timer(SECONDS, self._look)
+
+    async def _look(self) -> None:
+        """Shows what has changed."""
+        job = job_of(self._place, self._at)
+        state = await asyncio.to_thread(_state, self._folder, job)
+        self._show_question()
+        self._robust.look(self._folder)
+        if state == self._seen:
+            return
+        self._seen = state
+        row, running, version, output = state
+        self._show_row(row, running, job)
+        self._output.text = output
+        if (
+            version
+            and version != self._reported
+            and (self._follow.value or not self._reported or not running)
+        ):
+            self._reported = version
+            self._report.clear()
+            with self._report:
+                _frame(self._at, version)
+
+    def _show_row(self, row: dict[str, Any], running: bool, job: Job | None) -> None:
+        status = row["status"] if row else "running" if running else "not begun"
+        self._badge.clear()
+        with self._badge:
+            status_badge(status)
+        self._now.text = _progress(row, running)
+        go_on = row.get("go_on", "") if row else ""
+        self._command.text = job.command if job else go_on or f"tdac report {self._at}"
+        self._stop.visible = running
+        self._resume.visible = bool(go_on) and not running and status != "running"
+        self._wishes.clear()
+        if not running and not row and job is not None:
+            with self._wishes:
+                last = job.output().strip().splitlines()[-1:] or ["nothing was printed"]
+                ui.label(f"It did not begin: {last[0]}").classes("problem")
+
+    def _interrupt(self) -> None:
+        job = job_of(self._place, self._at)
+        if job is not None:
+            job.stop()
+
+    def _go_on(self, *, trusted: bool = False) -> None:
+        """Continues the run; one from elsewhere first lists what it asks for."""
+        try:
+            run = load_run(self._folder)
+            own = is_own_folder(run)
+            tests = self._folder / OWN_SUITE
+            suite = tests if tests.is_dir() else None
+            asked = [] if own else [wish.what for wish in wishes_of(run, suite, ())]
+        except (TdacError, OSError) as error:
+            ui.notify(str(error), type="negative")
+            return
+        if asked and not trusted:
+            self._ask(asked)
+            return
+        more = shlex.split(run.enough) if run.enough else []
+        words = ["synth", "--resume", self._at, *more]
+        start(self._place, [*words, *(["--trust"] if asked else [])], self._at)
+        self._wishes.clear()
+
+    def _ask(self, asked: list[str]) -> None:
+        self._wishes.clear()
+        with self._wishes, ui.card().classes("w-full"):
+            ui.label("This run was not begun here. To continue it, it wants to:")
+            for what in asked:
+                ui.label(f"• {what}").classes("problem")
+            ui.button(
+                "I trust it: continue", on_click=lambda: self._go_on(trusted=True)
+            ).props("color=negative")
+
+    def _show_question(self) -> None:
+        """The open question of a `manual` run, and a box for the answer."""
+        folder = self._place / f"{self._at}-questions"
+        open_ones = [
+            path
+            for path in sorted(folder.glob("*.prompt.md"))
+            if not _answer_to(path).exists()
+        ]
+        question = open_ones[0] if open_ones else None
+        if question == self._question:
+            return
+        self._question = question
+        self._asked.clear()
+        if question is None:
+            return
+        text = question.read_text(encoding="utf-8", errors="replace")
+        with self._asked, ui.card().classes("w-full"):
+            ui.label("The run waits for an answer. Copy the prompt to a model:")
+            with ui.row().classes("items-center"):
+                ui.button(
+                    "Copy the prompt", icon="content_copy",
+                    on_click=lambda: ui.clipboard.write(text),
+                )  # fmt: skip
+                ui.label(f"{len(text):,} characters").classes("note")
+            shown = ui.expansion("Show the prompt").classes("w-full")
+            with shown, ui.element("pre").classes("output"):
+                ui.label(text)
+            box = ui.textarea("and paste its whole answer here").classes("w-full")
+
+            def send() -> None:
+                if (box.value or "").strip():
+                    write_atomic(_answer_to(question), box.value)
+                else:
+                    ui.notify("the answer is empty", type="warning")
+
+            ui.button("Use this answer", on_click=send)
+
+
+def _answer_to(question: Path) -> Path:
+    return question.with_name(question.name.replace(".prompt.md", ".reply.md"))
+
+
+def _state(folder: Path, job: Job | None) -> tuple[dict[str, Any], bool, str, str]:
+    """Row of the list, whether it runs, version of its report, and output."""
+    running = job is not None and job.running
+    output = job.output() if job is not None else ""
+    if not (folder / RUN_FILE).is_file():
+        return {}, running, "", output
+    row = row_of(folder)
+    running = running or row["status"] == "running"
+    judged = len(list(folder.glob("iterations/*/*/report.json")))
+    version = f"{judged}-{row['status']}" if judged or not running else ""
+    return row, running, version, output
+
+
+def _progress(row: dict[str, Any], running: bool) -> str:
+    """One line about where the run stands."""
+    if not row or "k" not in row:
+        return "preparing the task …" if running else ""
+    text = f"iteration {row['k']} of at most {row['iterations']}"
+    tokens = row["tokens_in"] + row["tokens_out"]
+    if tokens:
+        cost = row["cost"]
+        text += f"; {tokens:,} tokens"
+        text += "" if cost is None else f", {cost:.4f} USD"
+    if row.get("reason"):
+        text += f"; {row['reason']}"
+    return text
+
+
+def _frame(at: str, version: str) -> None:
+    """The report of a run in one of its states."""
+    ui.element("iframe").classes("report").props(
+        f'src="{address_of("/report", at)}&version={version}#play" '
+        f'sandbox="allow-scripts" title="Report on {at}"'
+    )

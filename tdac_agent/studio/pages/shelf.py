@@ -1,0 +1,220 @@
+"""The list of runs, trainings, campaigns and benches in the folder."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import zipfile
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import fastapi
+from nicegui import events, ui
+
+from tdac_agent.campaign.drive import CONFIG_FILE
+from tdac_agent.library.listing import folders_of, row_of
+from tdac_agent.models.budget import format_usd
+from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
+from tdac_agent.studio.jobs import jobs
+from tdac_agent.studio.pages.layout import address_of, framed, shown_first
+
+MOST_ROWS = 2_000
+MOST_UPLOAD = 256 << 20
+MOST_UNPACKED = 1 << 30
+MOST_FILES = 20_000
+_known: dict[Path, tuple[tuple[int, ...], dict[str, Any]]] = {}
+COLUMNS = [
+    {"name": name, "label": name, "field": name, "align": "left", "sortable": True}
+    for name in ("run", "task", "writer", "status", "k", "cost", "started")
+]
+
+
+def add(application: fastapi.FastAPI, place: Path) -> None:
+    """Adds the page."""
+    del application
+
+    @ui.page("/runs")
+    async def page() -> None:
+        with framed("Runs"):
+            found = ui.column().classes("w-full")
+            with found:
+                ui.label("reading the folder …").classes("note")
+            _show_others(place)
+            _show_upload(place)
+            await shown_first()
+            rows = await asyncio.to_thread(rows_in, place)
+            found.clear()
+            with found:
+                _show_table(rows)
+
+
+def rows_in(place: Path) -> list[dict[str, Any]]:
+    """A row for each run and training, the newest first."""
+    found = sorted(map(_row, folders_of(place)), key=lambda row: row.get("started", ""))
+    for folder in [each for each in _known if not each.exists()]:
+        del _known[folder]
+    return [_cells(place, row) for row in reversed(found[-MOST_ROWS:])]
+
+
+def _row(folder: Path) -> dict[str, Any]:
+    """The row of a run; that of a finished one is read once."""
+    stamp = tuple(
+        (folder / name).stat().st_mtime_ns if (folder / name).exists() else 0
+        for name in (RUN_FILE, JOURNAL)
+    )
+    before = _known.get(folder)
+    if before is not None and before[0] == stamp and before[1]["status"] != "running":
+        return before[1]
+    row = row_of(folder)
+    _known[folder] = stamp, row
+    return row
+
+
+def _cells(place: Path, row: dict[str, Any]) -> dict[str, Any]:
+    run = str(Path(row["run"]).resolve().relative_to(place))
+    k = f"{row['k']}/{row['iterations']}" if "k" in row else ""
+    cost = row.get("cost")
+    return {
+        "run": run,
+        "address": address_of("/run", run) if "steps" not in row else "",
+        "task": str(row.get("task", "")),
+        "writer": row.get("learner", ""),
+        "status": row["status"],
+        "k": k or (f"{row['steps']:,} steps" if "steps" in row else ""),
+        "cost": format_usd(cost) if cost else "",
+        "started": _when(row.get("started", "")),
+    }
+
+
+def _when(started: str) -> str:
+    try:
+        return f"{datetime.fromisoformat(started).astimezone():%Y-%m-%d %H:%M}"
+    except (ValueError, OverflowError):
+        return started[:16]
+
+
+def _show_table(rows: list[dict[str, Any]]) -> None:
+    if not rows:
+        ui.label("No runs in this folder yet.")
+        return
+    table = ui.table(
+        columns=COLUMNS,
+        rows=rows,
+        row_key="run",
+        selection="multiple",
+        pagination={"rowsPerPage": 25},
+    ).classes("w-full")
+    table.add_slot(
+        "body-cell-run",
+        '<q-td :props="props"><a v-if="props.row.address" :href="props.row.address">'
+        "{{ props.row.run }}</a><span v-else>{{ props.row.run }}</span></q-td>",
+    )
+    with table.add_slot("top-left"):
+        search = ui.input("search").props("dense clearable")
+        search.bind_value_to(table, "filter")
+    with table.add_slot("top-right"):
+
+        def compare() -> None:
+            chosen = [row["run"] for row in table.selected if row["address"]]
+            if len(chosen) == 2:
+                one, other = map(quote, chosen)
+                ui.navigate.to(f"/compare?one={one}&other={other}")
+            else:
+                ui.notify("select two runs", type="info")
+
+        ui.button("Two side by side", on_click=compare).props("flat no-caps")
+
+
+def _show_others(place: Path) -> None:
+    """Campaigns and benches, and commands that still run."""
+    campaigns = [path.parent for path in place.glob(f"*/{CONFIG_FILE}")]
+    campaigns += [path.parent for path in place.glob(f"*/*/{CONFIG_FILE}")]
+    benches = [path.parent for path in place.glob("*/bench.json")]
+    benches += [path.parent for path in place.glob("*/*/bench.json")]
+    for title, folders, page in (
+        ("Campaigns", campaigns, "/report"),
+        ("Benches", benches, "/file"),
+    ):
+        if not folders:
+            continue
+        ui.label(title).classes("text-lg font-bold")
+        for folder in sorted(folders):
+            at = str(folder.relative_to(place))
+            target = at if page == "/report" else f"{at}/bench.html"
+            ui.link(at, address_of(page, target), new_tab=True)
+    running = [job for job in jobs(place) if job.running]
+    if running:
+        ui.label("At work").classes("text-lg font-bold")
+    for job in running:
+        with ui.row().classes("items-center"):
+            ui.label(job.command).classes("font-mono text-sm")
+            ui.button("Stop", on_click=job.stop).props("flat dense")
+
+
+def _show_upload(place: Path) -> None:
+    async def uploaded(event: events.UploadEventArguments) -> None:
+        data = await event.file.read()
+        try:
+            folder = unpack(data, Path(event.file.name).stem, place / "runs")
+        except (OSError, ValueError, zipfile.BadZipFile) as error:
+            ui.notify(f"{event.file.name}: {error}", type="negative")
+            return
+        ui.navigate.to(address_of("/run", str(folder.relative_to(place))))
+
+    ui.label("A run from elsewhere").classes("text-lg font-bold")
+    ui.label(
+        "Drop a run folder as a .zip. It is shown as data: nothing in it runs unless "
+        "you continue it and agree to what it asks for."
+    ).classes("note")
+    ui.upload(
+        label="run folder as .zip", auto_upload=True, max_file_size=MOST_UPLOAD,
+        on_upload=uploaded,
+    ).props("accept=.zip")  # fmt: skip
+
+
+def unpack(data: bytes, name: str, parent: Path) -> Path:
+    """Unpacks a run folder; returns where it is.
+
+    Args:
+        data: Content of a `.zip` file.
+        name: Name for the folder.
+        parent: Folder in which to put it.
+
+    Raises:
+        ValueError: It has no run, leads out of its folder, or is too large.
+        zipfile.BadZipFile: It is no `.zip` file.
+    """
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        entries = [entry for entry in packed.infolist() if not entry.is_dir()]
+        if (
+            len(entries) > MOST_FILES
+            or sum(e.file_size for e in entries) > MOST_UNPACKED
+        ):
+            raise ValueError("it is too large")
+        roots = [e.filename for e in entries if Path(e.filename).name == RUN_FILE]
+        if not roots:
+            raise ValueError(f"it has no {RUN_FILE}")
+        root = min(roots, key=lambda entry: entry.count("/")).removesuffix(RUN_FILE)
+        kept = [entry for entry in entries if entry.filename.startswith(root)]
+        names = [entry.filename.removeprefix(root) for entry in kept]
+        for inner in names:
+            if Path(inner).is_absolute() or ".." in Path(inner).parts:
+                raise ValueError(f"{inner} leads out of the folder")
+        folder = _free(parent, name)
+        for entry, inner in zip(kept, names, strict=True):
+            (folder / inner).parent.mkdir(parents=True, exist_ok=True)
+            (folder / inner).write_bytes(packed.read(entry))
+    return folder
+
+
+def _free(parent: Path, name: str) -> Path:
+    parent.mkdir(parents=True, exist_ok=True)
+    kept = "".join(c if c.isalnum() or c in "-_" else "-" for c in name)[:80] or "run"
+    number, folder = 1, parent / kept
+    while folder.exists():
+        number += 1
+        folder = parent / f"{kept}-{number}"
+    folder.mkdir()
+    return folder

@@ -1,0 +1,252 @@
+"""Worlds of task sets: look at them, drive one, watch two policies on the same one."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+from pathlib import Path
+
+import cv2
+import fastapi
+import numpy as np
+from nicegui import ui
+
+from tdac_agent.bench.rivals import rival_names
+from tdac_agent.evaluation.set_play import SHOWN
+from tdac_agent.library.listing import next_folder
+from tdac_agent.studio.driving import Drive
+from tdac_agent.studio.jobs import STATE, job_of, start
+from tdac_agent.studio.pages.layout import (
+    address_of,
+    framed,
+    shown_command,
+    shown_first,
+)
+from tdac_envs.core.errors import TdacError
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.ladder.picture import draw_world
+from tdac_envs.ladder.set_file import set_names
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.ladder.worlds import LadderWorld
+
+SECONDS = 0.05
+"""Between two frames of a drive, at least."""
+KEYS = "Arrow keys or W A S D drive; R begins again."
+
+
+def add(application: fastapi.FastAPI, place: Path) -> None:
+    """Adds the page."""
+    del application
+
+    @ui.page("/worlds")
+    async def page(level: str = "unknown") -> None:
+        with framed("Worlds"):
+            await Looking(place).show(level)
+
+
+class Looking:
+    """The state of one opened page.
+
+    Args:
+        place: Folder of the studio.
+    """
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+        self._tasks: TaskSet | None = None
+        self._drive: Drive | None = None
+
+    async def show(self, level: str) -> None:
+        """Builds the page."""
+        names = list(set_names())
+        with ui.row().classes("w-full items-end gap-3"):
+            self._name = ui.select(
+                names, value=level if level in names else names[0], label="task set",
+                on_change=self._open,
+            ).classes("w-40")  # fmt: skip
+            self._split = ui.select(
+                list(SHOWN), value="dev", label="split", on_change=self._open
+            ).classes("w-28")
+            self._index = ui.number(
+                "world", value=0, min=0, precision=0, on_change=self._open
+            ).classes("w-28")
+            ui.button("Next", on_click=self._next).props("outline")
+        with ui.row().classes("w-full gap-6 items-start"):
+            self._image = ui.interactive_image().classes("board world")
+            with ui.column().classes("gap-3 w-80"):
+                self._facts = ui.column().classes("gap-0")
+                self._build_driving()
+                self._build_use()
+        self._build_watching()
+        ui.keyboard(on_key=self._key)
+        self._timer = ui.timer(SECONDS, self._step, active=False)
+        await shown_first()
+        await self._open()
+
+    def _build_driving(self) -> None:
+        ui.label("Drive it yourself").classes("font-bold")
+        self._keys = ui.label(KEYS).classes("note text-sm")
+        ui.button("Drive", on_click=self._begin_drive).props("outline")
+        self._told = ui.label().props("role=status")
+
+    def _build_use(self) -> None:
+        ui.label("Use it").classes("font-bold")
+        ui.button("Write a controller for this map", on_click=self._as_map).props(
+            "outline no-caps"
+        )
+        ui.button("Write one for the whole set", on_click=self._write_for_set).props(
+            "outline no-caps"
+        )
+
+    def _build_watching(self) -> None:
+        ui.label("Watch two on this world").classes("text-lg font-bold")
+        options = ["builtin", *rival_names(), *policies_in(self._place)]
+        with ui.row().classes("items-end gap-3"):
+            self._one = ui.select(options, value="builtin", label="left").classes(
+                "w-64"
+            )
+            self._other = ui.select(
+                options, value="follow-the-gap", label="right"
+            ).classes("w-64")
+            ui.button("Watch", on_click=self._watch)
+        self._command = shown_command("")
+        self._films = ui.row().classes("w-full no-wrap gap-3")
+
+    async def _open(self) -> None:
+        self._timer.deactivate()
+        self._drive = None
+        name, split = self._name.value, self._split.value
+        index = int(self._index.value or 0)
+        try:
+            tasks, picture, facts = await asyncio.to_thread(look_at, name, split, index)
+        except TdacError as error:
+            ui.notify(str(error), type="warning")
+            return
+        self._tasks = tasks
+        self._show(picture)
+        self._facts.clear()
+        with self._facts:
+            for key, value in facts.items():
+                ui.label(f"{key}: {value}").classes("text-sm")
+        self._told.text = ""
+
+    def _show(self, picture: Image) -> None:
+        self._image.set_source(as_address(picture))
+
+    def _next(self) -> None:
+        self._index.value = int(self._index.value or 0) + 1
+
+    async def _begin_drive(self) -> None:
+        """Puts the robot at the start, and listens to the keys."""
+        self._drive = await asyncio.to_thread(
+            Drive.of, self._name.value, self._split.value, int(self._index.value or 0)
+        )
+        self._timer.interval = max(SECONDS, self._drive.dt)
+        self._timer.activate()
+        self._told.text = "Go."
+
+    def _key(self, event: object) -> None:
+        drive = self._drive
+        if drive is None:
+            return
+        name, down = str(event.key.name), bool(event.action.keydown)  # type: ignore[attr-defined]
+        if name.lower() == "r" and down:
+            drive.begin()
+            self._timer.activate()
+        drive.press(name, down)
+
+    async def _step(self) -> None:
+        drive = self._drive
+        if drive is None:
+            return
+        picture = await asyncio.to_thread(drive.step)
+        self._show(picture)
+        self._told.text = drive.status
+        if drive.over:
+            self._timer.deactivate()
+
+    def _as_map(self) -> None:
+        """Keeps the world's map as a file, and opens it on the first page."""
+        assert self._tasks is not None
+        index, split = int(self._index.value or 0), self._split.value
+        world = self._tasks.world(split, index)
+        if not isinstance(world, LadderWorld):
+            ui.notify("this world is no map; choose another set", type="info")
+            return
+        at = f"{STATE}/files/{self._tasks.name}-{split}-{index}.npy"
+        (self._place / at).parent.mkdir(parents=True, exist_ok=True)
+        np.save(self._place / at, world.cells)
+        ui.navigate.to(f"/?source=map: {at}")
+
+    def _write_for_set(self) -> None:
+        name = self._name.value
+        folder = str(next_folder(name, self._place))
+        start(self._place, ["synth", "--set", name, "--out", folder], folder)
+        ui.navigate.to(address_of("/run", folder))
+
+    def _watch(self) -> None:
+        """Lets two policies drive this world, and shows their videos."""
+        name, split = self._name.value, self._split.value
+        index = str(int(self._index.value or 0))
+        self._films.clear()
+        for who in (self._one.value, self._other.value):
+            kept = "".join(c if c.isalnum() else "-" for c in who)
+            film = f"{STATE}/films/{name}-{split}-{index}-{kept}.mp4"
+            (self._place / film).parent.mkdir(parents=True, exist_ok=True)
+            world = ["--set", name, "--split", split, "--index", index]
+            words = ["play", who, *world, "--video", film]
+            job = start(self._place, words, film)
+            self._command.text = job.command
+            with self._films, ui.column().classes("w-1/2 gap-1"):
+                show_film(self._place, film, who)
+
+
+def show_film(place: Path, film: str, title: str) -> None:
+    """Shows a video as soon as the job that draws it has ended."""
+    label = ui.label(f"{title}: drawing …").classes("note")
+    column = ui.column().classes("w-full")
+
+    def look() -> None:
+        job = job_of(place, film)
+        if job is not None and job.running:
+            return
+        timer.deactivate()
+        if not (place / film).is_file():
+            label.text = f"{title}: {job.output()[-300:] if job else 'no video'}"
+            return
+        last = (job.output().strip().splitlines() if job else [])[-1:]
+        label.text = f"{title}: {last[0]}" if last else title
+        stamp = (place / film).stat().st_mtime_ns
+        with column:
+            ui.video(f"{address_of('/file', film)}&v={stamp}").classes("w-full")
+
+    timer = ui.timer(0.5, look)
+
+
+def look_at(name: str, split: str, index: int) -> tuple[TaskSet, Image, dict[str, str]]:
+    """A world of a set: the set, a picture, and how hard it is."""
+    tasks = load_set(name)
+    world, task = tasks.world_and_task(split, index)
+    hard, file = world.difficulty, tasks.file
+    facts = {
+        "generator": tasks.kind(split, index),
+        "shortest path": f"{hard.length:.4g} {file.unit}",
+        "at full speed": f"{hard.steps:.0f} steps",
+        "narrowest passage": f"{hard.gap:.2f} body diameters",
+        "detour": f"{hard.detour:.2f} times the straight line",
+    }
+    return tasks, draw_world(tasks, world, task), facts
+
+
+def policies_in(place: Path) -> list[str]:
+    """Controllers and learned policies of the folder."""
+    found = [*place.glob("*.py"), *place.glob("*/*.zip"), *place.glob("*.zip")]
+    found += [*place.glob("runs/*/controller.py"), *place.glob("runs/*/policy.zip")]
+    found += [*place.glob(f"{STATE}/files/*.py")]
+    return sorted(str(path.relative_to(place)) for path in found)[:300]
+
+
+def as_address(picture: Image) -> str:
+    """A picture as a data URL."""
+    _, data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])
+    return f"data:image/jpeg;base64,{base64.b64encode(data.tobytes()).decode()}"

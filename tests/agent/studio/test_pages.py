@@ -1,0 +1,230 @@
+"""The pages in a real browser, as a user without the command line sees them."""
+
+import json
+import time
+
+import cv2
+import numpy as np
+import pytest
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.ui import WebDriverWait
+
+SECONDS = 60
+SIZES = {"desktop": (1440, 900), "phone": (390, 844)}
+# A controller that drives straight on, into a wall.
+BLIND = """
+def policy(obs):
+    return 1.0, 1.0
+"""
+OVERFLOW = """
+const page = document.documentElement;
+return page.scrollWidth - page.clientWidth;
+"""
+
+
+@pytest.fixture
+def page(browser, studio):
+    """The studio in a window; afterwards nothing was complained about."""
+    browser.get_log("browser")  # of the page before
+    resize(browser, "desktop")
+    browser.get(studio.address)
+    wait(browser, lambda b: "token" not in b.current_url and b.title.startswith("New"))
+    yield browser
+    assert [
+        line for line in browser.get_log("browser") if line["level"] != "INFO"
+    ] == []
+
+
+def resize(browser, name):
+    width, height = SIZES[name]
+    size = {"width": width, "height": height, "deviceScaleFactor": 1}
+    size["mobile"] = name == "phone"
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def wait(browser, condition):
+    return WebDriverWait(browser, SECONDS, 0.1).until(condition)
+
+
+def text_of(browser):
+    return browser.find_element(By.TAG_NAME, "body").text
+
+
+def says(browser, text):
+    wait(browser, lambda b: text in text_of(b))
+
+
+def press(browser, name):
+    """Clicks the button with a name."""
+    path = f"//button[.//span[normalize-space()='{name}']]"
+    button = wait(browser, lambda b: b.find_element(By.XPATH, path))
+    wait(browser, lambda b: button.is_enabled())
+    browser.execute_script("arguments[0].click()", button)
+
+
+def choose(browser, text):
+    """Clicks a radio button by the beginning of its label."""
+    path = f"//*[@role='radio'][starts-with(normalize-space(.), '{text}')]"
+    browser.execute_script("arguments[0].click()", browser.find_element(By.XPATH, path))
+
+
+def upload(browser, file, label="or drop a file"):
+    path = f"//div[contains(@class,'q-uploader')][contains(., '{label}')]//input"
+    wait(browser, lambda b: b.find_elements(By.XPATH, path))[0].send_keys(str(file))
+
+
+def click_map(browser, x, y, size):
+    """Clicks a place of the picture, in px of a map of this width and height."""
+    image = browser.find_element(By.CSS_SELECTOR, ".board img")
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", image)
+    right = (x + 0.5) / size[0] - 0.5, (y + 0.5) / size[1] - 0.5
+    over = right[0] * image.size["width"], right[1] * image.size["height"]
+    ActionChains(browser).move_to_element_with_offset(image, *over).click().perform()
+
+
+def number(browser, name):
+    return browser.find_element(By.CSS_SELECTOR, f"input[aria-label='{name}']")
+
+
+@pytest.fixture
+def plan(tmp_path):
+    """A plan of two rooms with a door, 400 x 300 px."""
+    picture = np.full((300, 400), 255, np.uint8)
+    picture[:8] = picture[-8:] = picture[:, :8] = picture[:, -8:] = 0
+    picture[:, 196:204] = 0
+    picture[120:190, 190:210] = 255
+    cv2.imwrite(str(tmp_path / "plan.png"), picture)
+    return tmp_path / "plan.png"
+
+
+def open_plan(browser, plan):
+    """Drops the plan, and clicks start, heading and goal."""
+    upload(browser, plan)
+    says(browser, "400 x 300 px")
+    says(browser, "Click the start")
+    for place in ((60, 150), (120, 150), (340, 60)):
+        click_map(browser, *place, (400, 300))
+        time.sleep(0.3)
+    says(browser, "A path of")
+
+
+def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
+    """By clicks alone; the page shows the command, and the candidate drives."""
+    open_plan(page, plan)
+    assert number(page, "start x").get_attribute("value") == "60"
+    assert abs(float(number(page, "heading, rad").get_attribute("value"))) < 0.05
+    assert "tdac synth --map .studio/files/plan.png --start 60 150" in text_of(page)
+    press(page, "Write and verify a controller")
+    wait(page, lambda b: "/run?" in b.current_url)
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
+    page.switch_to.frame(frame)
+    says(page, "all tests passed" if "all tests" in text_of(page) else "verified")
+    clock = page.find_element(By.CSS_SELECTOR, ".player .clock")
+    wait(page, lambda b: "reached" in clock.text)
+    page.switch_to.default_content()
+    run = json.loads((studio.place / "runs/plan-1/run.json").read_text())
+    assert run["status"] == "verified"
+
+
+def test_no_request_leaves_this_machine(browser, page, studio):
+    """Nor does a page of it load anything from elsewhere."""
+    names = "return performance.getEntriesByType('resource').map((e) => e.name)"
+    for path in ("/", "/runs", "/worlds"):
+        browser.get(studio.base + path)
+        says(browser, "tdac studio")
+        time.sleep(1)
+        for name in browser.execute_script(names):
+            assert name.startswith((studio.base, "data:", "blob:")), name
+
+
+def test_a_goal_that_cannot_be_reached(page, plan):
+    """The reason is shown, and nothing can be started."""
+    open_plan(page, plan)
+    click_map(page, 2, 2, (400, 300))
+    says(page, "goal (2, 2) lies in an obstacle")
+    path = "//button[.//span[normalize-space()='Write and verify a controller']]"
+    assert not page.find_element(By.XPATH, path).is_enabled()
+    click_map(page, 340, 250, (400, 300))
+    says(page, "A path of")
+
+
+def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
+    """It is the first candidate; the report has what it failed, and its successor."""
+    (tmp_path / "blind.py").write_text(BLIND)
+    open_plan(page, plan)
+    choose(page, "a controller of my own")
+    says(page, "Drop the controller first.")
+    upload(page, tmp_path / "blind.py", "drop controller.py here")
+    says(page, "--from .studio/files/blind.py")
+    press(page, "Write and verify a controller")
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
+    page.switch_to.frame(frame)
+    wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "a.cell")) > 1)
+    assert page.find_elements(By.CSS_SELECTOR, "a.cell.failed")
+    page.switch_to.default_content()
+
+
+def test_the_keyboard_alone(page, plan):
+    """Places are typed, the button is reached by Tab and pressed by Enter."""
+    upload(page, plan)
+    says(page, "Click the start")
+    places = {"start x": 60, "start y": 60, "goal x": 340, "goal y": 250}
+    for name, value in places.items():
+        field = number(page, name)
+        field.send_keys(Keys.CONTROL, "a")
+        field.send_keys(str(value), Keys.TAB)
+        time.sleep(0.2)
+    says(page, "A path of")
+    for _ in range(40):
+        focused = page.switch_to.active_element
+        if focused.text.upper().startswith("WRITE AND VERIFY"):
+            break
+        focused.send_keys(Keys.TAB)
+    page.switch_to.active_element.send_keys(Keys.ENTER)
+    wait(page, lambda b: "/run?" in b.current_url)
+
+
+def test_a_world_is_driven_by_the_keyboard(page, studio):
+    page.get(f"{studio.base}/worlds?level=unknown")
+    says(page, "narrowest passage")
+    press(page, "Drive")
+    says(page, "Go.")
+    body = page.find_element(By.TAG_NAME, "body")
+    ActionChains(page).key_down(Keys.ARROW_UP, body).pause(1.5).key_up(
+        Keys.ARROW_UP
+    ).perform()
+    wait(page, lambda b: any(word in text_of(b) for word in (" s\n", "contact")))
+    status = page.find_element(By.CSS_SELECTOR, "[role=status]").text
+    assert status.endswith(" s")
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_nothing_is_cut_off(page, studio, size):
+    resize(page, size)
+    for path in ("/", "/runs", "/worlds"):
+        page.get(studio.base + path)
+        says(page, "tdac studio")
+        time.sleep(1)
+        assert page.execute_script(OVERFLOW) <= 0, path
+    resize(page, "desktop")
+
+
+def test_a_killed_server_kills_no_run(browser, page, studio, plan):
+    """Another one in the same folder finds the run again."""
+    open_plan(page, plan)
+    press(page, "Write and verify a controller")
+    wait(page, lambda b: "/run?" in b.current_url)
+    at = page.current_url.partition("?at=")[2]
+    studio.kill()
+    studio.start()
+    browser.get_log("browser")  # the connection was lost
+    browser.get(studio.address)
+    wait(browser, lambda b: "token" not in b.current_url)
+    browser.get(f"{studio.base}/run?at={at}")
+    wait(browser, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    browser.get(f"{studio.base}/runs")
+    says(browser, at)

@@ -1,0 +1,148 @@
+"""Parts of the studio without a browser: drafts, jobs, unpacked runs."""
+
+import io
+import json
+import shlex
+import time
+import zipfile
+from dataclasses import replace
+
+import pytest
+
+pytest.importorskip("nicegui", reason="needs tdac[studio]")
+
+from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.studio.board import board_of, names_of
+from tdac_agent.studio.draft import Draft, check
+from tdac_agent.studio.driving import Drive
+from tdac_agent.studio.jobs import job_of, jobs, start
+from tdac_agent.studio.pages.shelf import unpack
+from tdac_envs.worlds.bodies import BODY_RADIUS
+
+SECONDS = 120
+
+
+def flags_of(words):
+    """The flags of a command line, as far as drafts use them."""
+    given, left = {}, list(words)
+    names = {"--map": "map_image", "--world": "world", "--polarity": "polarity"}
+    while left:
+        flag = left.pop(0)
+        if flag in names:
+            given[names[flag]] = left.pop(0)
+        elif flag in ("--start", "--goal"):
+            given[flag[2:]] = (float(left.pop(0)), float(left.pop(0)))
+        else:
+            key = {"--heading": "heading", "--robot-radius": "robot_radius"}[flag]
+            given[key] = float(left.pop(0))
+    return TaskFlags(**given)
+
+
+@pytest.mark.parametrize(("kind", "source"), [("map", "office"), ("world", "maze")])
+def test_a_draft_is_the_task_of_its_command(kind, source, tmp_path):
+    """What the page checks is what the shown command does."""
+    board = board_of(kind, source)
+    draft = Draft.of(board, source)
+    checked = check(draft, board, tmp_path)
+    assert checked.problem == ""
+    assert flags_of(draft.words()).load().sha256() == checked.task.sha256()
+    # The body passes the narrowest place of its path, by less than anywhere else.
+    body = board.radius or BODY_RADIUS
+    assert 0.95 * body < checked.clearance < 2.0 * body
+
+
+@pytest.mark.parametrize("kind", ["map", "world"])
+def test_clicks_lead_back_to_places(kind):
+    for name in names_of(kind):
+        board = board_of(kind, name)
+        assert board.goal is not None
+        ((x, y),) = board.at([board.goal]).tolist()
+        assert 0 <= x <= board.width
+        assert 0 <= y <= board.height
+        assert board.place(x, y) == pytest.approx(board.goal)
+
+
+def test_what_cannot_be_driven(tmp_path):
+    board = board_of("map", "maze")
+    draft = Draft.of(board, "maze")
+    wide = check(replace(draft, radius=30.0), board, tmp_path)
+    assert wide.task is None
+    assert "too near" in wide.problem
+    assert wide.widest == pytest.approx(20.4, abs=0.2)
+    assert check(replace(draft, radius=wide.widest - 0.5), board, tmp_path).task
+    outside = check(replace(draft, goal=(5.0, 5.0)), board, tmp_path)
+    assert "outside of the closed wall" in outside.problem
+
+
+def wait_for(job):
+    end = time.monotonic() + SECONDS
+    while job.running and time.monotonic() < end:
+        time.sleep(0.05)
+    assert not job.running
+
+
+def test_a_job_is_found_again(tmp_path):
+    job = start(tmp_path, ["runs", "."], "runs/x")
+    assert job_of(tmp_path, "runs/x") == job
+    assert job.command == "tdac runs ."
+    wait_for(job)
+    assert job.code == 0
+    assert "no runs in ." in job.output()
+    other = start(tmp_path, ["runs", "missing"], "runs/y")
+    wait_for(other)
+    assert other.code == 2
+    assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
+    assert shlex.split(other.command)[0] == "tdac"
+    # A damaged record hides no other one.
+    (job.folder / "job.json").write_text("{")
+    assert [each.about for each in jobs(tmp_path)] == ["runs/y"]
+
+
+def packed(**files):
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name.replace("__", "/"), content)
+    return stream.getvalue()
+
+
+def test_a_run_folder_is_unpacked(tmp_path):
+    data = packed(**{"maze-1/run.json": "{}", "maze-1/iterations/x.md": "text"})
+    folder = unpack(data, "maze 1", tmp_path)
+    assert folder.name == "maze-1"
+    assert json.loads((folder / "run.json").read_text()) == {}
+    assert (folder / "iterations" / "x.md").read_text() == "text"
+    assert unpack(data, "maze 1", tmp_path).name == "maze-1-2"
+
+
+@pytest.mark.parametrize(
+    ("files", "message"),
+    [
+        ({"a.txt": "x"}, "has no run.json"),
+        ({"run.json": "{}", "../out.txt": "x"}, "leads out of"),
+        ({"run.json": "{}", "/etc/x": "x"}, "leads out of"),
+    ],
+)
+def test_what_is_not_unpacked(tmp_path, files, message):
+    with pytest.raises(ValueError, match=message):
+        unpack(packed(**files), "run", tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_keys_drive(tmp_path):
+    """Up drives ahead; left turns to the left, as a person sees it."""
+    drive = Drive.of("unknown", "dev", 0)
+    env = drive._env
+    drive.press("ArrowUp", True)
+    assert drive.action() == (1.0, 1.0)
+    drive.press("ArrowLeft", True)
+    left, right = drive.action()
+    assert right > left > 0
+    drive.press("ArrowUp", False)
+    left, right = drive.action()
+    assert right > 0 > left
+    before = env.pose()[2]
+    frame = drive.step()
+    assert frame.ndim == 3
+    assert env.pose()[2] < before  # y points down: a turn to the left is negative
+    assert drive.status == f"{drive.dt:.1f} s"
