@@ -1,11 +1,14 @@
 """Drives to a goal without a map, and never into space that it has not seen free.
 
 Two maps grow: the distance to the nearest point that a ray has hit, and the space that
-rays and the body have found free. The way to the goal takes unseen space for free,
-except between two hits that seem to be of one wall. In each step, arcs are tried out:
-the next step of an arc must lie in free space, what comes then must not touch a hit.
-If the best arc leads into unseen space, the robot first turns on the spot to look
-there. With rays all around, it drives backwards as well as forwards.
+rays and the body have found free. A search finds the way to the goal, on which unseen
+space costs a little more. In each step, arcs are tried out: the next step of an arc
+must lie in free space, what comes then must not touch a hit. With rays all around, the
+robot drives backwards as well as forwards, and each arc is followed by a turn and a
+straight line to a place of the way, as far ahead as is best: from there, what lines
+and turns to the goal cost is known. Otherwise, or if there is no such line, an arc is
+followed by a straight line, and its end has the cost of the search. If the best arc
+leads into unseen space, the robot first turns on the spot to look there.
 """
 
 import json
@@ -25,21 +28,23 @@ GAP = VIEW / max(RAYS - 1, 1)  # rad between two rays
 FAN = GAP * np.arange(RAYS) - 0.5 * VIEW
 ROUND = 2.0 * math.pi - VIEW < 1.01 * GAP  # whether the robot sees behind itself
 MARGIN = 0.06  # px that are kept from walls
-WISH, FEAR = 0.5, 6.0  # px that are kept where there is room; price of a px less
+WISH, FEAR = 0.5, 1.0  # px that are kept where there is room; price of a px less
 LOOSE = 0.45  # px by which the search may come too near to a hit
 SLIVER = 1.6  # px around walls in which a px must be crossed to be free
-GUESS = 2.5  # how much more a px costs where a wall is likely
-LINE = 60  # px between two hits in a row that are taken for one wall, at most
-APART = 2.0 * (RADIUS - LOOSE) - 1.0  # px between two hits that leave no way
 STALE = 8  # steps after which new walls lead to a new plan, if they are not in the way
 ROOM = 1.5 * RADIUS  # clearance from which a px costs nothing extra
 REACH = int(ROOM) + 2
 PRICE = 0.15  # how much more a px beside a wall costs
-UNSEEN = 0.0  # how much more an unseen px costs
+UNSEEN = 0.3  # how much more an unseen px costs
 PEEK = 6.0  # px that a look costs
 WAIT, STUCK = 25, 6.0  # steps within so many px after which the search goes another way
 CELL = 2  # px between the places of the search
 BEYOND = 48.0  # px beyond the robot up to which the search goes
+HALF = AXLE / 2.0  # px that a turn by a rad costs
+LINKS = 40  # places of the way to which lines are tried
+BINS = 90  # bearings of lines to a place that are told apart, over pi
+SCOUTS = 16  # ends of arcs from which it is found out which places are in sight
+BATCH, BATCHES = 128, 24  # lines that are looked at together; how often, at most
 LOOK, TURN = 6.0, 10.0  # px ahead; px that a turn by a right angle costs
 WINDOW = 36  # px around the robot in which arcs lie
 # Steps after which an arc is looked at: often in the first ones, which will be driven.
@@ -48,13 +53,14 @@ TIMES = np.array(
 )
 NEXT, SOON = 5, 11  # entries of TIMES up to one step and up to four steps
 SPIN = 2.0 * STEP / AXLE  # rad of a step on the spot
-# Directions of lines from the heading; the spins into them, forwards or backwards.
+# Directions of lines from the heading, and the spins into them.
 TURNS = np.arange(120) * (2.0 * math.pi / 120)
-SPINS = np.array([(k + 30) % 60 - 30 for k in range(120)]) * (2.0 * math.pi / 120)
 FULL_SPINS = np.remainder(TURNS + math.pi, 2.0 * math.pi) - math.pi
 LENGTHS = np.arange(1, 33) * 0.75  # px
 SAMPLES = np.arange(0.0, RANGE, 0.5)  # px along a ray
 STEPS = np.maximum(np.abs(np.arange(-REACH, REACH + 1)) - 0.5, 0.0)
+BEND = np.abs(np.arange(BINS)[:, None] - np.arange(BINS))
+BEND = HALF * math.pi / BINS * np.minimum(BEND, BINS - BEND)  # price between bearings
 KERNEL = np.hypot(STEPS[:, None], STEPS)  # distance to a px from the px around it
 
 
@@ -66,25 +72,29 @@ class Maps:
         walls: Which px are walls.
         crossed: Which px a ray or the body has been in: they are free.
         filled: Which px lie between two rays that went further.
-        guessed: Which px may be walls, since they lie between two hits of a wall.
         away: Distance to the nearest wall, at most REACH px.
+        extra: How much more a px costs if it is unseen or closed, for every CELL-th px.
         cost: Cost of the way to the goal, for every CELL-th px.
         closed: Places at which the robot got no further.
+        way: Indices of the places of the way from where it was planned to the goal.
+        chain: Lines and turns along the way; None if there is none.
     """
 
     def __init__(self, goal):
         self.goal = goal
         half = int(max(320.0, max(map(abs, goal)) + 160.0)) // CELL * CELL
         self.half, self.side = half, 2 * half + 1
-        self.walls, self.crossed, self.filled, self.guessed = np.zeros(
-            (4, self.side, self.side), bool
+        self.walls, self.crossed, self.filled = np.zeros(
+            (3, self.side, self.side), bool
         )
         self.away = np.full((self.side, self.side), float(REACH))
         self.cost = np.full((half + 1, half + 1), np.inf)
+        self.extra = np.zeros_like(self.cost)
         self.closed = np.zeros_like(self.cost, bool)
         self.way, self.trail = np.zeros(0, int), []
         self.age, self.news = 0, False
         self.looks = 0
+        self.chain = None
 
     def square(self, x, y, reach):
         """Slices of the px around a place, and their x and y relative to it."""
@@ -112,7 +122,6 @@ class Maps:
         hit = ranges < RANGE - 1e-3
         tips = ranges + 1e-3
         rows, columns = self.indices(x + tips * cosines, y + tips * sines)
-        self.guess(rows, columns, hit)
         rows, columns = rows[hit], columns[hit]
         fresh = {
             (j, i)
@@ -126,41 +135,6 @@ class Maps:
                 np.minimum(part, KERNEL, out=part)
         self.fill(x, y, heading, ranges)
         return bool(fresh)
-
-    def guess(self, rows, columns, hit):
-        """Takes what is between two hits for a wall, if they are in one row or column.
-
-        A wall along which rays graze has hits that are far apart.
-        """
-        next_row, next_column = np.roll(rows, -1), np.roll(columns, -1)
-        tall, wide = np.abs(next_row - rows), np.abs(next_column - columns)
-        both, long = hit & np.roll(hit, -1), np.maximum(tall, wide)
-        both &= (np.minimum(tall, wide) == 0) & (long > APART) & (long <= LINE)
-        both[RAYS - 1 :] &= ROUND
-        for k in np.flatnonzero(both).tolist():
-            j, i = np.linspace(
-                (rows[k], columns[k]), (next_row[k], next_column[k]), long[k] + 1
-            ).T.astype(int)
-            self.guessed[j[1:-1], i[1:-1]] = True
-
-    def doubt(self):
-        """Forgets guesses that have been seen free; rows and columns of the others."""
-        places = np.nonzero(self.guessed)
-        free = self.crossed[places] | self.filled[places]
-        self.guessed[places] = ~free
-        return places[0][~free], places[1][~free]
-
-    def likely(self):
-        """Distance to the nearest wall or guess, for every CELL-th px."""
-        away = self.away[::CELL, ::CELL].copy()
-        reach = REACH // CELL
-        kernel = KERNEL[REACH % CELL :: CELL, REACH % CELL :: CELL]
-        rows, columns = self.doubt()
-        for j, i in np.unique(np.stack([rows, columns]) // CELL, axis=1).T.tolist():
-            part = away[j - reach : j + reach + 1, i - reach : i + reach + 1]
-            if part.shape == kernel.shape:
-                np.minimum(part, kernel, out=part)
-        return away
 
     def fill(self, x, y, heading, ranges):
         """Fills the px between two rays, as far as both went; and those of the body."""
@@ -188,6 +162,7 @@ class Maps:
         if self.way.size:
             away = self.away[::CELL, ::CELL].ravel()[self.way] if new else ROOM
             if np.min(away) >= RADIUS - LOOSE and not (self.news and self.age >= STALE):
+                self.go_on()
                 return
         self.plan(x, y)
         self.way = descent(self.cost, self.cell(x, y))
@@ -196,6 +171,14 @@ class Maps:
             self.plan(x, y)
             self.way = descent(self.cost, self.cell(x, y))
         self.age, self.news = 0, False
+        self.chain = Chain(self) if ROUND and self.way.size else None
+
+    def go_on(self):
+        """Drops the part of the way that has been driven, if it is long."""
+        done = 0 if self.chain is None else self.chain.at
+        if done > LINKS // 2 and self.way.size > LINKS:
+            self.way = self.way[done:]
+            self.chain = Chain(self)
 
     def watch(self, x, y):
         """Closes the narrowest place ahead if the robot gets no further."""
@@ -213,10 +196,9 @@ class Maps:
     def plan(self, x, y):
         """Costs of the way to the goal, up to somewhat beyond the robot."""
         away, free = self.away[::CELL, ::CELL], self.filled[::CELL, ::CELL]
-        likely = self.likely()
-        price = 1.0 + PRICE * np.clip((ROOM - likely) / (ROOM - RADIUS), 0.0, 1.0) ** 2
-        price += GUESS * (likely < RADIUS - LOOSE)
-        price += UNSEEN * ~free
+        self.extra = np.where(self.closed, np.inf, UNSEEN * ~free)
+        price = 1.0 + PRICE * np.clip((ROOM - away) / (ROOM - RADIUS), 0.0, 1.0) ** 2
+        price += self.extra
         passable = (away >= RADIUS - LOOSE) & ~self.closed
         passable[:3], passable[-3:], passable[:, :3], passable[:, -3:] = (False,) * 4
         goal, robot = self.cell(*self.goal), self.cell(x, y)
@@ -227,6 +209,22 @@ class Maps:
             self.cost[:], found = wave(passable, price, goal, robot, most)
             if found:
                 return
+
+    def toll(self, x, y, to_x, to_y, apart, least):
+        """What lines cost beyond their length; inf where a px is too near to a wall."""
+        dx, dy = to_x - x, to_y - y
+        length = np.hypot(dx, dy)
+        shares = np.linspace(0.0, 1.0, max(int(length.max() / apart) + 1, 2))
+        x = x[:, None] + dx[:, None] * shares + self.half
+        y = y[:, None] + dy[:, None] * shares + self.half
+        at = (y + 0.5).astype(int) * self.side + (x + 0.5).astype(int)
+        fits = (self.away.ravel()[at] >= least).all(axis=1)
+        i = (x[fits] * (1.0 / CELL) + 0.5).astype(int)
+        j = (y[fits] * (1.0 / CELL) + 0.5).astype(int)
+        extra = self.extra.ravel()[j * self.extra.shape[1] + i].mean(axis=1)
+        found = np.full(length.shape, np.inf)
+        found[fits] = length[fits] * extra
+        return found
 
     def cell(self, x, y):
         """Row and column of the place of the search that is nearest."""
@@ -385,6 +383,120 @@ class Near:
         return between(self.part, x, y, self.i, self.j, CELL)
 
 
+class Chain:
+    """Places on the way, and what lines and turns from each of them to the goal cost.
+
+    Attributes:
+        x, y: The places; the last one is the goal if the way is short enough.
+        rest: Cost after a line that gets to a place at one of BINS bearings, px.
+        at: The place that the robot is near.
+    """
+
+    def __init__(self, maps):
+        self.maps, self.at = maps, 0
+        tail = self.place()
+        count = self.x.size
+        self.rest = np.full((count, BINS), tail)
+        dx, dy = self.x - self.x[:, None], self.y - self.y[:, None]
+        bins = bins_of(np.arctan2(dy, dx))
+        cost = self.between_places(np.hypot(dx, dy))
+        for k in range(count - 1, 0, -1):
+            cost[:k, k] += self.rest[k, bins[:k, k]]
+            after = cost[k - 1, k:] + BEND[:, bins[k - 1, k:]]
+            self.rest[k - 1] = after.min(axis=1)
+
+    def place(self):
+        """Sets the places, with some room if that is near; cost at the last one."""
+        maps = self.maps
+        j, i = np.divmod(maps.way[:LINKS], maps.cost.shape[1])
+        down, right = (shift.ravel() - 2 for shift in np.indices((5, 5)))
+        rows, columns = CELL * j[:, None] + down, CELL * i[:, None] + right
+        # Of equals, the nearest one is taken.
+        room = np.minimum(maps.away[rows, columns], RADIUS + 1.0)
+        room -= 0.01 * np.hypot(down, right)
+        best = np.arange(j.size), room.argmax(axis=1)
+        x, y = columns[best] - float(maps.half), rows[best] - float(maps.half)
+        self.x, self.y = x, y
+        if maps.way.size > LINKS:
+            return float(maps.cost[j[-1], i[-1]])
+        x[-1], y[-1] = maps.goal
+        return 0.0
+
+    def between_places(self, lengths):
+        """Costs of lines from each place to later ones; inf if they touch a wall."""
+        cost = np.full(lengths.shape, np.inf)
+        start, end = np.triu_indices(self.x.size, 1)
+        group = np.digitize(lengths[start, end], (20.0, 50.0))
+        for k in np.unique(group):
+            i, j = start[group == k], end[group == k]
+            toll = self.maps.toll(
+                self.x[i], self.y[i], self.x[j], self.y[j], 1.5, RADIUS - 0.1
+            )
+            cost[i, j] = lengths[i, j] + toll
+        # The way itself leads on, even if it seems a little too narrow.
+        i = np.arange(self.x.size - 1)
+        step = cost[i, i + 1]
+        cost[i, i + 1] = np.where(np.isfinite(step), step, lengths[i, i + 1] + 1.0)
+        return cost
+
+    def in_sight(self, x, y):
+        """Places ahead that are in sight from some of the poses."""
+        window = slice(self.at, self.at + 12)
+        gaps = np.hypot(self.x[window] - x[0], self.y[window] - y[0])
+        self.at += int(gaps.argmin())
+        gaps = np.hypot(self.x[self.at :] - x[0], self.y[self.at :] - y[0])
+        gaps[-1] = np.inf
+        ahead = self.at + np.flatnonzero(gaps > 1.5)
+        some = np.unique(np.linspace(0, x.size - 1, SCOUTS).astype(int))
+        pose, place = np.repeat(some, ahead.size), np.tile(ahead, some.size)
+        toll = self.maps.toll(
+            x[pose], y[pose], self.x[place], self.y[place], 2.0, RADIUS - 0.75
+        )
+        return ahead[np.isfinite(toll.reshape(some.size, -1)).any(axis=0)]
+
+    def best(self, x, y, heading, before):
+        """The least price of a way over one of the poses, and the number of the pose.
+
+        Lines are looked at in the order of the price that they have if nothing is in
+        their way.
+        """
+        places = self.in_sight(x, y)
+        dx, dy = self.x[places] - x[:, None], self.y[places] - y[:, None]
+        bearing = np.arctan2(dy, dx)
+        turn = bearing - heading[:, None]
+        turn = np.abs(turn - math.pi * np.rint(turn * (1.0 / math.pi)))
+        price = before[:, None] + np.hypot(dx, dy) + HALF * turn
+        price = (price + self.rest[places, bins_of(bearing)]).ravel()
+        order = np.argsort(price)[: BATCH * BATCHES]
+        best = math.inf, 0
+        for first in range(0, order.size, BATCH):
+            some = order[first : first + BATCH]
+            if price[some[0]] >= best[0]:
+                break
+            pose, place = np.divmod(some, places.size)
+            line = x[pose], y[pose], self.x[places[place]], self.y[places[place]]
+            worth = price[some] + self.maps.toll(*line, 1.0, RADIUS - 0.75)
+            for k in np.argsort(worth):
+                if worth[k] >= best[0]:
+                    break
+                if self.fits(*(float(ends[k]) for ends in line)):
+                    best = float(worth[k]), int(pose[k])
+        return best
+
+    def fits(self, x, y, to_x, to_y):
+        """Whether there is room for the body on a line, beyond its start."""
+        count = int(2.0 * math.hypot(to_x - x, to_y - y)) + 2
+        shares = np.linspace(0.0, 1.0, count)[1:]
+        px, py = x + (to_x - x) * shares, y + (to_y - y) * shares
+        room = between(self.maps.away, px, py, self.maps.half)
+        return bool(room.min() >= RADIUS + MARGIN)
+
+
+def bins_of(bearing):
+    """Numbers of bearings, forwards or backwards alike."""
+    return np.rint(bearing * (BINS / math.pi)).astype(int) % BINS
+
+
 def clearances(cells, reach):
     """Distance from each px to the nearest one that is set, at most reach."""
     padded = np.pad(cells, reach)
@@ -416,9 +528,10 @@ def wheel_pairs():
 def courses():
     """An arc of one, two, four or all steps and then a straight line, at TIMES.
 
-    Returns the action of each course, and x, y, heading from a pose at the origin.
+    Returns the action of each course, the steps of its arc, and x, y, heading from a
+    pose at the origin.
     """
-    pairs, parts = [], []
+    pairs, parts, lengths = [], [], []
     for left, right in wheel_pairs():
         forward, turn = 0.5 * STEP * (left + right), STEP * (left - right) / AXLE
         for steps in (1.0, 2.0, 4.0, TIMES[-1]):
@@ -428,6 +541,7 @@ def courses():
             after = math.copysign(STEP, forward) * (TIMES - on_arc)
             facing = turn * on_arc
             pairs.append((left, right))
+            lengths.append(steps)
             parts.append(
                 (
                     chord * np.cos(half) + after * np.cos(facing),
@@ -436,11 +550,12 @@ def courses():
                 )
             )
     x, y, facing = np.array(parts).transpose(1, 0, 2)
-    return np.array(pairs), x, y, facing
+    return np.array(pairs), np.array(lengths), x, y, facing
 
 
-PAIRS, AHEAD, ASIDE, FACING = courses()
+PAIRS, ARC_STEPS, AHEAD, ASIDE, FACING = courses()
 FORWARD = PAIRS.sum(axis=1) > 0.0
+ARCS = np.flatnonzero(TIMES[-1] > ARC_STEPS)  # those before lines to places
 STATE = {}
 
 
@@ -509,6 +624,53 @@ def best_arc(near, x, y, heading, slack):
     k = int(worth.argmin())
     unseen = None if ready[k] else (px[k, :NEXT], py[k, :NEXT])
     return float(worth[k]), PAIRS[k], unseen
+
+
+def exact_turns(chain, x, y, heading):
+    """Steps that turn to places of the way and, at various speeds, drive on.
+
+    Returns the actions, and x, y, heading at TIMES from a pose at the origin.
+    """
+    dx, dy = chain.x[chain.at :] - x, chain.y[chain.at :] - y
+    turn = np.arctan2(dy, dx) - heading
+    back = np.rint(turn / math.pi)
+    turn = np.clip(turn - math.pi * back, -SPIN, SPIN)
+    drive = np.where(back % 2 == 0, 1.0, -1.0) * np.minimum(
+        1.0 - np.abs(turn) / SPIN, np.hypot(dx, dy) / STEP
+    )
+    drive, turn = np.concatenate([drive, 0.4 * drive, 0.0 * drive]), np.tile(turn, 3)
+    time = np.minimum(TIMES, 1.0)
+    half = 0.5 * turn[:, None] * time
+    chord = STEP * drive[:, None] * time * np.sinc(half / math.pi)
+    pairs = np.column_stack([drive + turn / SPIN, drive - turn / SPIN])
+    return pairs, chord * np.cos(half), chord * np.sin(half), 2.0 * half
+
+
+def best_chain(near, x, y, heading, slack):
+    """The best arc before a turn and a line to a place of the way; as `best_arc`."""
+    chain = near.maps.chain
+    exact = exact_turns(chain, x, y, heading)
+    courses = PAIRS[ARCS], AHEAD[ARCS], ASIDE[ARCS], FACING[ARCS]
+    pairs, ahead, aside, facing = (
+        np.concatenate(both) for both in zip(courses, exact, strict=True)
+    )
+    steps = np.append(ARC_STEPS[ARCS], np.ones(len(exact[0])))
+    cosine, sine = math.cos(heading), math.sin(heading)
+    px, py = x + cosine * ahead - sine * aside, y + sine * ahead + cosine * aside
+    on_arc = steps[:, None] >= TIMES
+    room, seen = near.room(px, py), near.seen(px, py)
+    fits = ((room >= MARGIN) | ~on_arc).all(axis=1)
+    some = np.flatnonzero(fits & (np.abs(pairs).max(axis=1) > 0.02))  # none that waits
+    if not some.size:
+        return math.inf, None, None
+    fear = fears(np.where(on_arc, room, WISH)[:, :SOON], seen[:, :NEXT])
+    ready = (seen[:, :NEXT] >= -slack).all(axis=1)
+    before = STEP * steps + PEEK * ~ready + fear
+    end = some, np.searchsorted(TIMES, steps)[some]
+    price, k = chain.best(px[end], py[end], heading + facing[end], before[some])
+    k = some[k]
+    unseen = None if ready[k] else (px[k, :NEXT], py[k, :NEXT])
+    return price, pairs[k], unseen
 
 
 def best_line(near, x, y, heading, slack):
@@ -596,6 +758,24 @@ def observe(x, y, heading, ranges, goal):
     return maps, new, (x, y, heading)
 
 
+def best_course(near, x, y, heading, slack):
+    """What is driven: price, action, unseen place or None."""
+    best = math.inf, None, None
+    maps = near.maps
+    if math.dist((x, y), maps.goal) <= STEP * TIMES[-1] + TOLERANCE:
+        best = best_arc(near, x, y, heading, slack)
+        if best[0] < 0.0:
+            return best
+    if maps.chain is not None:
+        chained = best_chain(near, x, y, heading, slack)
+        if math.isfinite(chained[0]):
+            return chained
+    if not math.isfinite(best[0]):
+        best = best_arc(near, x, y, heading, slack)
+    line = best_line(near, x, y, heading, slack)
+    return line if line[0] < best[0] else best
+
+
 def policy(obs):
     """Wheel speeds (left, right)."""
     x, y, heading = (float(value) for value in obs["pose"])
@@ -606,11 +786,7 @@ def policy(obs):
     maps.replan(x, y, new)
     near = Near(maps, x, y)
     slack = 0.5 * max(maps.looks - 2, 0)
-    price, pair, unseen = best_arc(near, x, y, heading, slack)
-    if price >= 0.0:
-        other, line, hidden = best_line(near, x, y, heading, slack)
-        if other < price:
-            price, pair, unseen = other, line, hidden
+    price, pair, unseen = best_course(near, x, y, heading, slack)
     if not math.isfinite(price):
         return 0.6, -0.6
     if unseen is not None:

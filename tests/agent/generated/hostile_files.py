@@ -22,10 +22,11 @@ import yaml
 
 from tdac_agent.builtin.scripted import Script
 from tdac_agent.campaign.config import read_config
-from tdac_agent.library.listing import row_of
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.rules import _histories
 from tdac_agent.cli.run_view import show_run
+from tdac_agent.cli.runs import _table
+from tdac_agent.library.listing import row_of
 from tdac_agent.models.choice import Options
 from tdac_agent.models.prices import load_prices
 from tdac_agent.runs.history import gather_run
@@ -131,7 +132,7 @@ def use_run(folder: Path) -> None:
     json.dumps(row).encode()
     with contextlib.redirect_stdout(io.StringIO()):
         console = Console()
-        console.print(runs_command._table([row], folder, 120))
+        console.print(_table([row], folder, 120))
         show_run(load_run(folder), console)
     told = gather_run(folder)
     for tried in told.tried:
