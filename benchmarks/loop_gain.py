@@ -1,0 +1,145 @@
+"""What the loop adds to a model's first answers, at equal numbers of episodes.
+
+    python -m benchmarks.loop_gain OUT [--levels L...] [-n 100]
+
+`results/ladder/loops/LEVEL/N` has runs of `tdac synth --set LEVEL --episodes 128`. The
+first candidate and the selected one of each drive on the first N hidden worlds of the
+salt on which the first answers were judged (`results/ladder/genuine/figures/LEVEL`).
+
+Best of N: the first answers drive on `dev` worlds, 128 episodes together, and the best
+one is taken. Its score is that of the same hidden worlds.
+
+OUT/gain.csv has a row for each run: scores, paired differences with 95 % intervals
+by bootstrap over worlds, candidates, and characters asked and answered. After an
+interruption, the same command continues.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from benchmarks.recorded_answers import interval
+from tdac_agent.bench.arena import sealed_episodes
+from tdac_agent.evaluation.kept_sets import kept_report
+from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.prompting.extract import extract_source
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+
+RESULTS = Path("results/ladder")
+EPISODES = 128
+SALT = "salt"
+
+
+def gains(level: str, worlds: int, out: Path, judge: WarmJudge) -> list[dict[str, Any]]:
+    """A row for each run of a level."""
+    tasks, salt = load_set(level), out / SALT / level
+    figures = RESULTS / "genuine" / "figures" / level
+    salt.parent.mkdir(parents=True, exist_ok=True)
+    salt.write_bytes(bytes.fromhex((figures / "salt.hex").read_text()))
+    best, best_scores = best_of_n(tasks, figures, worlds, out, judge)
+    rows = []
+    for run in sorted((RESULTS / "loops" / level).iterdir()):
+        files = run / "iterations/k01/j0/controller.py", run / "controller.py"
+        first, last = (
+            hidden_scores(file.read_bytes(), tasks, worlds, salt, out, judge)
+            for file in files
+        )
+        report = json.loads((run / "report.json").read_text())
+        row: dict[str, Any] = {
+            "level": level,
+            "run": run.name,
+            "selected": f"k={report['k']} j={report['j']}",
+            "candidates": len(report["candidates"]),
+            "episodes": report["feedback_used"] + report["validation_used"],
+            "asked": characters(run, "prompt"),
+            "answered": characters(run, "reply"),
+            "first": first.mean(),
+            "last": last.mean(),
+            "best_of_n": best_scores.mean(),
+            "n": best,
+        }
+        for name, before in (("first", first), ("best_of_n", best_scores)):
+            low, high = interval(last - before)
+            row |= {f"over_{name}": (last - before).mean()}
+            row |= {f"over_{name}_low": low, f"over_{name}_high": high}
+        rows.append(row)
+        print(row, flush=True)
+    return rows
+
+
+def characters(run: Path, what: str) -> int:
+    """Characters of all prompts or all replies of a run."""
+    return sum(len(file.read_text()) for file in run.rglob(f"*.{what}*.md"))
+
+
+def best_of_n(
+    tasks: TaskSet, figures: Path, worlds: int, out: Path, judge: WarmJudge
+) -> tuple[str, NDArray[np.float64]]:
+    """The first answer that is best on `dev`, with its scores on hidden worlds."""
+    table = pd.read_csv(figures / "worlds.csv")
+    replies = sorted((RESULTS / "genuine" / tasks.name).glob("*/reply.md"))
+    judged = [file for file in replies if int(file.parent.name) in _names(table)]
+    share = EPISODES // len(judged)
+    means = []
+    for file in judged:
+        source = extract_source(file.read_text(encoding="utf-8"))
+        assert source is not None
+        raw = source.encode()
+        kept = out / "dev" / tasks.name / sha256_of(raw)[:16]
+        about = sha256_of(raw), tasks.sha256, "dev", share
+        report = kept_report(kept, *about) or verify_on_set(
+            raw, tasks, "dev", share, out=kept, judge=judge
+        )
+        means.append(np.mean([each.time_score for each in report.episodes]))
+    best = judged[int(np.argmax(means))].parent.name
+    own = table[(table["entrant"] == best) & (table["index"] < worlds)]
+    scores = own.sort_values("index")["time_score"].to_numpy(np.float64)
+    assert len(scores) == worlds
+    return f"{best} of {len(judged)}", scores
+
+
+def _names(table: pd.DataFrame) -> set[int]:
+    """Numbers of the answers in a table of worlds."""
+    return {int(name) for name in table["entrant"].unique() if str(name).isdecimal()}
+
+
+def hidden_scores(
+    source: bytes, tasks: TaskSet, worlds: int, salt: Path, out: Path, judge: WarmJudge
+) -> NDArray[np.float64]:
+    """Time scores of a file on hidden worlds."""
+    sha256 = sha256_of(source)
+    kept = out / "hidden" / tasks.name / sha256[:16]
+    if not (kept / "sealed").is_dir():
+        verify_on_set(
+            source, tasks, "hidden", worlds, salt_file=salt, out=kept, judge=judge
+        )
+    episodes = sealed_episodes(kept, sha256)
+    return np.array([each.time_score for each in episodes], np.float64)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.loop_gain")
+    parser.add_argument("out", type=Path)
+    levels = sorted(path.name for path in (RESULTS / "loops").iterdir())
+    parser.add_argument("--levels", nargs="+", choices=levels, default=levels)
+    parser.add_argument("-n", "--worlds", type=int, default=100)
+    options = parser.parse_args()
+    rows = []
+    with WarmJudge() as judge:
+        for level in options.levels:
+            rows += gains(level, options.worlds, options.out, judge)
+    write_atomic(options.out / "gain.csv", pd.DataFrame(rows).to_csv(index=False))
+
+
+if __name__ == "__main__":
+    main()
