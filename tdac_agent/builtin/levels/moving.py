@@ -1,15 +1,15 @@
 """Drives to a goal without a map, among discs that move straight on and bounce.
 
-A grid keeps where rays have hit and what they have crossed. Ranges are exact, so the
-circle through hits of a disc gives its centre and radius, and two centres its velocity;
-where it will be follows from that, bounces included. A field of path lengths to the
-goal takes unseen space for free. In each step, a search in space and time around the
-robot finds the course of the next seconds that ends nearest to the goal and keeps away
-from where the discs will be; it may also wait or withdraw. The robot drives backwards
-as well as forwards.
+Walls are pixels: what rays hit lies on lines of their lattice. The first scan gives the
+direction of the lattice, and from then on, a hit beside all lines is of a disc, and all
+others say exactly which pixels are walls. A Kalman filter for each disc estimates its
+place, velocity and radius, and bounces off known walls are predicted. A field of times
+to the goal takes unseen space for free. In each step, a search in space and time around
+the robot, backwards from a few seconds ahead, finds what each place is worth soon, by
+where the discs will be. Courses of the next steps are tried out: the one that costs
+least, up to its end and from there on, is driven, forwards or backwards.
 """
 
-import heapq
 import json
 import math
 
@@ -21,532 +21,615 @@ ROBOT = PARAMS["robot"]
 RADIUS, AXLE, RANGE = ROBOT["radius"], ROBOT["axle_length"], ROBOT["range_max"]
 DT = PARAMS["dt"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
-RAYS = ROBOT["n_rays"]
-FAN = math.radians(ROBOT["field_of_view_deg"]) * np.linspace(-0.5, 0.5, RAYS)
+TOLERANCE = 0.95 * PARAMS["goal_tolerance"]
+FAN = math.radians(ROBOT["field_of_view_deg"]) * np.linspace(-0.5, 0.5, ROBOT["n_rays"])
 
-CELL = 2.0  # px
-HALF = 480.0  # px from the start to the border of the grid
-SIDE = int(2 * HALF / CELL)  # cells
-FREE, SOLID = -3, 3  # evidence below which a cell is free, and from which it is a wall
-LEAST, MOST = -8, 8  # evidence never goes beyond
-SAMPLES = np.arange(0.0, RANGE, CELL)  # px along a ray
-KEEP = RADIUS + 2.2  # px from a robot's centre to the nearest wall
-NEAR = 4.0  # px from a wall within which a hit may be of the wall
-SMALLEST, LARGEST, USUAL = 4.5, 9.5, 7.0  # px, radii of discs
-SAME = 0.05  # px between the centres of two circles that are of one disc
-FASTEST = 3.3  # px that a disc moves in a step, at most
-GATE = 4.0  # px from where a disc is expected to where it is found, at most
-COAST = 30  # steps for which a disc is remembered that is not seen
-TALL = 3  # cells around a bounce whose walls say how it goes
-NODE = 4.0  # px between the nodes of both searches
-LAYER = 2  # steps between two layers of the search in space and time
-LAYERS = 18
-HELD = 2  # layers for which wheel speeds are held
-WINDOW = 18  # nodes from the robot to the border of the search
-TOUCH, WIDTH = 0.5, 0.5  # px from a disc at which a contact is as likely as not
-SPREAD, FADE = 0.1, 0.95  # by how much less is known of discs with each layer
-LOST = 800.0  # px that a contact costs
-HURRY = 0.3  # price of a layer, as a part of the length that is left
-PAUSE = 0.6  # px that a layer of waiting costs
-TURNING, HABIT = 5.0, 0.3  # px that a rad costs; that a change of a wheel costs
-REPLAN = 6  # steps between two fields of path lengths
-STEPS = NODE * np.arange(-WINDOW, WINDOW + 1)
-COLUMNS, ROWS = np.meshgrid(STEPS, STEPS)
-MOVES = [(0, 0), (0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
-ANGLES = np.array([math.atan2(row, column) for row, column in MOVES])
-SPEEDS = np.array([-1.0, -0.7, -0.4, -0.15, 0.0, 0.15, 0.4, 0.7, 1.0])
-PAIRS = np.array([(left, right) for left in SPEEDS for right in SPEEDS])
+HALF = 330  # px from the start to the border of the map
+SIDE = 2 * HALF + 1
+REACH = 20  # px up to which clearances are known
+ON_LINE = 5e-4  # px from a line of the lattice within which a hit is on it
+TURNS = np.arange(15708) * (0.5 * math.pi / 15708)  # rad, of the lattice
+LINE = 34.0  # px between two hits on a line that are taken for one wall, at most
+BETWEEN = np.linspace(0.0, 1.0, 35)[1:-1]
+SAMPLES = np.arange(0.0, RANGE, 1.5)  # px along a ray
+SMALLEST, LARGEST, USUAL = 4.9, 9.1, 7.0  # px, radii of discs
+FASTEST = 3.1  # px that a disc moves in a step, at most
+HIT_NOISE = 4e-4  # px^2, variance of the distance of a hit from a circle
+NEW = np.diag([9.0, 9.0, 3.0, 3.0, 2.0])  # covariance of a disc that is new
+DRIFT = np.diag([1e-5, 1e-5, 1e-5, 1e-5, 1e-7])  # what a step adds to it
+BOUNCE = np.diag([0.04, 0.04, 0.04, 0.04, 0.0])  # what a bounce adds to it
+SURPRISE = np.diag([4.0, 4.0, 4.0, 4.0, 0.1])  # what hits elsewhere add to it
+GATE = 5.0  # px from a circle within which a hit may be of its disc, at most
+JUMP = 11.0  # px between two neighbouring hits of a disc, at most
+APART = 4.0  # px between the centres of a disc that is seen and one that is not
+COAST = 40  # steps for which a disc is remembered that is not seen
+MARGIN = 0.2  # px that are kept from walls
+COARSE = 4  # px between the nodes of the field
+ROOM, CROWDED = 16.0, 0.2  # px from walls below which a step costs more, and how much
+BUCKET = 2.0  # steps to the goal that differ among nodes which are settled at once
+REPLAN = 5  # steps between two fields
+FAR = np.float32(2e3)  # steps, where there is no way
+NODE = 2  # px between the nodes of the search in space and time
+LAYER = 2  # steps between two layers; within them, the robot drives three nodes
+LAYERS, BEGIN = 18, 3  # layers, and the one in which courses end
+WINDOW = 44  # nodes from the robot to the border of the search
+STAMP = 16  # nodes from a disc within which it matters
+BLOCKED, DEEPER = 250.0, 100.0  # steps that a step too near to a wall costs, and a px
+RISK, FADE = 60.0, 0.94  # steps that a layer in contact costs; by how much less later
+TOUCH = 1.0  # px from a disc at which a contact is as likely as not
+SHARP, BLUR = 0.3, 0.02  # px by which gaps are uncertain now, and more with each step
+BOUNCED = 0.1  # px more with each step after a bounce
+WIDEST = 3.0  # px
+VAGUE = 8.0  # px by which a place is uncertain where little is known
+HIT, HIT_STEPS = 0.3, 6  # px below which a gap counts as a contact, in the first steps
+STRUCK, STRUCK_DEEPER = 150.0, 20.0  # steps that such a contact costs, and a px
+VEER, REVERSE = 1.0, 0.5  # steps that another direction, and another gear, costs
+TURNING = 1.0  # steps that a rad costs which is left to turn at the end of a course
+FIRST = 3  # steps of the first part of a course
+FINE = 3.0, -3.0, 6.0, -6.0  # deg, turns that are tried beside those by tens
+FURTHER = 0.0, -0.5, 0.5, -1.1, 1.1  # rad, turns after the first part
+FACING = 1.2  # rad to the direction of a course from which the robot drives
+SQUARE = NODE * np.arange(-WINDOW - 3, WINDOW + 4)
+# Moves of the field, and points from which a slope is taken.
+MOVES = np.array(
+    [(i, j) for i in range(-2, 3) for j in range(-2, 3) if math.gcd(i, j) == 1]
+)
+CROSS = np.array([(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)])
 STATE = {}
 
 
-def disk(radius):
-    """Offsets (row, column) of the cells whose centre is within a radius, px."""
-    reach = int(radius / CELL) + 1
-    steps = np.arange(-reach, reach + 1)
-    rows, columns = np.meshgrid(steps, steps, indexing="ij")
-    inside = CELL * np.hypot(rows, columns) <= radius
-    return np.column_stack([rows[inside], columns[inside]]).tolist()
+def kernel():
+    """Distances to a pixel from the pixels around it."""
+    steps = np.maximum(np.abs(np.arange(-REACH, REACH + 1)) - 0.5, 0.0)
+    return np.minimum(np.hypot(steps[:, None], steps), REACH).astype(np.float32)
 
 
-BODY, BESIDE = disk(KEEP), disk(NEAR)
+KERNEL = kernel()
 
 
-def cells(x, y):
-    """Rows and columns of points, px."""
-    columns = np.floor((np.asarray(x) + HALF) / CELL).astype(int)
-    rows = np.floor((np.asarray(y) + HALF) / CELL).astype(int)
-    return np.clip(rows, 1, SIDE - 2), np.clip(columns, 1, SIDE - 2)
+def lattice(x, y):
+    """The direction of the lattice of pixels by hits; the start is in one's middle."""
+    hits = []
+    for part in np.array_split(TURNS, 16):
+        cos, sin = np.cos(part)[:, None], np.sin(part)[:, None]
+        both = cos * x + sin * y, cos * y - sin * x
+        on = [np.abs(each % 1.0 - 0.5) < 0.02 for each in both]
+        hits.append((on[0] | on[1]).sum(axis=1))
+    turn = TURNS[int(np.concatenate(hits).argmax())]
+    for near in (0.05, 0.02, 0.01, 0.004, 0.002):
+        u, v = turned(x, y, turn)
+        arms = np.concatenate([v, -u])
+        off = np.concatenate([u, v]) % 1.0 - 0.5
+        on = np.abs(off) < near
+        turn -= float((arms[on] * off[on]).sum() / max((arms[on] ** 2).sum(), 1e-9))
+    return turn
 
 
-def grown(mask, offsets):
-    """The cells within some offsets of those of a mask, but for its border."""
-    reach = max(max(abs(row), abs(column)) for row, column in offsets)
-    height, width = mask.shape
-    padded = np.zeros((height + 2 * reach, width + 2 * reach), bool)
-    padded[reach:-reach, reach:-reach] = mask
-    out = np.zeros_like(mask)
-    for row, column in offsets:
-        top, left = reach + row, reach + column
-        out |= padded[top : top + height, left : left + width]
-    return out
+def turned(x, y, turn):
+    """Points in a frame that is turned."""
+    cos, sin = math.cos(turn), math.sin(turn)
+    return cos * x + sin * y, cos * y - sin * x
+
+
+def pixels(x, y):
+    """Columns and rows of the pixels of points."""
+    i, j = np.rint(x).astype(int) + HALF, np.rint(y).astype(int) + HALF
+    return np.clip(i, REACH + 1, SIDE - REACH - 2), np.clip(
+        j, REACH + 1, SIDE - REACH - 2
+    )
+
+
+def between(values, u, v):
+    """Values at points between nodes, by column and row."""
+    height, width = values.shape
+    u, v = np.clip(u, 0.0, width - 1.001), np.clip(v, 0.0, height - 1.001)
+    i, j = u.astype(np.int32), v.astype(np.int32)
+    a, b, at, flat = u - i, v - j, j * width + i, values.ravel()
+    low = flat[at] + a * (flat[at + 1] - flat[at])
+    high = flat[at + width] + a * (flat[at + width + 1] - flat[at + width])
+    return low + b * (high - low)
 
 
 class Map:
     """What is known of walls.
 
     Attributes:
-        evidence: Above 0 for walls, below 0 for free space, 0 where nothing was seen.
-        blocked: Cells where the centre of the robot cannot be.
-        beside: Cells at a wall.
+        walls: Pixels that have been hit, or lie between two hits of a wall.
+        crossed: Pixels that a ray has crossed: they are free.
+        clear: Distances of pixels to the nearest wall, at most REACH px.
     """
 
     def __init__(self):
-        self.evidence = np.zeros((SIDE, SIDE), np.int8)
-        self.blocked = np.zeros((SIDE, SIDE), bool)
-        self.beside = np.zeros((SIDE, SIDE), bool)
+        self.walls, self.crossed = np.zeros((2, SIDE, SIDE), bool)
+        self.clear = np.full((SIDE, SIDE), REACH, np.float32)
 
-    def surprising(self, hits):
-        """Which hits lie where free space was seen, and not at a wall."""
-        rows, columns = cells(*hits.T)
-        return (self.evidence[rows, columns] <= FREE) & ~self.beside[rows, columns]
-
-    def add(self, x, y, angles, ranges, of_discs):
-        """Adds a scan; some of its rays have hit discs."""
-        cos, sin = np.cos(angles), np.sin(angles)
-        (top, bottom), (left, right) = window(x, y, RANGE + 12.0)
-        part = self.evidence[top:bottom, left:right]
-        far = SAMPLES[None, :]
-        crossed = far < (ranges - 1.5)[:, None]
-        rows, columns = cells(
-            (x + far * cos[:, None])[crossed], (y + far * sin[:, None])[crossed]
+    def add(self, x, y, cos, sin, ranges):
+        """Adds a scan; returns which rays have hit discs."""
+        inside = (ranges - 0.05)[:, None] > SAMPLES
+        i, j = pixels(
+            (x + SAMPLES * cos[:, None])[inside], (y + SAMPLES * sin[:, None])[inside]
         )
-        seen = np.zeros(part.shape, np.int8)
-        seen[rows - top, columns - left] = -1
-        still = (ranges < RANGE - 1e-3) & ~of_discs
-        rows, columns = cells(x + (ranges + 0.7) * cos, y + (ranges + 0.7) * sin)
-        seen[rows[still] - top, columns[still] - left] = 1
-        np.clip(part + seen, LEAST, MOST, out=part)
-        solid = part >= SOLID
-        self.blocked[top:bottom, left:right] = grown(solid, BODY)
-        self.beside[top:bottom, left:right] = grown(solid, BESIDE)
+        self.crossed[j, i] = True
+        wrong = self.walls[j, i].any()
+        hit = ranges < RANGE - 1e-3
+        at_x, at_y = x + ranges * cos, y + ranges * sin
+        on_x = np.abs(at_x % 1.0 - 0.5) < ON_LINE
+        on_y = np.abs(at_y % 1.0 - 0.5) < ON_LINE
+        i, j = pixels(at_x + 0.02 * cos, at_y + 0.02 * sin)
+        of_walls = hit & (on_x | on_y) & ~self.crossed[j, i]
+        new_i, new_j = [i[of_walls]], [j[of_walls]]
+        # Discs may stand before a wall, between two hits of it.
+        rays, free = np.flatnonzero(of_walls), np.cumsum(~hit)
+        a, b = rays[:-1], rays[1:]
+        one = (np.abs(at_x[a] - at_x[b]) < ON_LINE) & on_x[a]
+        one |= (np.abs(at_y[a] - at_y[b]) < ON_LINE) & on_y[a]
+        one &= (free[a] == free[b]) & (
+            np.hypot(at_x[a] - at_x[b], at_y[a] - at_y[b]) < LINE
+        )
+        for k, to in zip(a[one].tolist(), b[one].tolist(), strict=True):
+            new_i.append(np.rint(i[k] + BETWEEN * (i[to] - i[k])).astype(int))
+            new_j.append(np.rint(j[k] + BETWEEN * (j[to] - j[k])).astype(int))
+        i, j = np.concatenate(new_i), np.concatenate(new_j)
+        fresh = ~self.walls[j, i] & ~self.crossed[j, i]
+        new = np.unique(j[fresh] * SIDE + i[fresh])
+        self.walls.ravel()[new] = True
+        if wrong:
+            self.walls &= ~self.crossed
+            self.clear[:] = REACH
+            new = np.flatnonzero(self.walls)
+        for k in new.tolist():
+            j, i = divmod(k, SIDE)
+            part = self.clear[j - REACH : j + REACH + 1, i - REACH : i + REACH + 1]
+            np.minimum(part, KERNEL, out=part)
+        return hit & ~of_walls
 
-    def bounced(self, place, rate):
-        """The velocity after a bounce off the walls near a place."""
-        row, column = (int(each) for each in cells(*place))
-        part = self.evidence[
-            row - TALL : row + TALL + 1, column - TALL : column + TALL + 1
-        ]
-        rows, columns = np.nonzero(part > 0)
-        if not len(rows):
-            return -rate
-        at_x = (columns + column - TALL + 0.5) * CELL - HALF
-        at_y = (rows + row - TALL + 0.5) * CELL - HALF
-        off_x, off_y = place[0] - at_x, place[1] - at_y
-        weight = 1.0 / np.maximum(off_x**2 + off_y**2, 1.0)
-        away = np.array([(off_x * weight).sum(), (off_y * weight).sum()])
-        away /= max(math.hypot(*away), 1e-9)
-        into = float(rate @ away)
-        return rate - 2.0 * into * away if into < 0.0 else rate
+    def clear_at(self, x, y):
+        """Clearances at points, interpolated, px."""
+        return between(self.clear, x + HALF, y + HALF)
 
-
-def window(x, y, reach):
-    """First and last rows and columns within a distance of a point."""
-    rows, columns = cells([x - reach, x + reach], [y - reach, y + reach])
-    return (rows[0], rows[1] + 1), (columns[0], columns[1] + 1)
+    def ahead(self, places, rates, radii):
+        """Places, velocities and normals of bounces (or 0) a step later, (n, 2)."""
+        there = places + rates
+        normals = np.zeros_like(there)
+        i, j = pixels(there[:, 0], there[:, 1])
+        for k in np.flatnonzero(self.clear[j, i] < radii + 1.0).tolist():
+            clear = self.clear_at(*(there[k] + CROSS).T)
+            lack = radii[k] - clear[0]
+            if lack <= 0.0:
+                continue
+            normal = np.array([clear[1] - clear[2], clear[3] - clear[4]])
+            normal /= max(math.hypot(*normal), 1e-6)
+            into = float(rates[k] @ normal)
+            if into < 0.0:
+                rates = rates.copy()
+                rates[k] = rates[k] - 2.0 * into * normal
+                there[k] = there[k] + 2.0 * min(lack, -into) * normal
+                normals[k] = normal
+        return there, rates, normals
 
 
 class Disc:
-    """A disc that moves.
+    """A disc: place (px), velocity (px per step) and radius (px) with covariance."""
 
-    Attributes:
-        place: Its centre, px.
-        rate: Its velocity, px per step; zero if it is not known.
-        radius: px.
-        seen: Steps in which its centre was found.
-        unseen: Steps since it was hit by a ray.
-    """
+    def __init__(self, x, y, radius):
+        self.mean, self.covariance = np.array([x, y, 0.0, 0.0, radius]), NEW.copy()
+        self.unseen, self.denied = 0, 0
 
-    def __init__(self, place, radius):
-        self.place, self.radius = np.array(place), radius
-        self.rate, self.seen, self.unseen = np.zeros(2), 0, 0
+    def expect(self, place, rate, normal):
+        """Goes on by a step, with a bounce or without."""
+        self.mean[:2], self.mean[2:4] = place, rate
+        self.covariance = MOTION @ self.covariance @ MOTION.T + DRIFT
+        if normal.any():
+            mirror = np.eye(5)
+            mirror[:2, :2] -= 2.0 * np.outer(normal, normal)
+            mirror[2:4, 2:4] = mirror[:2, :2]
+            self.covariance = mirror @ self.covariance @ mirror.T + BOUNCE
+        self.unseen += 1
 
-    def meet(self, place, radius):
-        """Corrects place and velocity by the circle that was found in this step."""
-        off = np.array(place) - self.place  # from where it was expected
-        self.rate = self.rate + off if self.seen else off
-        fast = math.hypot(*self.rate)
+    def meet(self, hits):
+        """Corrects the estimates: there are points on the circle."""
+        off = np.hypot(*(hits - self.mean[:2]).T) - self.mean[4]
+        if np.abs(off).max() > 0.3 + 4.0 * self.spread(0):
+            self.covariance = self.covariance + SURPRISE
+        before, mean = self.mean, self.mean
+        for _ in range(4):
+            away = hits - mean[:2]
+            far = np.maximum(np.hypot(*away.T), 1e-6)
+            slope = np.zeros((len(hits), 5))
+            slope[:, :2], slope[:, 4] = -away / far[:, None], -1.0
+            spread = self.covariance @ slope.T
+            noise = HIT_NOISE * np.eye(len(hits))
+            gain = np.linalg.solve(slope @ spread + noise, spread.T).T
+            mean = before + gain @ (mean[4] - far - slope @ (before - mean))
+            mean[4] = min(max(mean[4], SMALLEST), LARGEST)
+        fast = math.hypot(mean[2], mean[3])
         if fast > FASTEST:
-            self.rate *= FASTEST / fast
-        self.place, self.radius = np.array(place), radius
-        self.seen, self.unseen = self.seen + 1, 0
+            mean[2:4] *= FASTEST / fast
+        self.mean = mean
+        covariance = self.covariance - gain @ spread.T
+        self.covariance = 0.5 * (covariance + covariance.T)
+        self.unseen = self.denied = 0
 
-    def guess(self, place):
-        """Corrects them by a place that is not exact."""
-        off = np.array(place) - self.place
-        self.rate = self.rate + 0.4 * off
-        self.place, self.unseen = self.place + 0.6 * off, 0
-
-
-def circles(numbers, points, x, y):
-    """Circles through three hits each, as lists of centre, radius and hits."""
-    found = []
-    for k in range(len(numbers) - 2):
-        if numbers[k + 2] - numbers[k] > 5:
-            continue
-        (ax, ay), (bx, by), (cx, cy) = points[k : k + 3].tolist()
-        ux, uy, vx, vy = bx - ax, by - ay, cx - ax, cy - ay
-        twice = 2.0 * (ux * vy - uy * vx)
-        if abs(twice) < 1e-3:
-            continue
-        u, v = ux * ux + uy * uy, vx * vx + vy * vy
-        px, py = (vy * u - uy * v) / twice, (ux * v - vx * u) / twice
-        radius, px, py = math.hypot(px, py), ax + px, ay + py
-        behind = math.hypot(px - x, py - y) > math.hypot(bx - x, by - y)
-        if not (SMALLEST < radius < LARGEST and behind):
-            continue
-        for other in found:
-            if math.hypot(px - other[0][0], py - other[0][1]) < SAME:
-                other[2].update((k, k + 1, k + 2))
-                break
-        else:
-            found.append(((px, py), radius, {k, k + 1, k + 2}))
-    return found
+    def spread(self, steps):
+        """Standard deviation of the place some steps ahead, px."""
+        c = self.covariance
+        place, both = c[0, 0] + c[1, 1], c[0, 2] + c[1, 3]
+        total = place + 2.0 * steps * both + steps**2 * (c[2, 2] + c[3, 3])
+        return np.sqrt(np.maximum(0.5 * total, 0.0))
 
 
-def track(discs, chart, numbers, hits, pose):
-    """Finds discs in the hits; returns which hits are of discs.
-
-    Args:
-        discs: The discs; new ones are added.
-        chart: What is known of walls.
-        numbers: Numbers of the rays that have hit something.
-        hits: Where, shape (n, 2), px.
-        pose: Pose of the robot.
-    """
-    taken = np.zeros(len(hits), bool)
-    if len(hits):
-        surprising = chart.surprising(hits)
-        find_circles(discs, numbers, hits, pose, surprising, taken)
-        find_known(discs, hits, pose, taken)
-        left = np.flatnonzero(~taken & surprising).tolist()
-        find_others(discs, groups(left, numbers, hits), hits, pose, taken)
-    return taken
+MOTION = np.eye(5)
+MOTION[0, 2] = MOTION[1, 3] = 1.0
 
 
-def find_circles(discs, numbers, hits, pose, surprising, taken):
-    """Finds discs by circles.
-
-    Four hits on one circle are of a disc. Three may be of a wall: their circle counts
-    where a disc is expected, or where free space was seen.
-    """
-    x, y, _ = pose
-    met = set()
-    found = circles(numbers, hits, x, y)
-    for place, radius, on_circle in sorted(found, key=lambda each: -len(each[2])):
-        own, k = sorted(on_circle), expected(discs, place, radius, met)
-        sure = len(own) > 3 or surprising[own].all()
-        if taken[own].any() or (k is None and not sure):
-            continue
-        if k is None:
-            k = len(discs)
-            discs.append(Disc(place, radius))
-        discs[k].meet(place, radius)
-        taken[own] = True
-        met.add(k)
-
-
-def find_known(discs, hits, pose, taken):
-    """Finds discs whose radius is known by one or two hits."""
-    x, y, _ = pose
-    for disc in discs:
-        if not disc.seen or not disc.unseen:
-            continue
-        off = np.abs(np.hypot(*(hits - disc.place).T) - disc.radius)
-        own = np.flatnonzero(~taken & (off < 1.5))
-        if len(own) == 2 and own[1] == own[0] + 1:
-            place = behind(*hits[own], disc.radius, x, y)
-            if place is not None and math.dist(place, disc.place) < 3.0:
-                disc.meet(place, disc.radius)
-                taken[own] = True
-        elif len(own) and off[own].min() < 0.5:
-            disc.unseen = 0
-            taken[own] = True
-
-
-def find_others(discs, groups_of_hits, hits, pose, taken):
-    """Finds discs by hits where free space was seen, about where they are."""
-    x, y, _ = pose
-    for own in groups_of_hits:
-        taken[own] = True
-        middle = hits[own].mean(axis=0)
-        away = (middle - (x, y)) / max(math.dist(middle, (x, y)), 1e-6)
-        place = middle + 0.8 * USUAL * away
-        near = [disc for disc in discs if math.dist(disc.place, place) < GATE + FASTEST]
-        if not near:
-            discs.append(Disc(place, USUAL))
-        elif not any(disc.seen for disc in near):
-            near[0].guess(place)
-
-
-def expected(discs, place, radius, met):
-    """The disc that is expected nearest to a circle, not yet met; None if none is."""
-    best, least = None, math.inf
-    for k, disc in enumerate(discs):
-        if k in met or (disc.seen and abs(disc.radius - radius) > 0.1):
-            continue
-        off = math.dist(place, disc.place)
-        if off < min(least, GATE if disc.seen > 1 else GATE + FASTEST):
-            best, least = k, off
-    return best
-
-
-def behind(one, two, radius, x, y):
-    """The centre of a disc with two points on its border, behind them; or None."""
-    half = 0.5 * math.dist(one, two)
-    if not 0.0 < half < radius:
+def circle_through(points):
+    """Centre and radius of the circle through three points; None if there is none."""
+    (ax, ay), (bx, by), (cx, cy) = points.tolist()
+    ux, uy, vx, vy = bx - ax, by - ay, cx - ax, cy - ay
+    twice = 2.0 * (ux * vy - uy * vx)
+    if abs(twice) < 1e-3:
         return None
-    along = (two - one) / (2.0 * half)
-    across = np.array([-along[1], along[0]])
-    middle = 0.5 * (one + two)
-    if across @ (middle - (x, y)) < 0.0:
-        across = -across
-    return middle + math.sqrt(radius**2 - half**2) * across
+    u, v = ux * ux + uy * uy, vx * vx + vy * vy
+    px, py = (vy * u - uy * v) / twice, (ux * v - vx * u) / twice
+    return ax + px, ay + py, math.hypot(px, py)
 
 
-def groups(left, numbers, hits):
-    """Hits that are neighbours in number and in place."""
-    found = []
-    for k in left:
-        last = found[-1][-1] if found else k
-        near = numbers[k] - numbers[last] <= 2
-        if last < k and near and math.dist(hits[k], hits[last]) < USUAL:
-            found[-1].append(k)
-        else:
-            found.append([k])
-    return found
+def new_discs(hits, x, y):
+    """Discs that explain neighbouring hits."""
+    n = len(hits)
+    if n >= 3:
+        circle = circle_through(hits[[0, n // 2, n - 1]])
+        if circle is not None and SMALLEST - 0.1 < circle[2] < LARGEST + 0.1:
+            off = np.hypot(*(hits - circle[:2]).T) - circle[2]
+            if np.abs(off).max() < 0.05:
+                return [met(Disc(*circle), hits)]
+        cut = int(np.hypot(*np.diff(hits, axis=0).T).argmax()) + 1
+        return [d for part in (hits[:cut], hits[cut:]) for d in new_discs(part, x, y)]
+    middle = hits.mean(axis=0)
+    half = 0.5 * math.dist(hits[0], hits[-1])
+    deep = math.sqrt(max(USUAL**2 - half**2, 0.0)) if n == 2 else 0.85 * USUAL
+    away = (middle - (x, y)) / max(math.dist(middle, (x, y)), 1e-6)
+    return [met(Disc(*(middle + deep * away), USUAL), hits)]
 
 
-def forget(discs, pose, ranges):
-    """The discs that are still there, as far as the robot can see."""
+def met(disc, hits):
+    """A disc after its first hits."""
+    disc.meet(hits)
+    return disc
+
+
+def track(discs, chart, pose, hits, numbers, ranges):
+    """The discs after this step, by the hits that are of discs."""
+    if discs:
+        for disc, *now in zip(discs, *chart.ahead(*motion(discs)), strict=True):
+            disc.expect(*now)
+        places, _, radii = motion(discs)
+        gates = np.array([min(0.5 + 4.0 * disc.spread(0), GATE) for disc in discs])
+        gates = np.maximum(gates, 2.0)
+        off = np.hypot(*(hits[:, None] - places).transpose(2, 0, 1)) - radii
+        off = np.where(np.abs(off) < gates, np.abs(off) / gates**0.5, np.inf)
+        owner = np.where(off.min(axis=1) < np.inf, off.argmin(axis=1), -1)
+        for k, disc in enumerate(discs):
+            if (owner == k).any():
+                disc.meet(hits[owner == k])
+    else:
+        owner = np.full(len(hits), -1)
+    kept = [disc for disc in discs if is_there(disc, chart, pose, ranges)]
+    group = []
+    for k in [*np.flatnonzero(owner < 0).tolist(), None]:
+        if group and (
+            k is None
+            or numbers[k] - numbers[group[-1]] > 2
+            or math.dist(hits[k], hits[group[-1]]) > JUMP
+        ):
+            kept += new_discs(hits[group], *pose[:2])
+            group = []
+        group.append(k)
+    seen = [disc for disc in kept if not disc.unseen]
+    return seen + [
+        disc
+        for disc in kept
+        if disc.unseen
+        and all(math.dist(disc.mean[:2], other.mean[:2]) > APART for other in seen)
+    ]
+
+
+def is_there(disc, chart, pose, ranges):
+    """Whether a disc may still be there, by the rays that pass its place."""
+    if not disc.unseen:
+        return True
     x, y, heading = pose
-    kept = []
-    for disc in discs:
-        off, far = disc.place - (x, y), math.dist(disc.place, (x, y))
-        bearing = math.remainder(math.atan2(off[1], off[0]) - heading, 2.0 * math.pi)
-        ray = int(np.argmin(np.abs(FAN - bearing)))
-        seen_past = far < RANGE and ranges[ray] > far + 1.0
-        if disc.unseen <= (1 if seen_past else COAST if disc.seen else 4):
-            kept.append(disc)
-    return kept
-
-
-def advance(discs, chart):
-    """Moves the discs to where they are expected a step later."""
-    places, rates = advanced(*motion(discs)[:2], chart)
-    for disc, place, rate in zip(discs, places, rates, strict=True):
-        disc.place, disc.rate, disc.unseen = place, rate, disc.unseen + 1
-
-
-def advanced(places, rates, chart):
-    """Places and velocities after a step, shape (n, 2); walls are bounced off."""
-    there = places + rates
-    now, then = chart.beside[cells(*places.T)], chart.beside[cells(*there.T)]
-    for k in np.flatnonzero(then & ~now).tolist():
-        rates = rates.copy()
-        rates[k] = chart.bounced(there[k], rates[k])
-        there[k] = places[k] + rates[k]
-    return there, rates
+    off_x, off_y = disc.mean[0] - x, disc.mean[1] - y
+    far = math.hypot(off_x, off_y)
+    bearing = FAN + heading - math.atan2(off_y, off_x)
+    bearing = np.abs(np.remainder(bearing + math.pi, 2.0 * math.pi) - math.pi)
+    wide = math.asin(min(0.7 * disc.mean[4] / max(far, 0.1), 1.0))
+    disc.denied += bool((ranges[bearing < wide] > far).any())
+    clear = float(chart.clear_at(*disc.mean[:2]))
+    known = disc.covariance[2, 2] + disc.covariance[3, 3] < 0.5
+    return (
+        disc.denied < 2
+        and disc.unseen <= (COAST if known else 8)
+        and clear > disc.mean[4] - 3.0
+    )
 
 
 def motion(discs):
     """Places, velocities (px per step) and radii of some discs."""
-    places = np.array([disc.place for disc in discs]).reshape(-1, 2)
-    rates = np.array([disc.rate for disc in discs]).reshape(-1, 2)
-    return places, rates, np.array([disc.radius for disc in discs])
+    means = np.array([disc.mean for disc in discs])
+    return means[:, :2], means[:, 2:4], means[:, 4]
 
 
-def futures(discs, chart):
-    """Places in each step, shape (LAYERS * LAYER + 1, n, 2), px."""
-    at, rates, _ = motion(discs)
-    places = np.empty((LAYERS * LAYER + 1, *at.shape))
-    for step in range(len(places)):
+def forecast(discs, chart):
+    """Places of discs in each step ahead, (steps, n, 2), and how uncertain they are."""
+    steps = LAYERS * LAYER + 1
+    at, rates, radii = motion(discs)
+    places, since = np.empty((steps, *at.shape)), np.zeros((steps, len(at)))
+    bounced = np.zeros(len(at), bool)
+    for step in range(steps):
         places[step] = at
-        at, rates = advanced(at, rates, chart)
-    return places
+        since[step] = since[step - 1] + bounced if step else 0.0
+        at, rates, normals = chart.ahead(at, rates, radii)
+        bounced |= normals.any(axis=1)
+    ahead = np.arange(steps)
+    spread = np.array([disc.spread(ahead) for disc in discs]).T
+    spread = spread + BLUR * ahead[:, None] + BOUNCED * since
+    doubts = np.log1p((spread / VAGUE) ** 2)
+    return places, np.minimum(SHARP + spread, WIDEST), doubts, radii
 
 
-def between(values, u, v):
-    """Values at points between nodes, by column and row."""
-    i, j = (
-        np.clip(each.astype(int), 0, count - 2)
-        for each, count in ((u, values.shape[1]), (v, values.shape[0]))
-    )
-    a, b = u - i, v - j
-    return (1 - b) * ((1 - a) * values[j, i] + a * values[j, i + 1]) + b * (
-        (1 - a) * values[j + 1, i] + a * values[j + 1, i + 1]
-    )
+def risks(gaps, layers):
+    """Costs of a layer by gaps to discs in units of what is unknown."""
+    price = (RISK * FADE**layers).astype(gaps.dtype)
+    return price / (1.0 + np.exp(np.clip(gaps, -15.0, 15.0)))
 
 
 class Field:
-    """Lengths of the shortest paths to the goal from the nodes of a lattice."""
+    """Steps to the goal from the nodes of a lattice.
+
+    Attributes:
+        times: The steps.
+    """
 
     def __init__(self, goal):
-        self.goal = goal
-        self.count = int(2 * HALF / NODE)
-        self.lengths = np.full((self.count, self.count), np.inf)
+        self.goal, self.times = goal, None
 
     def replan(self, chart, x, y):
-        """Dijkstra from the goal to somewhat beyond the robot."""
-        step = int(NODE / CELL)
-        blocked = chart.blocked[::step, ::step]
-        close = grown(blocked, disk(1.5 * CELL))
-        count = self.count
-        price = np.where(blocked, 25.0, np.where(close, 1.4, 1.0))
-        price[[0, -1]] = price[:, [0, -1]] = np.inf
-        price = price.ravel().tolist()
-        begin, end = self.node(*self.goal), self.node(x, y)
-        lengths = [math.inf] * (count * count)
-        lengths[begin] = 0.0
-        heap, most = [(0.0, begin)], math.inf
-        steps = [(1, 1.0), (-1, 1.0), (count, 1.0), (-count, 1.0)]
-        steps += [
-            (row + side, math.sqrt(2)) for row in (count, -count) for side in (1, -1)
-        ]
-        while heap:
-            length, node = heapq.heappop(heap)
-            if length > lengths[node]:
-                continue
-            if length > most:
-                break
-            if node == end:
-                most = length + NODE * WINDOW
-            for offset, far in steps:
-                other = node + offset
-                longer = length + NODE * far * price[other]
-                if longer < lengths[other]:
-                    lengths[other] = longer
-                    heapq.heappush(heap, (longer, other))
-        self.lengths = np.array(lengths).reshape(count, count)
-        self.lengths[~np.isfinite(self.lengths)] = 2.0 * np.nanmax(
-            np.where(np.isfinite(self.lengths), self.lengths, 0.0)
+        """Finds the times from the goal to somewhat beyond the robot, in buckets."""
+        clear = chart.clear[::COARSE, ::COARSE]
+        width = clear.shape[1]
+        price = price_at(clear)
+        price = np.where(clear < RADIUS + 1.0, 12.0, price)
+        price[clear < RADIUS - 3.0] = np.inf
+        price[[0, 1, -2, -1]] = price[:, [0, 1, -2, -1]] = np.inf
+        price = price.ravel()
+        times = np.full(price.size, np.inf)
+        begin, end = (
+            round((b + HALF) / COARSE) * width + round((a + HALF) / COARSE)
+            for a, b in (self.goal, (x, y))
         )
+        price[begin] = min(price[begin], 1.0)
+        offsets = MOVES[:, 1] * width + MOVES[:, 0]
+        lengths = 0.5 * COARSE / STEP * np.hypot(*MOVES.T)
+        times[begin] = 0.0
+        todo, most = np.array([begin]), np.inf
+        while len(todo):
+            bound = times[todo].min() + BUCKET
+            if bound > most:
+                break
+            soon = times[todo] <= bound
+            now, later = todo[soon], [todo[~soon]]
+            while len(now):
+                to = now[:, None] + offsets
+                time = times[now, None] + lengths * (price[now, None] + price[to])
+                better = time < times[to]
+                to, time = to[better], time[better]
+                np.minimum.at(times, to, time)
+                soon = times[to] <= bound
+                now = np.unique(to[soon])
+                later.append(to[~soon])
+            todo = np.unique(np.concatenate(later))
+            todo = todo[times[todo] > bound]
+            if times[end] < np.inf:
+                most = min(most, times[end] + NODE * WINDOW * 1.5 / STEP)
+        self.times = np.minimum(times, FAR).reshape(clear.shape)
 
-    def node(self, x, y):
-        """Number of the node nearest to a point."""
-        column, row = round((x + HALF) / NODE), round((y + HALF) / NODE)
-        return row * self.count + column
-
-    def at(self, x, y):
-        """Lengths at points, between nodes."""
-        return between(self.lengths, (x + HALF) / NODE, (y + HALF) / NODE)
-
-
-def danger(gaps, layers):
-    """Probability of a contact in a layer, by the gap that is expected then, px."""
-    # What is far ahead is not known well.
-    width = WIDTH + SPREAD * layers
-    return FADE**layers / (1.0 + np.exp(np.clip((gaps - TOUCH) / width, -30.0, 30.0)))
-
-
-def dangers(places, discs, x, y):
-    """Probability of a contact at each node in each layer."""
-    if not discs:
-        return np.zeros((LAYERS + 1, *COLUMNS.shape))
-    reach = RADIUS + np.array([disc.radius for disc in discs], np.float32)
-    off = (places[::LAYER] - (x, y)).astype(np.float32)
-    steps = STEPS.astype(np.float32)
-    dx, dy = (steps - off[:, :, :1]) ** 2, (steps - off[:, :, 1:]) ** 2
-    far = np.sqrt(dy[:, :, :, None] + dx[:, :, None, :]) - reach[:, None, None]
-    return danger(far.min(axis=1), np.arange(LAYERS + 1)[:, None, None])
-
-
-def around(values):
-    """Values of the nodes to which MOVES lead, shape (moves, rows, columns)."""
-    padded, side = np.pad(values, 1, constant_values=LOST), 2 * WINDOW + 1
-    return np.stack(
-        [padded[1 + j : 1 + j + side, 1 + i : 1 + i + side] for j, i in MOVES]
-    )
+    def around(self, x, y):
+        """Steps to the goal from the nodes of the search."""
+        u, v = (x + SQUARE + HALF) / COARSE, (y + SQUARE + HALF) / COARSE
+        times = between(self.times, *np.meshgrid(u, v))
+        off = np.hypot(x + SQUARE - self.goal[0], (y + SQUARE - self.goal[1])[:, None])
+        direct = np.maximum(off - TOLERANCE, 0.0) / STEP
+        times = np.where((off < 20.0) & (times < 30.0), direct, times)
+        return times.astype(np.float32), off < TOLERANCE
 
 
-def values(field, chart, places, discs, x, y):
-    """What is left to pay at each node in layer HELD, and the move from there."""
-    left = field.at(x + COLUMNS, y + ROWS)
-    left = np.minimum(left - left[WINDOW, WINDOW], 0.5 * LOST)
-    walls = chart.blocked[cells(x + COLUMNS, y + ROWS)]
-    risks = dangers(places, discs, x, y)
-    # Whoever is early is better off than who arrives at last.
-    value = np.where(walls, LOST, left + risks[LAYERS] * (LOST - left))
-    for layer in range(LAYERS - 1, HELD - 1, -1):
-        options = around(value)
-        options[0] += PAUSE
-        choice = options.argmin(axis=0)
-        further = np.minimum(options.min(axis=0) + HURRY * left, LOST)
-        value = further + risks[layer] * (LOST - further)
-        value[walls] = LOST
-    # Wheel speeds are tested by themselves for walls.
-    value = np.where(walls, around(value).min(axis=0) + NODE, value)
-    return value, choice
+def price_at(clear):
+    """What a step costs by the clearance: it is more beside walls."""
+    return 1.0 + CROWDED * np.clip((ROOM - clear) / (ROOM - RADIUS), 0.0, 1.0)
+
+
+def least_around(values):
+    """The least value within three nodes, shape smaller by 3 on each side."""
+    height, width = values.shape[0] - 6, values.shape[1] - 6
+    three = np.minimum(np.minimum(values[:, :-2], values[:, 1:-1]), values[:, 2:])
+    five = np.minimum(three[:, :-2], three[:, 2:])
+    seven = np.minimum(five[:, :-2], five[:, 2:])
+    three, five = three[:, 2 : 2 + width], five[:, 1 : 1 + width]
+    best = np.minimum(seven[2 : 2 + height], seven[3 : 3 + height])
+    np.minimum(best, seven[4 : 4 + height], out=best)
+    for rows, top in ((five, 1), (five, 5), (three, 0), (three, 6)):
+        np.minimum(best, rows[top : top + height], out=best)
+    return best
+
+
+def values_ahead(field, chart, future, x, y):
+    """Steps that are left at each node in layer BEGIN."""
+    times, at_goal = field.around(x, y)
+    clear = chart.clear[np.ix_(*(pixels(x + SQUARE, y + SQUARE)[::-1]))]
+    blocked = clear < RADIUS + MARGIN
+    base = np.where(blocked, FAR, LAYER * price_at(clear))[3:-3, 3:-3]
+    base = base.astype(np.float32)
+    values = np.where(blocked, FAR, times)
+    # Who leaves the square at its border goes on as if there were no discs.
+    inner, at_goal = values[3:-3, 3:-3], at_goal[3:-3, 3:-3]
+    costs = layer_costs(future, x, y) if future is not None else np.zeros(LAYERS)
+    for layer in range(LAYERS - 1, BEGIN - 1, -1):
+        after = base + least_around(values) + costs[layer - BEGIN]
+        np.minimum(after, FAR, out=after)
+        after[at_goal] = 0.0
+        inner[:] = after
+    return inner
+
+
+def layer_costs(future, x, y):
+    """Costs of discs at each node, layers BEGIN to LAYERS - 1."""
+    layers = np.arange(BEGIN, LAYERS)
+    places, widths, doubts = (each[layers * LAYER] for each in future[:3])
+    places = places - (x, y)
+    nodes = np.rint(places / NODE).astype(int)
+    near = np.abs(nodes).max(axis=2) <= WINDOW + STAMP
+    off = (nodes * NODE - places)[..., None] + NODE * np.arange(-STAMP, STAMP + 1)
+    square, side = 2 * (WINDOW + 2 * STAMP) + 1, 2 * STAMP + 1
+    costs = np.zeros((len(layers), square, square), np.float32)
+    for m, radius in enumerate(future[3]):
+        on = np.flatnonzero(near[:, m])
+        far = (off[on, m].astype(np.float32)) ** 2
+        gaps = np.sqrt(far[:, 1, :, None] + far[:, 0, None, :])
+        gaps -= np.float32(radius + RADIUS + TOUCH)
+        gaps /= widths[on, m, None, None].astype(np.float32)
+        gaps += doubts[on, m, None, None].astype(np.float32)
+        stamps = risks(gaps, layers[on, None, None])
+        for layer, stamp in zip(on.tolist(), stamps, strict=True):
+            i, j = (nodes[layer, m] + WINDOW + STAMP).tolist()
+            part = costs[layer, j : j + side, i : i + side]
+            np.maximum(part, stamp, out=part)
+    return costs[:, 2 * STAMP : -2 * STAMP, 2 * STAMP : -2 * STAMP]
+
+
+def candidates():
+    """Headings and speeds to try: first turn and further one (rad), speeds, gear."""
+    rows = []
+    for angle in np.radians([0.0, *FINE, *range(10, 360, 10)]).tolist():
+        rows += [(angle, b, 1.0, 1.0, 1.0) for b in FURTHER]
+        rows += [(angle, b, 1.0, 1.0, -1.0) for b in FURTHER]
+        for first, then in ((0.5, 0.5), (1.0, 0.0), (0.0, 1.0)):
+            rows += [(angle, 0.0, first, then, gear) for gear in (1.0, -1.0)]
+    rows.append((0.0, 0.0, 0.0, 0.0, 1.0))
+    # The last ones go on in the direction of the course that is driven.
+    rows += [
+        (0.0, b, v, 1.0, g) for b in FURTHER for v in (1.0, 0.0) for g in (1.0, -1.0)
+    ]
+    return np.array(rows).T
+
+
+CANDIDATES = candidates()
+STEPS = BEGIN * LAYER
+
+
+def roll(pose, ways):
+    """Drives all candidates: x, y after each step, headings and first wheel speeds."""
+    _, further, speed_1, speed_2, gear = CANDIDATES
+    x, y, heading = pose
+    limit = 2.0 * STEP / AXLE
+    aim = ways + np.where(gear < 0.0, math.pi, 0.0)
+    x, y = np.full(len(gear), x), np.full(len(gear), y)
+    heading = np.full(len(gear), heading)
+    xs, ys = [], []
+    for step in range(STEPS):
+        goal, speed = (aim, speed_1) if step < FIRST else (aim + further, speed_2)
+        off = np.remainder(goal - heading + math.pi, 2.0 * math.pi) - math.pi
+        turn = np.clip(off, -limit, limit)
+        wheel = 0.5 * AXLE / STEP * turn
+        drive = np.minimum(speed, 1.0 - np.abs(wheel))
+        drive = gear * np.where(np.abs(off) > FACING, 0.0, drive)
+        if step == 0:
+            wheels = np.column_stack([drive + wheel, drive - wheel])
+        length = STEP * drive * (1.0 - turn * turn / 24.0)
+        x = x + length * np.cos(heading + 0.5 * turn)
+        y = y + length * np.sin(heading + 0.5 * turn)
+        heading = heading + turn
+        xs.append(x)
+        ys.append(y)
+    return np.array(xs), np.array(ys), heading, wheels
+
+
+def costs_of(xs, ys, chart, future):
+    """Costs of each step of all candidates, by walls and discs."""
+    clear = chart.clear_at(xs, ys)
+    costs = price_at(clear)
+    lack = RADIUS + MARGIN - clear
+    costs += np.where(lack > 0.0, BLOCKED + DEEPER * lack, 0.0)
+    if future is None:
+        return costs
+    places, widths, doubts, radii = future
+    ahead = np.arange(1, STEPS + 1)[:, None]
+    for m, radius in enumerate(radii):
+        at = places[1 : STEPS + 1, m]
+        if math.dist(at[0], (xs[0, 0], ys[0, 0])) > radius + RADIUS + 50.0:
+            continue
+        gaps = np.hypot(xs - at[:, :1], ys - at[:, 1:]) - radius - RADIUS
+        scaled = (gaps - TOUCH) / widths[1 : STEPS + 1, m, None]
+        scaled += doubts[1 : STEPS + 1, m, None]
+        costs += risks(scaled, ahead / LAYER) / LAYER
+        lack = HIT - gaps[:HIT_STEPS]
+        costs[:HIT_STEPS] += np.where(lack > 0.0, STRUCK + STRUCK_DEEPER * lack, 0.0)
+    return costs
 
 
 def chosen(field, chart, discs, pose):
-    """The best wheel speeds, held up to layer HELD, by what they lead to."""
+    """The wheel speeds of the candidate that costs least."""
     x, y, heading = pose
-    places = futures(discs, chart)
-    value, choice = values(field, chart, places, discs, x, y)
-    wheels = PAIRS * STEP
-    forward = 0.5 * wheels.sum(axis=1)
-    turn = (wheels[:, 0] - wheels[:, 1]) / AXLE
-    facing = np.full(len(PAIRS), heading)
-    px, py = np.full(len(PAIRS), x), np.full(len(PAIRS), y)
-    safe = np.ones(len(PAIRS))
-    reach = RADIUS + np.array([disc.radius for disc in discs])
-    for step in range(1, HELD * LAYER + 1):
-        for part in (0.5, 0.5):
-            middle = facing + 0.5 * part * turn
-            px = px + part * forward * np.cos(middle)
-            py = py + part * forward * np.sin(middle)
-            facing = facing + part * turn
-            safe[chart.blocked[cells(px, py)]] = 0.0
-        if discs:
-            off_x, off_y = (
-                px[:, None] - places[step, :, 0],
-                py[:, None] - places[step, :, 1],
-            )
-            gaps = (np.hypot(off_x, off_y) - reach).min(axis=1)
-            safe *= 1.0 - danger(gaps, step / LAYER)
-    cost = between(value, (px - x) / NODE + WINDOW, (py - y) / NODE + WINDOW)
-    column = np.rint((px - x) / NODE).astype(int) + WINDOW
-    row = np.rint((py - y) / NODE).astype(int) + WINDOW
-    moves = choice[row, column]
-    off = np.remainder(ANGLES[moves] - facing + 0.5 * math.pi, math.pi) - 0.5 * math.pi
-    cost += np.where(moves > 0, TURNING * np.abs(off), 0.0)
-    cost += HABIT * np.abs(PAIRS - STATE["last"]).sum(axis=1)
-    cost = LOST + safe * (cost - LOST)
-    return PAIRS[int(np.argmin(cost))]
+    future = forecast(discs, chart) if discs else None
+    mid_x, mid_y = round(x), round(y)
+    values = values_ahead(field, chart, future, mid_x, mid_y)
+    ways = heading + CANDIDATES[0]
+    if STATE["way"] is not None:
+        ways[-4 * len(FURTHER) :] = STATE["way"][0]
+    xs, ys, facing, wheels = roll(pose, ways)
+    costs = costs_of(xs, ys, chart, future)
+    done = np.hypot(xs - field.goal[0], ys - field.goal[1]) < TOLERANCE
+    done = np.logical_or.accumulate(done, axis=0)
+    costs[1:][done[:-1]] = 0.0
+    u, v = (xs[-1] - mid_x) / NODE + WINDOW, (ys[-1] - mid_y) / NODE + WINDOW
+    left = between(values, u, v)
+    cap = values[values < 0.5 * FAR].max(initial=0.0) + 1.0
+    low = np.minimum(values, cap)
+    slope_x = between(low, u + 1.5, v) - between(low, u - 1.5, v)
+    slope_y = between(low, u, v + 1.5) - between(low, u, v - 1.5)
+    turn = np.arctan2(-slope_y, -slope_x) - facing
+    turn = np.abs(np.remainder(turn + 0.5 * math.pi, math.pi) - 0.5 * math.pi)
+    total = costs.sum(axis=0) + np.where(done[-1], 0.0, left + TURNING * turn)
+    if STATE["way"] is not None:
+        total += VEER * (1.0 - np.cos(ways - STATE["way"][0]))
+        total += np.where(CANDIDATES[4] != STATE["way"][1], REVERSE, 0.0)
+    best = int(total.argmin())
+    if CANDIDATES[2, best] > 0.0:
+        STATE["way"] = ways[best], CANDIDATES[4, best]
+    return wheels[best]
 
 
 def reset(obs):
-    """Starts an episode."""
-    STATE.update(chart=Map(), discs=[], step=0, last=np.zeros(2))
-    STATE["field"] = Field([float(value) for value in obs["goal"]])
+    """Finds the lattice of pixels; from here on, all is in its frame."""
+    ranges = obs["ranges"].astype(float)
+    hit = ranges < RANGE - 1e-3
+    angles = float(obs["pose"][2]) + FAN[hit]
+    turn = lattice(ranges[hit] * np.cos(angles), ranges[hit] * np.sin(angles))
+    goal = turned(*obs["goal"].astype(float), turn)
+    STATE.update(turn=turn, chart=Map(), discs=[], field=Field(goal), step=0, way=None)
 
 
 def policy(obs):
     """Wheel speeds for an observation."""
-    pose = x, y, heading = tuple(float(value) for value in obs["pose"])
-    ranges = np.asarray(obs["ranges"], float)
-    chart, field, angles = STATE["chart"], STATE["field"], heading + FAN
-    numbers = np.flatnonzero(ranges < RANGE - 1e-3)
-    points = np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles)])
-    discs = STATE["discs"]
-    advance(discs, chart)
-    of_discs = track(discs, chart, numbers.tolist(), points[numbers], pose)
-    STATE["discs"] = forget(discs, pose, ranges)
-    rays = np.zeros(RAYS, bool)
-    rays[numbers[of_discs]] = True
-    chart.add(x, y, angles, ranges, rays)
+    x, y = turned(*obs["pose"][:2].astype(float), STATE["turn"])
+    pose = x, y, float(obs["pose"][2]) - STATE["turn"]
+    ranges = obs["ranges"].astype(float)
+    chart, field = STATE["chart"], STATE["field"]
+    cos, sin = np.cos(pose[2] + FAN), np.sin(pose[2] + FAN)
+    numbers = np.flatnonzero(chart.add(x, y, cos, sin, ranges))
+    points = np.column_stack([x + ranges * cos, y + ranges * sin])[numbers]
+    STATE["discs"] = track(STATE["discs"], chart, pose, points, numbers, ranges)
     if STATE["step"] % REPLAN == 0:
         field.replan(chart, x, y)
     STATE["step"] += 1
-    STATE["last"] = pair = chosen(field, chart, STATE["discs"], pose)
-    return pair.astype(np.float32)
+    return chosen(field, chart, STATE["discs"], pose).astype(np.float32)
