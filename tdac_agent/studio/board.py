@@ -30,7 +30,7 @@ Place = tuple[float, float]
 WIDTH = 900
 """Small maps are enlarged to about this width, large ones reduced to twice that, px."""
 OCCUPIED = 24, 90, 150
-SHARE = 0.62
+SHARE = 0.75
 """Opacity of the occupied grid over the picture."""
 
 
@@ -51,8 +51,11 @@ class Board:
         notes: What the reader is to know.
         start: Where the robot of the file starts, with its heading, if it says so.
         goal: Where the file has its goal.
+        radius: Body radius of a bundled map, px.
         widest: Largest body radius that gets from one place to another, in the unit;
             negative for none. None for worlds, whose robot has one size.
+        laid_over: The picture with another occupied grid over it: the reading of a
+            map may depend on start and goal. None for worlds.
     """
 
     kind: Kind
@@ -69,6 +72,7 @@ class Board:
     goal: Place | None = None
     radius: float | None = None
     widest: Callable[[Place, Place], float] | None = None
+    laid_over: Callable[[BoolGrid], bytes] | None = None
 
 
 def names_of(kind: Kind) -> tuple[str, ...]:
@@ -104,6 +108,9 @@ def _of_map(source: str, polarity: str | None) -> Board:
     zoom = _zoom(grid.cells)
     picture = _laid_over(image, grid.cells, zoom)
 
+    def laid_over(cells: BoolGrid) -> bytes:
+        return _encoded(_laid_over(image, cells, zoom))
+
     def place(x: float, y: float) -> Place:
         return x / zoom - 0.5, y / zoom - 0.5
 
@@ -131,6 +138,7 @@ def _of_map(source: str, polarity: str | None) -> Board:
         bundled.goal if bundled else None,
         bundled.robot_radius if bundled else None,
         widest,
+        laid_over,
     )
 
 

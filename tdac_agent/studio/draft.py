@@ -110,6 +110,7 @@ class Checked:
         narrowest: The place on it that is nearest to an obstacle.
         clearance: Distance from there to the obstacle.
         widest: Largest body radius that gets through, px; None if it is not known.
+        picture: The map as it was read for this task.
     """
 
     task: Task | None
@@ -118,6 +119,7 @@ class Checked:
     narrowest: Place | None = None
     clearance: float = 0.0
     widest: float | None = None
+    picture: bytes | None = None
 
 
 def check(draft: Draft, board: Board, place: Path) -> Checked:
@@ -138,7 +140,10 @@ def check(draft: Draft, board: Board, place: Path) -> Checked:
     nominal = task.nominal
     path = np.asarray(nominal.shortest_path(nominal.start), np.float64)
     narrowest, clearance = _narrowest(nominal, path)
-    return Checked(task, "", path, narrowest, clearance, widest)
+    picture = None
+    if board.laid_over is not None and isinstance(nominal, Map2DTask):
+        picture = board.laid_over(nominal.terrain.grid.cells)
+    return Checked(task, "", path, narrowest, clearance, widest, picture)
 
 
 def _narrowest(nominal: Any, path: np.ndarray) -> tuple[Place | None, float]:

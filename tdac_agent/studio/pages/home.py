@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import io
+import base64
 import itertools
 import math
 import re
@@ -13,7 +13,6 @@ from pathlib import Path
 
 import fastapi
 from nicegui import events, ui
-from PIL import Image
 
 from tdac_agent.library.listing import next_folder
 from tdac_agent.studio.board import Board, Kind, Place, board_of, names_of
@@ -61,6 +60,7 @@ class Choosing:
         self._board: Board | None = None
         self._draft: Draft | None = None
         self._checked: Checked | None = None
+        self._shown = b""
         self._turn = 0  # number of the newest choice: the work on older ones is dropped
 
     async def show(self, source: str) -> None:
@@ -158,7 +158,7 @@ class Choosing:
             return
         kept = asked if kind == "map" else None
         self._board, self._draft = board, Draft.of(board, name, kept)
-        self._image.set_source(Image.open(io.BytesIO(board.png)))
+        self._show_picture(board.png)
         self._image.props(f'alt="{kind} {name}"')
         self._reading.text = board.reading
         self._notes.clear()
@@ -174,6 +174,7 @@ class Choosing:
     def _refuse(self, text: str) -> None:
         self._checked, self._draft = None, None
         self._image.set_source("")
+        self._shown = b""
         self._image.content = ""
         self._reading.text = ""
         self._tell(text, good=False)
@@ -244,9 +245,16 @@ class Choosing:
                 return
             self._checked = checked
             self._tell(*_sentence(checked, board))
+            self._show_picture(checked.picture or board.png)
         self._image.content = overlay(board, draft, self._checked)
         self._show_radius(draft)
         self._refresh_command()
+
+    def _show_picture(self, png: bytes) -> None:
+        if png != self._shown:
+            self._shown = png
+            address = f"data:image/png;base64,{base64.b64encode(png).decode()}"
+            self._image.set_source(address)
 
     def _show_numbers(self, draft: Draft) -> None:
         places = (*(draft.start or (None, None)), draft.heading)

@@ -20,6 +20,7 @@ code.command { display: block; background: #eceae3; padding: .6em .8em;
 .board { width: 100%; border: 1px solid #d4d2c8; border-radius: 6px; overflow: hidden; }
 .board img { width: 100%; cursor: crosshair; }
 @media (min-width: 1024px) { .beside { position: sticky; top: 4rem; } }
+@media (max-width: 1023px) { .beside { order: -1; } }
 .world { width: min(100%, 78vh); }
 .problem { color: #a3280f; } .fine { color: #12694a; } .note { color: #5d6068; }
 iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
