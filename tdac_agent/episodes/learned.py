@@ -37,6 +37,7 @@ _NETWORKS = {
     "stable_baselines3.sac.policies": "SACPolicy",
     "stable_baselines3.td3.policies": "TD3Policy",
     "sb3_contrib.common.recurrent.policies": "RecurrentActorCriticPolicy",
+    "tdac_agent.episodes.memory_policy": "MemoryPolicy",
 }
 """Policy class for observations in a Box, by the module of the saved class."""
 _WITHOUT_SDE = "stable_baselines3.td3.policies"
@@ -179,7 +180,7 @@ def _policy_class(module: str, dict_observation: bool) -> Any:
     except ImportError as error:
         needed = f"SB3 policies need an extra: {install_command('sb3')}"
         raise ControllerFault(needed, "import") from error
-    except KeyError as error:
+    except (KeyError, AttributeError) as error:
         raise ControllerFault(
             f"a policy from {module[:80]} cannot be evaluated; expected one of PPO, "
             "RecurrentPPO, A2C, SAC or TD3",

@@ -19,6 +19,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecMonitor
 
+from tdac_agent.episodes.memory_policy import MemoryPolicy
 from tdac_agent.errors import RunError
 from tdac_agent.training.checkpoint_marks import CHECKPOINT, REPLAY, install_checkpoint
 from tdac_agent.training.curve import Point, read_curve, write_curve
@@ -30,6 +31,8 @@ from tdac_agent.training.set_trials import evaluate_on_worlds
 from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 
 ALGOS = {"ppo": PPO, "recurrent-ppo": RecurrentPPO, "sac": SAC, "td3": TD3}
+POLICIES = {f"{MemoryPolicy.__module__}.{MemoryPolicy.__qualname__}": MemoryPolicy}
+"""Policy classes besides those that stable-baselines3 knows by name."""
 EVALUATION_SEED = 1_000_000
 """Added to the training seed; `tdac evaluate` uses other episodes."""
 _Trials = VecMonitor | WrappedVectorEnv
@@ -188,7 +191,7 @@ def _model(plan: TrainingPlan, folder: Path, envs: VecMonitor) -> Any:
         given = model_arguments(plan.hyperparameters)
         try:
             return kind(
-                plan.policy,
+                POLICIES.get(plan.policy, plan.policy),
                 envs,
                 **{"seed": plan.seed, "device": "cpu", "tensorboard_log": log, **given},
             )
