@@ -14,6 +14,8 @@
 #                     make clients CLIENTS="sb3 skrl"
 #   make results-rl   The trainings of results/ladder/learned: hours, not part of CI;
 #                     after an interruption it goes on.
+#   make docs         The site, in build/site, with its links checked and its notebooks run.
+#   make linkcheck    Links to other sites; needs a network.
 #   make lint         Style, types and import rules.
 PYTHON ?= python3
 VENV ?= .venv
@@ -26,7 +28,7 @@ SAMPLE ?= 1
 PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 .PHONY: synth test test-all slow slow-sample lint bench portability clients results-rl \
-	clean
+	docs linkcheck clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
@@ -56,6 +58,13 @@ results-rl: $(VENV)/.installed
 	$(BIN)/pip install --quiet -e ".[sb3]"
 	$(BIN)/python -m benchmarks.ladder_trainings runs/results-rl --keep results/ladder/learned
 
+docs: $(VENV)/.docs-installed
+	$(BIN)/sphinx-build -W --keep-going -q -b html -c docs . build/site
+	@echo "built: build/site/index.html"
+
+linkcheck: $(VENV)/.docs-installed
+	$(BIN)/sphinx-build -q -b linkcheck -c docs . build/links
+
 lint: $(VENV)/.lint-installed
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -71,6 +80,10 @@ $(VENV)/.installed: pyproject.toml
 $(VENV)/.test-installed: $(VENV)/.installed
 	$(BIN)/pip install --quiet -e ".[test]"
 	$(BIN)/tdac warm
+	touch $@
+
+$(VENV)/.docs-installed: $(VENV)/.installed
+	$(BIN)/pip install --quiet -e ".[docs]"
 	touch $@
 
 $(VENV)/.lint-installed: $(VENV)/.test-installed

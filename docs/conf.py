@@ -1,0 +1,106 @@
+"""The site. `make docs` builds it with warnings as errors, without a network."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import inspect
+import re
+from collections.abc import Iterator
+from pkgutil import resolve_name
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+project, author = "tdac", "the tdac authors"
+release = importlib.metadata.version("tdac")
+# The source folder is that of the repository, so that links between files work on the
+# site as they do in the repository.
+root_doc = "docs/index"
+include_patterns = [
+    "docs/**.md",
+    "notebooks/*.ipynb",
+    "results/**/README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+]
+exclude_patterns = [".*", "build", "runs", "node_modules"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+html_theme, html_title = "furo", "tdac"
+html_extra_path = ["site"]
+# Notebooks are run anew only if they have changed.
+nb_execution_mode = "cache"
+nb_execution_cache_path = "build/notebooks"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 900
+nb_merge_streams = True
+myst_heading_anchors = 4
+nitpicky = True
+# Types of the code, of other packages, and words for shapes, which link nowhere.
+nitpick_ignore_regex = [("py:.*", r".*")]
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+napoleon_use_ivar = True
+
+
+class Docstring(SphinxDirective):
+    """Shows the docstring of an object, which is Markdown: `{docstring} NAME`."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """The nodes of the docstring."""
+        text = inspect.getdoc(resolve_name(self.arguments[0]))
+        assert text is not None
+        lines = "\n".join(_listed(text.splitlines()))
+        return self.parse_text_to_nodes(lines, allow_section_headings=True)
+
+
+def _listed(lines: list[str]) -> Iterator[str]:
+    """The lines of a docstring, with its `Args:` as a list."""
+    inside = False
+    for line in lines:
+        if line == "Args:":
+            inside = True
+        elif inside and (found := re.match(r"    (\w+): (.*)", line)):
+            yield f"- `{found[1]}`: {found[2]}"
+        elif inside and line.startswith("        "):
+            yield f"  {line.strip()}"
+        else:
+            inside = inside and not line
+            yield line
+
+
+def as_rst(
+    app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]
+) -> None:
+    """Turns the Markdown of a docstring into reStructuredText, for autodoc."""
+    del app, what, name, obj, options
+    lines[:] = list(
+        _tables(re.sub(r"(?<!`)`([^`]+)`(?!`)", r"``\1``", line) for line in lines)
+    )
+
+
+def _tables(lines: Iterator[str]) -> Iterator[str]:
+    """The lines, with tables as `list-table`."""
+    rows = 0
+    for line in lines:
+        cells = [cell.strip() for cell in line.strip().strip("|").split("|")]
+        if not line.strip().startswith("|"):
+            if rows:
+                yield ""
+            rows = 0
+            yield line
+        elif not set("".join(cells)) <= set("-: "):
+            if not rows:
+                yield from ("", ".. list-table::", "   :header-rows: 1", "")
+            rows += 1
+            for number, cell in enumerate(cells):
+                yield f"   {'* - ' if number == 0 else '  - '}{cell}"
+
+
+def setup(app: Sphinx) -> None:
+    """Adds what this site needs."""
+    app.add_directive("docstring", Docstring)
+    app.connect("autodoc-process-docstring", as_rst, priority=400)

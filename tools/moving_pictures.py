@@ -1,0 +1,139 @@
+"""Draws the moving pictures of README and site.
+
+    python -m tools.moving_pictures docs
+
+`repair.gif` shows a run of `tdac synth --task cave`: its first candidate fails, the
+diagnosis is that of its report, and the repaired one arrives. The others show an
+episode in each environment.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from tdac_agent import load_task, synthesize
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.runs.history import CandidateHistory, Told, gather_run
+from tdac_envs.drawing.canvas import INK, PAPER, Image, blank, write_text
+from tdac_envs.drawing.runs import Status
+from tdac_envs.drawing.video import write_video
+from tdac_envs.map2d.picture import MapScene
+
+WIDTH, FPS, SPEED = 600, 12, 7.0
+"""Width of a picture, px; frames a second; simulated seconds a second."""
+HOLD = 3.0
+"""Seconds for which a text is shown at the end of an episode."""
+LINE, ROWS = 22, 4
+
+
+def repair(out: Path) -> None:
+    """Draws `repair.gif`."""
+    with tempfile.TemporaryDirectory() as name:
+        run = synthesize(load_task("cave"), learner="builtin", out=Path(name) / "run")
+        told = gather_run(run)
+        write_video(_frames(told), out / "repair.gif", FPS)
+
+
+def _frames(told: Told) -> Iterator[Image]:
+    for one in told.tried:
+        trajectory = dict(one.trajectories())["nominal"]
+        before, after = _captions(one)
+        yield from _episode(told, trajectory, before, after)
+
+
+def _captions(one: CandidateHistory) -> tuple[str, str]:
+    """What is written below a candidate that drives, and that has driven."""
+    assert one.report is not None
+    name = f"Candidate {one.j + 1}"
+    if one.state == "passed":
+        return f"{name}, repaired", f"{name}: all tests passed. Verified."
+    failed = next(f for f in one.report.failures if f.diagnosis is not None)
+    assert failed.diagnosis is not None
+    text = failed.diagnosis.text.partition(". ")[0]
+    return name, f"{name}: {len(one.failed)} tests failed. {text}."
+
+
+def _episode(
+    told: Told, trajectory: Trajectory, before: str, after: str
+) -> Iterator[Image]:
+    assert told.task is not None
+    nominal = told.task.nominal
+    scene = MapScene(
+        nominal.terrain.grid.cells,
+        trajectory.poses[0].tolist(),
+        nominal.goal,
+        goal_tolerance=nominal.goal_tolerance,
+        robot=nominal.robot,
+        path=nominal.shortest_path(nominal.start),
+    )
+    stride = max(1, round(SPEED / FPS / trajectory.dt))
+    ends = np.hypot(*(trajectory.poses[:, :2] - nominal.goal).T)
+    for step in trajectory.every(stride):
+        status = Status(step, nominal.horizon, float(ends[step]), "")
+        trail = trajectory.poses[: step + 1, :2]
+        pose = trajectory.poses[step].tolist()
+        frame = scene.frame(pose, trajectory.ranges[step], trail, status, [])
+        last = step == trajectory.steps
+        shown = _with_caption(frame, after if last else before)
+        for _ in range(round(HOLD * FPS) if last else 1):
+            yield shown
+
+
+def _with_caption(frame: Image, text: str) -> Image:
+    height = round(frame.shape[0] * WIDTH / frame.shape[1] / 2) * 2
+    small = cv2.resize(frame, (WIDTH, height), interpolation=cv2.INTER_AREA)
+    strip = blank(LINE * ROWS + 10, WIDTH, PAPER)
+    for row, line in enumerate(textwrap.wrap(text, 70)[:ROWS]):
+        write_text(strip, 10, LINE * (row + 1), line, INK)
+    return np.vstack([small, strip])
+
+
+def drive(episode: str, speed: float, file: Path, width: int = WIDTH) -> None:
+    """Draws an episode with `tdac play`, smaller than it does."""
+    with tempfile.TemporaryDirectory() as name:
+        film = Path(name) / "film.mp4"
+        command = f"play {episode} --speed {speed:g} --video {film}"
+        words = [sys.executable, "-m", "tdac_agent", *command.split()]
+        subprocess.run(words, check=True)
+        source = cv2.VideoCapture(str(film))
+        fps = source.get(cv2.CAP_PROP_FPS)
+        stride = max(1, round(fps / FPS))
+        write_video(_thinned(source, stride, width), file, FPS)
+
+
+def _thinned(source: cv2.VideoCapture, stride: int, width: int) -> Iterator[Image]:
+    number = 0
+    while source.grab():
+        if number % stride == 0:
+            frame = source.retrieve()[1]
+            height = round(frame.shape[0] * width / frame.shape[1] / 2) * 2
+            small = cv2.resize(frame, (width, height), interpolation=cv2.INTER_AREA)
+            yield np.ascontiguousarray(small[..., ::-1])
+        number += 1
+
+
+def main() -> None:
+    """Draws all of them."""
+    parser = argparse.ArgumentParser(prog="python -m tools.moving_pictures")
+    parser.add_argument("out", type=Path)
+    out = parser.parse_args().out
+    repair(out)
+    with tempfile.TemporaryDirectory() as name:
+        for task, file in (("maze", "map2d.gif"), ("epuck", "epuck.gif")):
+            folder = Path(name) / task
+            synthesize(load_task(task), learner="builtin", out=folder)
+            drive(str(folder), 7.0, out / file)
+    drive("builtin --set moving --split dev --index 3", 3.0, out / "ladder.gif", 360)
+
+
+if __name__ == "__main__":
+    main()
