@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
+from tdac_agent.bench.rivals import rival_names, rival_on
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.play import check_video, show
 from tdac_agent.environments.epuck import pictures as on_worlds
@@ -15,7 +17,7 @@ from tdac_agent.evaluation.set_entrants import set_entrants
 from tdac_agent.evaluation.set_play import check_shown, play_world
 from tdac_agent.evaluation.set_verify import compile_for_set
 from tdac_envs.drawing.canvas import Image
-from tdac_envs.ladder.task_sets import AnyTask, load_set
+from tdac_envs.ladder.task_sets import AnyTask, TaskSet, load_set
 from tdac_envs.map2d.task import Map2DTask
 
 
@@ -33,11 +35,21 @@ def run(
     check_shown(split)
     check_video(video)
     tasks = load_set(name)
-    (entrant,) = set_entrants([controller], tasks)
     compile_for_set(tasks)
-    rollout, task = play_world(entrant, tasks, split, index, tier)
+    with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
+        (entrant,) = set_entrants([_file_of(controller, tasks, folder)], tasks)
+        rollout, task = play_world(entrant, tasks, split, index, tier)
     title = f"{tasks.name}, {split} {index}"
     return show(rollout, partial(_frames, task, rollout), title, video, speed)
+
+
+def _file_of(controller: str, tasks: TaskSet, folder: str) -> str:
+    """A file with a classical planner of that name; else the word itself."""
+    if controller not in rival_names() or Path(controller).exists():
+        return controller
+    path = Path(folder) / f"{controller}.py"
+    path.write_text(rival_on(controller, tasks).source, encoding="utf-8")
+    return str(path)
 
 
 def _frames(task: AnyTask, rollout: Rollout, stride: int) -> Iterator[Image]:

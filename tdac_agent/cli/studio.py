@@ -18,7 +18,7 @@ def run(port: int, open_it: bool) -> None:
 
     def announce(address: str) -> None:
         print(address, flush=True)
-        text = "the studio is open for this browser alone; Ctrl-C ends it, not its runs"
+        text = "who opens this address is let in; Ctrl-C ends the studio, not its runs"
         print(text, file=sys.stderr)
 
     try:

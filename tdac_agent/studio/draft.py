@@ -15,6 +15,7 @@ from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.core.errors import TdacError
 from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.grid.grid import clearance_at
 from tdac_envs.map2d.task import Map2DTask
 
 DIGITS = {"px": 1, "m": 3}
@@ -146,6 +147,22 @@ def check(draft: Draft, board: Board, place: Path) -> Checked:
     return Checked(task, "", path, narrowest, clearance, widest, picture)
 
 
+def snapped(draft: Draft, place: Path) -> Draft:
+    """The draft with start and goal at the nearest free places.
+
+    Raises:
+        TdacError: There are none.
+    """
+    file = draft.task_file().model_copy(update={"snap": True})
+    nominal = load_task(file, base=place).nominal
+    start, goal = nominal.start, nominal.goal
+    return replace(
+        draft,
+        start=(float(start[0]), float(start[1])),
+        goal=(float(goal[0]), float(goal[1])),
+    )
+
+
 def _narrowest(nominal: Any, path: np.ndarray) -> tuple[Place | None, float]:
     """The place of a path that is nearest to an obstacle, and how near it is."""
     if len(path) < 2:
@@ -154,8 +171,8 @@ def _narrowest(nominal: Any, path: np.ndarray) -> tuple[Place | None, float]:
     if isinstance(nominal, EPuckTask):
         gaps = np.array([nominal.ground.gap(x, y) for x, y in dense])
     elif isinstance(nominal, Map2DTask):
-        columns, rows = np.rint(dense).astype(int).T
-        gaps = nominal.terrain.clear[rows, columns]
+        cells, limit = nominal.terrain.grid.cells, 4.0 * nominal.robot.radius
+        gaps = np.array([clearance_at(cells, x, y, limit) for x, y in dense])
     else:
         return None, 0.0
     at = int(gaps.argmin())

@@ -82,6 +82,13 @@ class Job:
         except (OSError, ValueError):
             return None
 
+    @property
+    def seconds(self) -> float:
+        """For how long it has run, or has been over, s."""
+        return (
+            datetime.now(UTC) - datetime.fromisoformat(self.started)
+        ).total_seconds()
+
     def output(self) -> str:
         """The end of what it has printed."""
         try:

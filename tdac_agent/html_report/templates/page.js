@@ -24,7 +24,8 @@
   }
   reveal();
   if (location.hash === "#play" && players.size) {
-    document.querySelector(".player").scrollIntoView();
+    // `scrollIntoView` would also scroll the page around a frame.
+    scrollTo(0, document.querySelector(".player").getBoundingClientRect().top);
     [...players.values()][0].play();
   }
 

@@ -16,7 +16,7 @@ from nicegui import events, ui
 
 from tdac_agent.library.listing import next_folder
 from tdac_agent.studio.board import Board, Kind, Place, board_of, names_of
-from tdac_agent.studio.draft import Checked, Draft, check
+from tdac_agent.studio.draft import Checked, Draft, check, snapped
 from tdac_agent.studio.jobs import STATE, start
 from tdac_agent.studio.pages.layout import (
     address_of,
@@ -36,6 +36,17 @@ PICTURES = ".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".tif", ".tiff", ".webp"
 OWN = (*PICTURES, *YAML, ".map", ".npy", ".wbt")
 MOST_FILES = 200
 FIRST = "map: maze"
+# A file that is dropped beside the box would replace the page.
+DROP = """<script>
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", (event) => {
+  event.preventDefault();
+  const input = document.querySelector(".q-uploader input[type=file]");
+  if (!input || event.target.closest(".q-uploader")) return;
+  input.files = event.dataTransfer.files;
+  input.dispatchEvent(new Event("change", { bubbles: true }));
+});
+</script>"""
 
 
 def add(application: fastapi.FastAPI, place: Path) -> None:
@@ -43,9 +54,10 @@ def add(application: fastapi.FastAPI, place: Path) -> None:
     del application
 
     @ui.page("/")
-    async def page(source: str = FIRST) -> None:
+    async def page(source: str = FIRST, task: str = "") -> None:
+        ui.add_body_html(DROP)
         with framed("New controller"):
-            await Choosing(place).show(source)
+            await Choosing(place).show(source, task)
 
 
 class Choosing:
@@ -63,7 +75,7 @@ class Choosing:
         self._shown = b""
         self._turn = 0  # number of the newest choice: the work on older ones is dropped
 
-    async def show(self, source: str) -> None:
+    async def show(self, source: str, task: str) -> None:
         """Builds the page."""
         with ui.row().classes("w-full gap-6 items-start"):
             with ui.column().classes("w-full lg:w-[26rem] gap-3"):
@@ -79,6 +91,7 @@ class Choosing:
                 self._notes = ui.column().classes("gap-0")
         await shown_first()
         await self._open(source)
+        await self._take(task)
 
     def _build_source(self, source: str) -> None:
         ui.label("1. Map or world").classes("text-lg font-bold")
@@ -92,16 +105,21 @@ class Choosing:
             with_input=True,
             on_change=lambda event: self._open(event.value),
         ).classes("w-full")
-        ui.upload(
-            label="or drop a file here: image, map.yaml + image, .map, .npy, .wbt",
-            multiple=True,
-            auto_upload=True,
-            max_file_size=MOST_BYTES,
-            on_upload=self._uploaded,
-            on_rejected=lambda: ui.notify(
-                f"a file may have at most {MOST_BYTES >> 20} MB", type="warning"
-            ),
-        ).classes("w-full").props('accept="{}"'.format(",".join(OWN)))
+        self._upload = (
+            ui.upload(
+                label="or drop a file here: image, map.yaml + image, .map, .npy, .wbt",
+                multiple=True,
+                auto_upload=True,
+                max_file_size=MOST_BYTES,
+                on_upload=self._uploaded,
+                on_rejected=lambda: ui.notify(
+                    f"expected {', '.join(OWN)}, of at most {MOST_BYTES >> 20} MB",
+                    type="warning",
+                ),
+            )
+            .classes("w-full")
+            .props('accept="{}"'.format(",".join(OWN)))
+        )
         self._polarity = ui.toggle(
             {"": "detect", "dark": "obstacles are dark", "light": "are light"},
             value="",
@@ -131,6 +149,10 @@ class Choosing:
             )
             self._radius.on("change", self._resized)
         self._told = ui.label().classes("text-sm").props("role=status")
+        self._snap = ui.button("Use the nearest free place", on_click=self._move).props(
+            "outline no-caps dense"
+        )
+        self._snap.visible = False
 
     def _build_start(self) -> None:
         ui.label("3. Who writes").classes("text-lg font-bold")
@@ -172,7 +194,10 @@ class Choosing:
         await self._check()
 
     def _refuse(self, text: str) -> None:
-        self._checked, self._draft = None, None
+        self._checked, self._draft, self._snap.visible = None, None, False
+        for number in self._numbers.values():
+            number.value = None
+        self._radius_text.text = ""
         self._image.set_source("")
         self._shown = b""
         self._image.content = ""
@@ -196,6 +221,7 @@ class Choosing:
         kind = "world" if suffix == ".wbt" else "map"
         source = f"{kind}: {UPLOADS}/{name}"
         self._source.set_options(_sources(self._place))
+        self._upload.reset()
         self._source.value = source
 
     async def _clicked(self, event: events.MouseEventArguments) -> None:
@@ -225,6 +251,37 @@ class Choosing:
         self._draft = replace(self._draft, start=start, goal=goal, heading=heading)
         await self._check()
 
+    async def _take(self, task: str) -> None:
+        """Takes start, heading, goal and radius from the address of the page."""
+        values = [float(part) for part in task.split(",") if part]
+        if self._draft is None or len(values) != 6:
+            return
+        x, y, heading, goal_x, goal_y, radius = values
+        self._draft = replace(
+            self._draft,
+            start=(x, y),
+            heading=heading,
+            goal=(goal_x, goal_y),
+            radius=radius,
+        )
+        self._radius.value = radius
+        self._show_numbers(self._draft)
+        await self._check()
+
+    async def _move(self) -> None:
+        """Moves start and goal to the nearest free places."""
+        draft, board = self._draft, self._board
+        if draft is None or board is None:
+            return
+        try:
+            moved = await asyncio.to_thread(snapped, draft, self._place)
+        except (TdacError, ValueError) as error:
+            self._tell(str(error), good=False)
+            return
+        self._draft = moved
+        self._show_numbers(moved)
+        await self._check()
+
     async def _resized(self) -> None:
         if self._draft is not None:
             self._draft = replace(self._draft, radius=float(self._radius.value))
@@ -238,7 +295,7 @@ class Choosing:
         self._turn += 1
         turn, self._checked = self._turn, None
         if draft.goal is None or (draft.start is None and board.start is None):
-            self._tell("Click the start, its heading, and the goal.", good=True)
+            self._tell("Click the start, a point ahead of it, and the goal.", good=True)
         else:
             checked = await asyncio.to_thread(check, draft, board, self._place)
             if turn != self._turn:
@@ -246,6 +303,8 @@ class Choosing:
             self._checked = checked
             self._tell(*_sentence(checked, board))
             self._show_picture(checked.picture or board.png)
+        stuck = self._checked is not None and self._checked.task is None
+        self._snap.visible = stuck and board.kind == "map"
         self._image.content = overlay(board, draft, self._checked)
         self._show_radius(draft)
         self._refresh_command()
@@ -265,12 +324,8 @@ class Choosing:
     def _show_radius(self, draft: Draft) -> None:
         text = f"robot radius {draft.radius:g} px" if draft.radius else ""
         widest = self._checked.widest if self._checked else None
-        if widest is not None:
-            text += (
-                f"; the widest that gets through has {widest:g} px"
-                if widest > 0
-                else "; no robot gets through"
-            )
+        if widest is not None and widest > 0:
+            text += f"; the widest that gets through has {widest:g} px"
         self._radius_text.text = text
 
     def _tell(self, text: str, good: bool) -> None:

@@ -62,10 +62,16 @@ def shown_command(text: str) -> ui.label:
         code = ui.element("code").classes("command")
         with code:
             label = ui.label(text)
-        ui.button(
-            icon="content_copy", on_click=lambda: ui.clipboard.write(label.text)
-        ).props("flat dense aria-label='Copy the command'")
+        ui.button(icon="content_copy", on_click=lambda: copied(label.text)).props(
+            "flat dense aria-label='Copy the command'"
+        )
     return label
+
+
+def copied(text: str) -> None:
+    """Copies a text, and says so."""
+    ui.clipboard.write(text)
+    ui.notify("copied")
 
 
 def address_of(page: str, at: str) -> str:

@@ -33,6 +33,7 @@ class Robustness:
             with ui.row().classes("items-center"):
                 self._count = ui.number("disturbed episodes", value=EPISODES, min=1)
                 self._go = ui.button("Measure", on_click=self._begin)
+                self._stop = ui.button("Stop", on_click=self._interrupt).props("flat")
                 self._now = ui.label().classes("note")
             self._found = ui.column().classes("w-full gap-1")
             self._film = ui.column().classes("w-full")
@@ -47,8 +48,8 @@ class Robustness:
         job = job_of(self._place, self._out)
         running = job is not None and job.running
         self._go.set_enabled(not running)
-        lines = job.output().strip().splitlines() if job else []
-        self._now.text = lines[-1] if running and lines else ""
+        self._stop.visible = running
+        self._now.text = f"measuring … {job.seconds:.0f} s" if job and running else ""
         path = self._place / self._out / "robust.json"
         try:
             text = read_file(path, RECORD_BYTES).decode()
@@ -68,9 +69,11 @@ class Robustness:
                 text += f" (95 % interval {low:.3f} to {high:.3f})"
             ui.label(f"{text}.")
             with ui.row().classes("items-center gap-2"):
-                ui.label("The worst, to watch:")
+                ui.label("Failures first, then the slowest; click one to watch it:")
                 for episode in report.worst[:SHOWN]:
-                    text = f"seed {episode.seed}: {episode.outcome}"
+                    text = (
+                        f"seed {episode.seed}: {episode.outcome}, {episode.steps} steps"
+                    )
                     ui.button(
                         text, on_click=lambda _, seed=episode.seed: self._watch(seed)
                     ).props("outline no-caps dense")
@@ -79,6 +82,11 @@ class Robustness:
         count = str(int(self._count.value or EPISODES))
         words = ["verify", self._at, "--robust", count, "--out", self._out]
         start(self._place, words, self._out)
+
+    def _interrupt(self) -> None:
+        job = job_of(self._place, self._out)
+        if job is not None:
+            job.stop()
 
     def _watch(self, seed: int) -> None:
         """Draws a video of an episode, and shows it."""
@@ -101,7 +109,9 @@ class Robustness:
                 label.text = job.output()[-300:] if job else "no video"
                 return
             with self._film:
-                ui.video(address_of("/file", film)).classes("w-full max-w-3xl")
+                ui.video(address_of("/file", film), autoplay=True).classes(
+                    "w-full max-w-3xl"
+                )
 
         with self._film:
             timer = ui.timer(0.5, finished)

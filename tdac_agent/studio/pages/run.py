@@ -12,11 +12,13 @@ from nicegui import ui
 
 from tdac_agent.library.listing import row_of
 from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
-from tdac_agent.runs.run_record import RUN_FILE, load_run
+from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, load_run
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.journal import read_records
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
     address_of,
+    copied,
     framed,
     shown_command,
     shown_first,
@@ -26,6 +28,12 @@ from tdac_agent.studio.pages.layout import (
 from tdac_agent.studio.pages.robustness import Robustness
 from tdac_envs.core.errors import TdacError
 
+KINDS = {
+    "generate": "a controller: one whole file in a ```python block",
+    "edit": "a repaired controller, in the form that the prompt asks for",
+    "summarise": "rules for later candidates: a list in a ```json block",
+}
+"""What questions ask for."""
 SECONDS = 1.0
 """Between two looks at the folder."""
 
@@ -38,8 +46,9 @@ def add(application: fastapi.FastAPI, place: Path) -> None:
     async def page(at: str = "") -> None:
         with framed(at):
             folder = within(place, at)
-            if folder is None or not at:
-                ui.label(f"{at!r} is not in this folder").classes("problem")
+            known = folder is not None and (folder.is_dir() or job_of(place, at))
+            if folder is None or not at or not known:
+                ui.label(f"There is no run {at!r} in this folder.").classes("problem")
                 return
             await Watching(place, at, folder).show()
 
@@ -83,7 +92,12 @@ class Watching:
             self._resume = ui.button(
                 "Continue", icon="play_arrow", on_click=self._go_on
             )
+            self._download = ui.button("Download controller.py", on_click=self._save)
+            self._judge = ui.button("Verify on hidden worlds", on_click=self._hidden)
             self._follow = ui.switch("show each new candidate", value=True)
+        self._verdict = ui.element("pre").classes("output")
+        with self._verdict:
+            self._verdict_text = ui.label()
         self._wishes = ui.column().classes("w-full gap-1")
         self._asked = ui.column().classes("w-full gap-1")
         self._report = ui.column().classes("w-full")
@@ -99,8 +113,9 @@ class Watching:
         """Shows what has changed."""
         job = job_of(self._place, self._at)
         state = await asyncio.to_thread(_state, self._folder, job)
-        self._show_question()
+        self._show_question(running=state[1])
         self._robust.look(self._folder)
+        self._show_clock(state, job)
         if state == self._seen:
             return
         self._seen = state
@@ -122,16 +137,46 @@ class Watching:
         self._badge.clear()
         with self._badge:
             status_badge(status)
-        self._now.text = _progress(row, running)
+        self._resume.text = "Continue"
         go_on = row.get("go_on", "") if row else ""
         self._command.text = job.command if job else go_on or f"tdac report {self._at}"
         self._stop.visible = running
         self._resume.visible = bool(go_on) and not running and status != "running"
+        self._follow.visible = running
+        done = bool(row) and status in ("verified", "selected")
+        self._download.visible = done
+        self._judge.visible = done and status == "selected"
         self._wishes.clear()
         if not running and not row and job is not None:
             with self._wishes:
                 last = job.output().strip().splitlines()[-1:] or ["nothing was printed"]
                 ui.label(f"It did not begin: {last[0]}").classes("problem")
+
+    def _show_clock(self, state: _State, job: Job | None) -> None:
+        """Where the run stands, and for how long its command has run."""
+        row, running, _, output = state
+        text = _progress(row, running)
+        if running and job is not None:
+            text += f" ({job.seconds:.0f} s)"
+            last = output.strip().splitlines()[-1:]
+            text += f": {last[0].strip()}" if last else ""
+        self._now.text = text
+        judged = job_of(self._place, self._verdict_about)
+        self._verdict.visible = judged is not None
+        if judged is not None:
+            self._verdict_text.text = f"$ {judged.command}\n{judged.output()}"
+            self._judge.set_enabled(not judged.running)
+
+    @property
+    def _verdict_about(self) -> str:
+        return f"{self._at}: hidden"
+
+    def _hidden(self) -> None:
+        words = ["verify", f"{self._at}/controller.py", "--set", f"{self._at}/set.yaml"]
+        start(self._place, words, self._verdict_about)
+
+    def _save(self) -> None:
+        ui.download(load_run(self._folder).controller)
 
     def _interrupt(self) -> None:
         job = job_of(self._place, self._at)
@@ -167,7 +212,7 @@ class Watching:
                 "I trust it: continue", on_click=lambda: self._go_on(trusted=True)
             ).props("color=negative")
 
-    def _show_question(self) -> None:
+    def _show_question(self, *, running: bool) -> None:
         """The open question of a `manual` run, and a box for the answer."""
         folder = self._place / f"{self._at}-questions"
         open_ones = [
@@ -175,7 +220,7 @@ class Watching:
             for path in sorted(folder.glob("*.prompt.md"))
             if not _answer_to(path).exists()
         ]
-        question = open_ones[0] if open_ones else None
+        question = open_ones[0] if open_ones and running else None
         if question == self._question:
             return
         self._question = question
@@ -184,11 +229,15 @@ class Watching:
             return
         text = question.read_text(encoding="utf-8", errors="replace")
         with self._asked, ui.card().classes("w-full"):
-            ui.label("The run waits for an answer. Copy the prompt to a model:")
+            unused = _last_unused(self._folder)
+            if unused:
+                ui.label(f"The last answer cannot be used: {unused}").classes("problem")
+            what = _asked_for(self._folder, text)
+            ui.label(f"The run waits for {what}. Copy the prompt to a model:")
             with ui.row().classes("items-center"):
                 ui.button(
                     "Copy the prompt", icon="content_copy",
-                    on_click=lambda: ui.clipboard.write(text),
+                    on_click=lambda: copied(text),
                 )  # fmt: skip
                 ui.label(f"{len(text):,} characters").classes("note")
             shown = ui.expansion("Show the prompt").classes("w-full")
@@ -205,11 +254,37 @@ class Watching:
             ui.button("Use this answer", on_click=send)
 
 
+def _asked_for(folder: Path, question: str) -> str:
+    """What a question asks for, by the name under which the run keeps it."""
+    for path in folder.glob("iterations/*/*/*.prompt*.md"):
+        if path.read_text(encoding="utf-8", errors="replace") == question:
+            return KINDS.get(path.name.partition(".")[0], "an answer")
+    return "an answer"
+
+
+def _last_unused(folder: Path) -> str:
+    """Why the newest answer cannot be used; empty if it can."""
+    try:
+        records = read_records(folder / JOURNAL)
+    except (TdacError, OSError, ValueError):
+        return ""
+    calls = [each for each in records if str(each.get("event")).startswith("call.")]
+    last = [each for each in calls if each["event"] != "call.intent"][-1:]
+    return (
+        str(last[0].get("reason", ""))
+        if last and last[0]["event"] == "call.unused"
+        else ""
+    )
+
+
 def _answer_to(question: Path) -> Path:
     return question.with_name(question.name.replace(".prompt.md", ".reply.md"))
 
 
-def _state(folder: Path, job: Job | None) -> tuple[dict[str, Any], bool, str, str]:
+_State = tuple[dict[str, Any], bool, str, str]
+
+
+def _state(folder: Path, job: Job | None) -> _State:
     """Row of the list, whether it runs, version of its report, and output."""
     running = job is not None and job.running
     output = job.output() if job is not None else ""

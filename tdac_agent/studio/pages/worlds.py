@@ -22,6 +22,7 @@ from tdac_agent.studio.pages.layout import (
     shown_command,
     shown_first,
 )
+from tdac_agent.studio.pages.writers import Writers
 from tdac_envs.core.errors import TdacError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.ladder.picture import draw_world
@@ -91,10 +92,12 @@ class Looking:
 
     def _build_use(self) -> None:
         ui.label("Use it").classes("font-bold")
-        ui.button("Write a controller for this map", on_click=self._as_map).props(
-            "outline no-caps"
+        ui.button(
+            "Write a controller for this map (without movers)", on_click=self._as_map
+        ).props("outline no-caps").bind_enabled_from(
+            self._name, "value", lambda name: name != "epuck"
         )
-        ui.button("Write one for the whole set", on_click=self._write_for_set).props(
+        ui.button("Write one for the whole set …", on_click=self._ask_writer).props(
             "outline no-caps"
         )
 
@@ -176,13 +179,36 @@ class Looking:
         at = f"{STATE}/files/{self._tasks.name}-{split}-{index}.npy"
         (self._place / at).parent.mkdir(parents=True, exist_ok=True)
         np.save(self._place / at, world.cells)
-        ui.navigate.to(f"/?source=map: {at}")
+        pose, goal = world.start, world.goal
+        places = (*pose, *goal, self._tasks.file.robot.radius)
+        values = ",".join(f"{float(value):.4g}" for value in places)
+        ui.navigate.to(f"/?source=map: {at}&task={values}")
 
-    def _write_for_set(self) -> None:
+    def _ask_writer(self) -> None:
+        """Asks who writes, and starts a run on the set."""
         name = self._name.value
         folder = str(next_folder(name, self._place))
-        start(self._place, ["synth", "--set", name, "--out", folder], folder)
-        ui.navigate.to(address_of("/run", folder))
+        with ui.dialog(value=True) as dialog, ui.card().classes("w-[40rem] max-w-full"):
+            ui.label(f"A controller for all worlds of {name}").classes(
+                "text-lg font-bold"
+            )
+            ui.label(
+                "Candidates drive on worlds of the split dev: 64 for tests, 64 for the "
+                "selection. That takes minutes."
+            ).classes("note")
+
+            def changed() -> None:
+                go.set_enabled(writers.problem() is None)
+
+            writers = Writers(self._place, changed)
+
+            def begin() -> None:
+                words = ["synth", "--set", name, *writers.words(), "--out", folder]
+                start(self._place, writers.with_folder(words, folder), folder)
+                dialog.close()
+                ui.navigate.to(address_of("/run", folder))
+
+            go = ui.button("Write it", on_click=begin)
 
     def _watch(self) -> None:
         """Lets two policies drive this world, and shows their videos."""
@@ -241,9 +267,10 @@ def look_at(name: str, split: str, index: int) -> tuple[TaskSet, Image, dict[str
 def policies_in(place: Path) -> list[str]:
     """Controllers and learned policies of the folder."""
     found = [*place.glob("*.py"), *place.glob("*/*.zip"), *place.glob("*.zip")]
-    found += [*place.glob("runs/*/controller.py"), *place.glob("runs/*/policy.zip")]
+    found += [file.with_name("controller.py") for file in place.glob("runs/*/set.yaml")]
+    found += place.glob("runs/*/policy.zip")
     found += [*place.glob(f"{STATE}/files/*.py")]
-    return sorted(str(path.relative_to(place)) for path in found)[:300]
+    return sorted(str(path.relative_to(place)) for path in found if path.exists())[:300]
 
 
 def as_address(picture: Image) -> str:

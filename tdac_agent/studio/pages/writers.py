@@ -18,7 +18,7 @@ WHO = {
     "anthropic": "a model of Anthropic",
     "openai": "a model of OpenAI, or of a server with its API",
     "manual": "a person, or a chat window: copy the prompt, paste the answer",
-    "file": "a controller of my own, repaired by the template",
+    "file": "a controller of my own; if it fails, the template takes over",
 }
 KEYS = {"anthropic": "ANTHROPIC_API_KEY", "openai": "OPENAI_API_KEY"}
 QUESTIONS = "questions"
@@ -58,7 +58,7 @@ class Writers:
         """The flags of the command line."""
         who = self._who.value
         if who == "file":
-            return ["--from", self._file or "controller.py"]
+            return ["--from", self._file or "controller.py", "--profile", "policy"]
         if who == "manual":
             return ["--learner", f"manual:{STATE}/{QUESTIONS}"]
         if who == "builtin":

@@ -49,7 +49,7 @@ def wait(browser, condition):
 
 
 def text_of(browser):
-    return browser.find_element(By.TAG_NAME, "body").text
+    return browser.execute_script("return document.body.innerText")
 
 
 def says(browser, text):
