@@ -231,7 +231,7 @@ class Watching:
         with self._asked, ui.card().classes("w-full"):
             unused = _last_unused(self._folder)
             if unused:
-                ui.label(f"The last answer cannot be used: {unused}").classes("problem")
+                ui.label(unused[:1].upper() + unused[1:]).classes("problem")
             what = _asked_for(self._folder, text)
             ui.label(f"The run waits for {what}. Copy the prompt to a model:")
             with ui.row().classes("items-center"):
@@ -268,13 +268,12 @@ def _last_unused(folder: Path) -> str:
         records = read_records(folder / JOURNAL)
     except (TdacError, OSError, ValueError):
         return ""
-    calls = [each for each in records if str(each.get("event")).startswith("call.")]
-    last = [each for each in calls if each["event"] != "call.intent"][-1:]
-    return (
-        str(last[0].get("reason", ""))
-        if last and last[0]["event"] == "call.unused"
-        else ""
-    )
+    answers = ("call.reply", "call.fault", "call.unused")
+    last = next((r for r in reversed(records) if r.get("event") in answers), {})
+    if last.get("event") != "call.unused":
+        return ""
+    count = f"answer {last.get('asked')} of at most {last.get('most')}"
+    return f"{count} cannot be used: {last.get('problem')}."
 
 
 def _answer_to(question: Path) -> Path:

@@ -168,6 +168,21 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     page.switch_to.default_content()
 
 
+def test_a_person_answers(page, plan):
+    """The page says what is asked for, and why an answer cannot be used."""
+    open_plan(page, plan)
+    choose(page, "a person, or a chat window")
+    press(page, "Write and verify a controller")
+    says(page, "The run waits for a controller")
+    box = page.find_element(By.TAG_NAME, "textarea")
+    box.send_keys("I cannot write code.")
+    press(page, "Use this answer")
+    says(page, "Answer 1 of at most 3 cannot be used: it has no fenced block.")
+    press(page, "Stop")
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.interrupted"))
+    wait(page, lambda b: "The run waits" not in text_of(b))
+
+
 def test_the_keyboard_alone(page, plan):
     """Places are typed, the button is reached by Tab and pressed by Enter."""
     upload(page, plan)
