@@ -21,6 +21,7 @@ from tdac_agent.cli.options import (
     Threshold,
     dir_flag,
     file_flag,
+    number_flag,
 )
 
 app = typer.Typer()
@@ -45,6 +46,18 @@ def map_command(
         Optional[Path],  # noqa: UP045 - typer reads it at run time
         dir_flag("--out", help="Output folder.  [default: NAME-map]"),
     ] = None,
+    ros: Annotated[
+        bool,
+        typer.Option(
+            "--yaml", help="Also write the grid as a ROS map: map.yaml and map.pgm."
+        ),
+    ] = False,
+    resolution: Annotated[
+        Optional[float],  # noqa: UP045
+        number_flag(
+            "--resolution", help="Metres per pixel of --yaml, if the file gives none."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Turn a map image into an occupancy grid, with a preview.
@@ -56,7 +69,8 @@ def map_command(
 
     said = ReadingOptions(polarity, threshold)
     task = maps.MapTask(start, goal, heading, robot_radius)
-    maps.run(image, task, snap, metres, said, preset, out, as_json)
+    back = maps.RosMap(ros, resolution)
+    maps.run(image, task, snap, metres, said, preset, out, back, as_json)
 
 
 @app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")

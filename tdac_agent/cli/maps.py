@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,7 @@ from tdac_envs.mapping.image import load_image
 from tdac_envs.mapping.map_folder import write_map
 from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates
+from tdac_envs.mapping.ros_writer import ROS_FILES, write_ros_map
 from tdac_envs.mapping.wording import obstacles_text, scale_text
 
 SHOWN, EXPLAINED = 8, 2
@@ -82,6 +84,32 @@ class MapTask:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class RosMap:
+    """Whether the grid is also written as a ROS map, and with which resolution."""
+
+    wanted: bool
+    resolution: float | None
+
+    def resolution_of(self, params: MapParams) -> float:
+        """Metres per pixel.
+
+        Raises:
+            TaskError: Nobody says it, or flag and file say different things.
+        """
+        given, own = self.resolution, params.resolution
+        if given is not None and not 0.0 < given < math.inf:
+            raise TaskError(f"--resolution: expected metres per pixel, got {given:g}")
+        if given is not None and own is not None and given != own:
+            raise TaskError(f"--resolution {given:g}: the file gives {own:g} m per px")
+        found = own or given
+        if found is None:
+            raise TaskError(
+                f"--yaml: {params.source} gives no resolution; add --resolution METRES"
+            )
+        return found
+
+
 def run(
     image: str,
     typed: MapTask,
@@ -90,10 +118,13 @@ def run(
     said: ReadingOptions,
     preset: Preset,
     out: Path | None,
+    ros: RosMap,
     as_json: bool,
 ) -> None:
     """Preprocesses a map, writes its folder and prints the best candidates."""
     typed.check()
+    if ros.resolution is not None and not ros.wanted:
+        raise TaskError("--resolution needs --yaml")
     path = Path(image)
     if image in bundled_maps():
         bundled = bundled_map(image)
@@ -120,8 +151,11 @@ def run(
     except PicturedError as error:
         error.folder = folder
         raise
+    resolution = ros.resolution_of(params) if ros.wanted else None
     shortest = _shortest_path(grid, params)
     files = write_map(folder, grid, params, source, units, shortest)
+    if resolution is not None:
+        files += write_ros_map(folder, grid, resolution, params.origin)
     if as_json:
         rows = [_row(candidate) for candidate in ranked]
         record = {
@@ -137,6 +171,9 @@ def run(
         _print_candidates(console, ranked, units)
         _print_drive(console, params, shortest, units)
     _print_files(console, params, folder, units)
+    if resolution is not None:
+        yaml = escape(str(folder / ROS_FILES[0]))
+        console.print(f"the grid as a ROS map: {yaml} ({resolution:g} m per px)")
 
 
 def _shortest_path(grid: OccupancyGrid, params: MapParams) -> Path2D | None:

@@ -26,7 +26,9 @@ JOBS, ABOUT, OUTPUT, ENDING = "jobs", "job.json", "output.txt", "exit"
 MOST_BYTES = 1 << 20
 TAIL = 4000
 """Characters of an output that are shown."""
+MOST_KNOWN = 10_000
 _STARTED: list[subprocess.Popen[bytes]] = []
+_KNOWN: dict[Path, Job] = {}
 # Writes the exit code when the command has ended, also after the studio has. An
 # interrupt is for the command, which has work to save.
 _WRAPPED = """
@@ -143,15 +145,25 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
 
 def jobs(place: Path) -> list[Job]:
     """The jobs that were started in a folder, the newest first."""
-    found = []
-    for file in (place / STATE / JOBS).glob(f"*/{ABOUT}"):
-        try:
-            facts = json.loads(read_file(file, MOST_BYTES))
-            words = tuple(map(str, facts.pop("words")))
-            found.append(Job(folder=file.parent, words=words, **facts))
-        except (OSError, ValueError, TypeError, KeyError):
-            continue
+    files = (place / STATE / JOBS).glob(f"*/{ABOUT}")
+    found = [job for job in map(_read, files) if job is not None]
     return sorted(found, key=lambda job: (job.started, job.folder.name), reverse=True)
+
+
+def _read(file: Path) -> Job | None:
+    """A job from its file, which never changes; None if it is damaged."""
+    if file in _KNOWN:
+        return _KNOWN[file]
+    try:
+        facts = json.loads(read_file(file, MOST_BYTES))
+        words = tuple(map(str, facts.pop("words")))
+        job = Job(folder=file.parent, words=words, **facts)
+    except (OSError, ValueError, TypeError, KeyError):
+        return None
+    if len(_KNOWN) >= MOST_KNOWN:
+        _KNOWN.clear()
+    _KNOWN[file] = job
+    return job
 
 
 def job_of(place: Path, about: str) -> Job | None:

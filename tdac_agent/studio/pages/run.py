@@ -60,7 +60,7 @@ def add(application: fastapi.FastAPI, place: Path) -> None:
                 with ui.column().classes("w-1/2 gap-1"):
                     ui.link(at, address_of("/run", at)).classes("font-bold")
                     if folder is not None and (folder / RUN_FILE).is_file():
-                        _frame(at, "compare")
+                        _frame(at, str((folder / RUN_FILE).stat().st_mtime_ns))
                     else:
                         ui.label("no such run").classes("problem")
 
@@ -137,7 +137,6 @@ class Watching:
         self._badge.clear()
         with self._badge:
             status_badge(status)
-        self._resume.text = "Continue"
         go_on = row.get("go_on", "") if row else ""
         self._command.text = job.command if job else go_on or f"tdac report {self._at}"
         self._stop.visible = running

@@ -255,3 +255,29 @@ def test_no_help_names_a_python_type(tdac, command):
     assert not re.search(
         r"<(bool|boolean|text|path|float|integer)>", out, re.IGNORECASE
     )
+
+
+def test_the_grid_as_a_ros_map(tdac, tmp_path):
+    """It is the same map, and says its resolution, which somebody has to state."""
+    code, text, errors = tdac("map", "office", "--yaml", "--resolution", 0.05)
+    assert code == 0, errors
+    assert "office-map/map.yaml (0.05 m per px)" in text
+    again = tdac("map", "office-map/map.yaml", "--json")
+    cells = np.load("office-map/occupancy.npy")
+    assert again[0] == 0
+    assert json.loads(again[1])["params"]["resolution"] == 0.05
+    np.testing.assert_array_equal(np.load("map-map/occupancy.npy"), cells)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["office", "--yaml"], "gives no resolution; add --resolution METRES"),
+        (["office", "--resolution", 0.05], "--resolution needs --yaml"),
+        (["office", "--yaml", "--resolution", 0], "expected metres per pixel, got 0"),
+    ],
+)
+def test_a_ros_map_without_a_scale(tdac, words, message):
+    code, _, errors = tdac("map", *words)
+    assert code == 2
+    assert message in errors

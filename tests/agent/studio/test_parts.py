@@ -95,8 +95,9 @@ def test_a_job_is_found_again(tmp_path):
     assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
     assert shlex.split(other.command)[0] == "tdac"
     # A damaged record hides no other one.
-    (job.folder / "job.json").write_text("{")
-    assert [each.about for each in jobs(tmp_path)] == ["runs/y"]
+    (other.folder.with_name("99999")).mkdir()
+    (other.folder.with_name("99999") / "job.json").write_text("{")
+    assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
 
 
 def packed(**files):
