@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import fastapi
 from nicegui import ui
 
 from tdac_agent.library.listing import row_of
+from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, load_run
 from tdac_agent.storage.files import write_atomic
@@ -34,6 +36,16 @@ KINDS = {
     "summarise": "rules for later candidates: a list in a ```json block",
 }
 """What questions ask for."""
+FIGURES: dict[str, Callable[[dict[str, Any]], str]] = {
+    "status": lambda row: str(row["status"]),
+    "task": lambda row: str(row.get("task", "")),
+    "writer": lambda row: str(row.get("learner", "")),
+    "iterations": lambda row: f"{row.get('k', '–')} of {row.get('iterations', '–')}",
+    "time": lambda row: f"{row.get('seconds') or 0.0:.0f} s",
+    "tokens": lambda row: f"{row.get('tokens_in', 0) + row.get('tokens_out', 0):,}",
+    "cost": lambda row: "–" if row.get("cost") is None else format_usd(row["cost"]),
+}
+"""Figures of runs beside each other, from the rows of the list."""
 SECONDS = 1.0
 """Between two looks at the folder."""
 
@@ -54,15 +66,34 @@ def add(application: fastapi.FastAPI, place: Path) -> None:
 
     @ui.page("/compare")
     async def compare(one: str = "", other: str = "") -> None:
-        with framed("Two runs"), ui.row().classes("w-full no-wrap gap-3"):
+        with framed("Two runs"):
+            runs = {}
             for at in (one, other):
                 folder = within(place, at)
-                with ui.column().classes("w-1/2 gap-1"):
-                    ui.link(at, address_of("/run", at)).classes("font-bold")
-                    if folder is not None and (folder / RUN_FILE).is_file():
+                if folder is None or not (folder / RUN_FILE).is_file():
+                    ui.label(f"There is no run {at!r} here.").classes("problem")
+                    return
+                runs[at] = folder
+            _show_figures(runs)
+            with ui.row().classes("w-full gap-3"):
+                for at, folder in runs.items():
+                    with ui.column().classes("w-full lg:w-[49%] gap-1"):
+                        ui.link(at, address_of("/run", at)).classes("font-bold")
                         _frame(at, str((folder / RUN_FILE).stat().st_mtime_ns))
-                    else:
-                        ui.label("no such run").classes("problem")
+
+
+def _show_figures(runs: dict[str, Path]) -> None:
+    """A table with the figures of runs, a column for each."""
+    rows = {at: row_of(folder) for at, folder in runs.items()}
+    names = ["", *rows]
+    columns = [
+        {"name": name, "label": name, "field": name, "align": "left"} for name in names
+    ]
+    lines = [
+        {"": label, **{at: told(row) for at, row in rows.items()}}
+        for label, told in FIGURES.items()
+    ]
+    ui.table(columns=columns, rows=lines).classes("w-full").props("dense flat")
 
 
 class Watching:

@@ -56,6 +56,7 @@ class Looking:
         self._place = place
         self._tasks: TaskSet | None = None
         self._drive: Drive | None = None
+        self._chosen: tuple[str, str, int] | None = None
 
     async def show(self, level: str) -> None:
         """Builds the page."""
@@ -116,14 +117,20 @@ class Looking:
         self._films = ui.row().classes("w-full no-wrap gap-3")
 
     async def _open(self) -> None:
+        """Shows the chosen world, unless it is shown already."""
+        name, split = self._name.value, self._split.value
+        chosen = name, split, int(self._index.value or 0)
+        if chosen == self._chosen:
+            return
+        self._chosen = chosen
         self._timer.deactivate()
         self._drive = None
-        name, split = self._name.value, self._split.value
-        index = int(self._index.value or 0)
         try:
-            tasks, picture, facts = await asyncio.to_thread(look_at, name, split, index)
+            tasks, picture, facts = await asyncio.to_thread(look_at, *chosen)
         except TdacError as error:
             ui.notify(str(error), type="warning")
+            return
+        if chosen != self._chosen:  # another one has been chosen meanwhile
             return
         self._tasks = tasks
         self._show(picture)

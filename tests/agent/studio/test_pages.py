@@ -1,6 +1,7 @@
 """The pages in a real browser, as a user without the command line sees them."""
 
 import json
+import shutil
 import time
 
 import cv2
@@ -129,6 +130,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     assert run["status"] == "verified"
 
 
+@pytest.mark.slow
 def test_no_request_leaves_this_machine(browser, page, studio):
     """Nor does a page of it load anything from elsewhere."""
     names = "return performance.getEntriesByType('resource').map((e) => e.name)"
@@ -151,6 +153,7 @@ def test_a_goal_that_cannot_be_reached(page, plan):
     says(page, "A path of")
 
 
+@pytest.mark.slow
 def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     """It is the first candidate; the report has what it failed, and its successor."""
     (tmp_path / "blind.py").write_text(BLIND)
@@ -168,6 +171,20 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     page.switch_to.default_content()
 
 
+def test_two_runs_side_by_side(page, studio, plan):
+    """Their figures in one table, and both reports."""
+    run = studio.place / "runs/plan-1"
+    assert (run / "run.json").is_file(), "that of the first test"
+    shutil.copytree(run, studio.place / "runs/copy", dirs_exist_ok=True)
+    page.get(f"{studio.base}/compare?one=runs/plan-1&other=runs/copy")
+    wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "iframe.report")) == 2)
+    cells = [cell.text for cell in page.find_elements(By.CSS_SELECTOR, "td")]
+    assert cells[:3] == ["status", "verified", "verified"]
+    page.get(f"{studio.base}/compare?one=runs/plan-1&other=runs/missing")
+    says(page, "There is no run 'runs/missing' here.")
+
+
+@pytest.mark.slow
 def test_a_person_answers(page, plan):
     """The page says what is asked for, and why an answer cannot be used."""
     open_plan(page, plan)
@@ -183,6 +200,7 @@ def test_a_person_answers(page, plan):
     wait(page, lambda b: "The run waits" not in text_of(b))
 
 
+@pytest.mark.slow
 def test_the_keyboard_alone(page, plan):
     """Places are typed, the button is reached by Tab and pressed by Enter."""
     upload(page, plan)
@@ -228,6 +246,7 @@ def test_nothing_is_cut_off(page, studio, size):
     resize(page, "desktop")
 
 
+@pytest.mark.slow
 def test_a_killed_server_kills_no_run(browser, page, studio, plan):
     """Another one in the same folder finds the run again."""
     open_plan(page, plan)
