@@ -14,8 +14,8 @@ import numpy as np
 
 from tdac_agent.evaluation.kept_sets import keep_report, keep_sealed
 from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
-from tdac_agent.tasks.provenance import sha256_of, versions
-from tdac_agent.verification.judge.set_job import WorldEpisode, movers_of
+from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of_world
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder import orca_driver, space_time
 from tdac_envs.ladder.orca_driver import Drive, drive_by_orca
@@ -55,16 +55,7 @@ def plan_worlds(
     began = time.monotonic()
     salt = None if salt_file is None else read_salt(salt_file)
     episodes = [_episode(tasks, split, index, salt) for index in range(count)]
-    provenance = SetProvenance(
-        set=tasks.name,
-        set_sha256=tasks.sha256,
-        split=split,
-        salt_sha256=None if salt is None else sha256_of(salt),
-        controller_sha256=planner_sha256(),
-        sandbox="none",
-        limits={},
-        versions=dict(versions()),
-    )
+    provenance = SetProvenance.unconfined(tasks, split, salt, planner_sha256())
     seconds = time.monotonic() - began
     report = summarise(provenance, episodes, None, seconds, told=salt is None)
     keep_report(report, folder)
@@ -92,13 +83,7 @@ def _episode(
         path_score=path_score(reached, found.driven if found else 0.0, hard.length),
         barn_score=barn_score(reached, steps, hard.length / tasks.file.full_step),
         d_min=0.0 if reached else hard.length,
-        length=hard.length,
-        least_steps=hard.steps,
-        gap=hard.gap,
-        detour=hard.detour,
-        in_sight=hard.in_sight,
-        density=hard.density,
-        **movers_of(task),
+        **figures_of_world(world, task),
         cpu_seconds=round(time.process_time() - began, 3),
     )
 

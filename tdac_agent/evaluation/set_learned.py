@@ -134,15 +134,8 @@ class LearnedRuns:
             episodes = self._episodes(worlds, driven, watch)
             if told and out is not None and driven is not None:
                 keep_trajectories(driven / TRAJECTORIES, out)
-        provenance = SetProvenance(
-            set=self.tasks.name,
-            set_sha256=self.tasks.sha256,
-            split=self.split,
-            salt_sha256=None if self.salt is None else sha256_of(self.salt),
-            controller_sha256=self.entrant.sha256,
-            sandbox="none",
-            limits={},
-            versions=dict(versions()),
+        provenance = SetProvenance.unconfined(
+            self.tasks, self.split, self.salt, self.entrant.sha256
         )
         seconds = time.monotonic() - began
         report = summarise(provenance, episodes, None, seconds, told=told)

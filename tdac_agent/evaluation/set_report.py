@@ -16,6 +16,7 @@ from tdac_agent.evaluation.robust_report import (
     success_interval,
 )
 from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import Checks
 from tdac_agent.verification.judge.set_job import WorldEpisode
@@ -25,6 +26,7 @@ from tdac_agent.verification.suite.contract import (
     reads_clock,
 )
 from tdac_envs.ladder.set_file import CpuSpec
+from tdac_envs.ladder.task_sets import TaskSet
 
 MOST_TOLD = 3
 """Failures whose diagnosis is reported."""
@@ -54,6 +56,22 @@ class SetProvenance(_Record):
     sandbox: str = Field(description="Sandbox tier.")
     limits: dict[str, float] = Field(description="Limits of each episode.")
     versions: dict[str, str]
+
+    @classmethod
+    def unconfined(
+        cls, tasks: TaskSet, split: str, salt: bytes | None, sha256: str
+    ) -> SetProvenance:
+        """That of episodes in which no code of strangers runs: without a sandbox."""
+        return cls(
+            set=tasks.name,
+            set_sha256=tasks.sha256,
+            split=split,
+            salt_sha256=None if salt is None else sha256_of(salt),
+            controller_sha256=sha256,
+            sandbox="none",
+            limits={},
+            versions=dict(versions()),
+        )
 
 
 class Scores(_Record):

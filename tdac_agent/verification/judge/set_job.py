@@ -46,7 +46,7 @@ from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.env import OnSet, make
 from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.set_file import SetFile
-from tdac_envs.ladder.task_sets import AnyTask
+from tdac_envs.ladder.task_sets import AnyTask, AnyWorld
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.state import SPEED
 
@@ -348,18 +348,26 @@ def figures_of(
         path_score=path_score(reached, driven, hard.length),
         barn_score=barn_score(reached, steps, barn_steps),
         d_min=round(float(rollout.distances().min()), UNITS[env.set.file.unit].digits),
-        length=hard.length,
-        least_steps=hard.steps,
-        gap=hard.gap,
-        detour=hard.detour,
-        in_sight=hard.in_sight,
-        density=hard.density,
-        **movers_of(env.task),
+        **figures_of_world(world, env.task),
         contact=rollout.contact,
         error=rollout.error,
         cpu_seconds=round(cpu_seconds, 3),
         **failure,
     )
+
+
+def figures_of_world(world: AnyWorld, task: AnyTask) -> dict[str, Any]:
+    """The figures of `WorldEpisode` that describe a world, with its movers."""
+    hard = world.difficulty
+    return {
+        "length": hard.length,
+        "least_steps": hard.steps,
+        "gap": hard.gap,
+        "detour": hard.detour,
+        "in_sight": hard.in_sight,
+        "density": hard.density,
+        **movers_of(task),
+    }
 
 
 def movers_of(task: AnyTask) -> dict[str, Any]:
