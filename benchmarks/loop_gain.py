@@ -25,8 +25,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.recorded_answers import interval
-from tdac_agent.bench.arena import sealed_episodes
+from benchmarks.recorded_answers import driven_on, episodes_in, interval
 from tdac_agent.evaluation.kept_sets import kept_report
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.prompting.extract import extract_source
@@ -49,12 +48,11 @@ def gains(level: str, worlds: int, out: Path, judge: WarmJudge) -> list[dict[str
     best, best_scores = best_of_n(tasks, figures, worlds, out, judge)
     rows = []
     for run in sorted((RESULTS / "loops" / level).iterdir()):
-        files = run / "iterations/k01/j0/controller.py", run / "controller.py"
-        first, last = (
-            hidden_scores(file.read_bytes(), tasks, worlds, salt, out, judge)
-            for file in files
-        )
         report = json.loads((run / "report.json").read_text())
+        files = candidate(run, 1, 0), candidate(run, report["k"], report["j"])
+        first, last = (
+            hidden_scores(file, level, worlds, salt, out, judge) for file in files
+        )
         row: dict[str, Any] = {
             "level": level,
             "run": run.name,
@@ -114,17 +112,18 @@ def _names(table: pd.DataFrame) -> set[int]:
 
 
 def hidden_scores(
-    source: bytes, tasks: TaskSet, worlds: int, salt: Path, out: Path, judge: WarmJudge
+    file: Path, level: str, worlds: int, salt: Path, out: Path, judge: WarmJudge
 ) -> NDArray[np.float64]:
-    """Time scores of a file on hidden worlds."""
-    sha256 = sha256_of(source)
-    kept = out / "hidden" / tasks.name / sha256[:16]
-    if not (kept / "sealed").is_dir():
-        verify_on_set(
-            source, tasks, "hidden", worlds, salt_file=salt, out=kept, judge=judge
-        )
-    episodes = sealed_episodes(kept, sha256)
-    return np.array([each.time_score for each in episodes], np.float64)
+    """Time scores of a candidate on hidden worlds."""
+    source = file.read_text(encoding="utf-8")
+    kept = out / "hidden" / level / sha256_of(source.encode())[:16]
+    driven_on(source, level, worlds, salt, kept, judge)
+    return episodes_in(kept)["time_score"].to_numpy(np.float64)
+
+
+def candidate(run: Path, k: int, j: int) -> Path:
+    """File of a candidate of a run."""
+    return run / "iterations" / f"k{k:02}" / f"j{j}" / "controller.py"
 
 
 def main() -> None:

@@ -74,8 +74,8 @@ def judge(answers: Path, out: Path, levels: list[str], worlds: int) -> None:
                     rows.append({"level": level, "entrant": name, "refused": "no file"})
                     continue
                 kept = out / SEALED / level / name
-                report = _driven(source, level, worlds, salt, kept, warm)
-                driven = _episodes(kept) if report.worlds else None
+                report = driven_on(source, level, worlds, salt, kept, warm)
+                driven = episodes_in(kept) if report.worlds else None
                 rows.append(_row(level, name, report, driven, first))
                 print(rows[-1], flush=True)
                 if driven is not None:
@@ -88,7 +88,7 @@ def judge(answers: Path, out: Path, levels: list[str], worlds: int) -> None:
     write_atomic(out / SALT, salt.read_bytes().hex() + "\n")
 
 
-def _driven(
+def driven_on(
     source: str, level: str, worlds: int, salt: Path, kept: Path, warm: WarmJudge
 ) -> SetReport:
     """The report of an entrant, which an interrupted run may have kept."""
@@ -106,7 +106,7 @@ def _driven(
     )
 
 
-def _episodes(kept: Path) -> pd.DataFrame:
+def episodes_in(kept: Path) -> pd.DataFrame:
     rows = pd.read_json(kept / SEALED / ROWS_FILE, lines=True)
     return rows[list(FIGURES)]
 
