@@ -89,12 +89,17 @@ def _episode(
 
 
 def _with_caption(frame: Image, text: str) -> Image:
-    height = round(frame.shape[0] * WIDTH / frame.shape[1] / 2) * 2
-    small = cv2.resize(frame, (WIDTH, height), interpolation=cv2.INTER_AREA)
+    small = _scaled(frame, WIDTH)
     strip = blank(LINE * ROWS + 10, WIDTH, PAPER)
     for row, line in enumerate(textwrap.wrap(text, 70)[:ROWS]):
         write_text(strip, 10, LINE * (row + 1), line, INK)
     return np.vstack([small, strip])
+
+
+def _scaled(frame: Image, width: int) -> Image:
+    """A smaller frame; videos need an even number of rows."""
+    height = round(frame.shape[0] * width / frame.shape[1] / 2) * 2
+    return cv2.resize(frame, (width, height), interpolation=cv2.INTER_AREA)
 
 
 def drive(episode: str, speed: float, file: Path, width: int = WIDTH) -> None:
@@ -115,9 +120,7 @@ def _thinned(source: cv2.VideoCapture, stride: int, width: int) -> Iterator[Imag
     while source.grab():
         if number % stride == 0:
             frame = source.retrieve()[1]
-            height = round(frame.shape[0] * width / frame.shape[1] / 2) * 2
-            small = cv2.resize(frame, (width, height), interpolation=cv2.INTER_AREA)
-            yield np.ascontiguousarray(small[..., ::-1])
+            yield np.ascontiguousarray(_scaled(frame, width)[..., ::-1])
         number += 1
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from tdac_envs.drawing.canvas import Image as Picture
 from tdac_envs.grid.grid import BoolGrid, clearance
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 from tdac_envs.mapping.image import MapImage, load_image
+from tdac_envs.mapping.map_folder import png
 from tdac_envs.mapping.params import ReadingOptions
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates
 from tdac_envs.mapping.score import widest_radius
@@ -109,7 +109,7 @@ def _of_map(source: str, polarity: str | None) -> Board:
     picture = _laid_over(image, grid.cells, zoom)
 
     def laid_over(cells: BoolGrid) -> bytes:
-        return _encoded(_laid_over(image, cells, zoom))
+        return png(_laid_over(image, cells, zoom))
 
     def place(x: float, y: float) -> Place:
         return x / zoom - 0.5, y / zoom - 0.5
@@ -125,7 +125,7 @@ def _of_map(source: str, polarity: str | None) -> Board:
     text = f"{size}: {obstacles_text(params)}; {scale_text(params.resolution)}"
     return Board(
         "map",
-        _encoded(picture),
+        png(picture),
         picture.shape[1],
         picture.shape[0],
         "px",
@@ -165,7 +165,7 @@ def _of_world(source: str) -> Board:
     text = f"Webots {world.version}: {len(world.obstacles)} obstacles; places in metres"
     return Board(
         "world",
-        _encoded(picture),
+        png(picture),
         picture.shape[1],
         picture.shape[0],
         "m",
@@ -203,9 +203,3 @@ def _pixel(cells: BoolGrid, place: Place) -> tuple[int, int]:
     rows, columns = cells.shape
     x, y = (round(value) for value in place)
     return min(max(x, 0), columns - 1), min(max(y, 0), rows - 1)
-
-
-def _encoded(picture: Picture) -> bytes:
-    stream = io.BytesIO()
-    Image.fromarray(np.ascontiguousarray(picture)).save(stream, "PNG")
-    return stream.getvalue()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -34,7 +33,6 @@ class Draft:
         heading: Start heading, rad, from +x towards +y; None for that of the file.
         radius: Body radius, px; of a map only.
         polarity: Which pixels of the map are obstacles; None to infer it.
-        ignore: Nodes of the world that are ignored.
     """
 
     kind: Kind
@@ -44,7 +42,6 @@ class Draft:
     heading: float | None = None
     radius: float | None = None
     polarity: str | None = None
-    ignore: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, board: Board, source: str, polarity: str | None = None) -> Draft:
@@ -56,21 +53,17 @@ class Draft:
 
     def words(self) -> list[str]:
         """The flags of the command line that name this task."""
-        return list(self._words())
-
-    def _words(self) -> Iterator[str]:
-        yield from (f"--{self.kind}", self.source)
-        for name in self.ignore:
-            yield from ("--ignore", name)
+        words = [f"--{self.kind}", self.source]
         for flag, place in (("--start", self.start), ("--goal", self.goal)):
             if place is not None:
-                yield from (flag, *(f"{value:g}" for value in place))
+                words += [flag, *(f"{value:g}" for value in place)]
         if self.heading is not None and self.start is not None:
-            yield from ("--heading", f"{self.heading:g}")
+            words += ["--heading", f"{self.heading:g}"]
         if self.radius is not None:
-            yield from ("--robot-radius", f"{self.radius:g}")
+            words += ["--robot-radius", f"{self.radius:g}"]
         if self.polarity is not None:
-            yield from ("--polarity", self.polarity)
+            words += ["--polarity", self.polarity]
+        return words
 
     def with_start(self, place: Place, unit: str) -> Draft:
         """The draft with a clicked start."""
@@ -95,7 +88,7 @@ class Draft:
         given: dict[str, Any] = {"start": start, "goal": self.goal}
         if self.kind == "world":
             given |= {"env": "TDAC-EPuck-v0", "world": self.source}
-            return TaskFile(**given, ignore=self.ignore)
+            return TaskFile(**given)
         given |= {"map": self.source, "robot": {"radius": self.radius}}
         return TaskFile(**given, polarity=self.polarity)
 

@@ -22,6 +22,8 @@ from tdac_envs.core.intake import read_file
 
 STATE = ".studio"
 """Folder of the studio in the folder where it was started."""
+FILES = f"{STATE}/files"
+"""Folder of what was uploaded or made for a run."""
 JOBS, ABOUT, OUTPUT, ENDING = "jobs", "job.json", "output.txt", "exit"
 MOST_BYTES = 1 << 20
 TAIL = 4000

@@ -13,7 +13,7 @@ import uvicorn
 from nicegui import ui
 
 from tdac_agent.studio.gate import Gate
-from tdac_agent.studio.pages import files, home, run, shelf, worlds
+from tdac_agent.studio.pages import compare, files, home, run, shelf, worlds
 
 MOST_MESSAGES = 100
 """Messages kept for a page that lost its connection, so that memory stays bounded."""
@@ -60,8 +60,9 @@ def _listen(port: int) -> socket.socket:
 
 def _application(place: Path) -> fastapi.FastAPI:
     application = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    for part in (files, home, run, shelf, worlds):
-        part.add(application, place)
+    files.add(application, place)
+    for page in (compare, home, run, shelf, worlds):
+        page.add(place)
     ui.run_with(
         application,
         title="tdac studio",

@@ -3,38 +3,31 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import itertools
-import math
-import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
 
-import fastapi
 from nicegui import events, ui
 
+from tdac_agent.html_report.scene import data_address
 from tdac_agent.library.listing import next_folder
 from tdac_agent.studio.board import Board, Kind, Place, board_of, names_of
 from tdac_agent.studio.draft import Checked, Draft, check, snapped
-from tdac_agent.studio.jobs import STATE, start
+from tdac_agent.studio.jobs import start
 from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
-    safe_name,
+    keep_upload,
     shown_command,
     shown_first,
 )
 from tdac_agent.studio.pages.overlay import overlay
 from tdac_agent.studio.pages.writers import Writers
+from tdac_agent.studio.sources import OWN, is_source, source_of, sources_in
 from tdac_envs.core.errors import PolarityError, TdacError
+from tdac_envs.grid.plan import path_length
 
-UPLOADS = f"{STATE}/files"
 MOST_BYTES = 64 << 20
-YAML = ".yaml", ".yml"
-PICTURES = ".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".tif", ".tiff", ".webp"
-OWN = (*PICTURES, *YAML, ".map", ".npy", ".wbt")
-MOST_FILES = 200
 FIRST = "map: maze"
 # A file that is dropped beside the box would replace the page.
 DROP = """<script>
@@ -49,9 +42,8 @@ addEventListener("drop", (event) => {
 </script>"""
 
 
-def add(application: fastapi.FastAPI, place: Path) -> None:
+def add(place: Path) -> None:
     """Adds the page."""
-    del application
 
     @ui.page("/")
     async def page(source: str = FIRST, task: str = "") -> None:
@@ -95,7 +87,7 @@ class Choosing:
 
     def _build_source(self, source: str) -> None:
         ui.label("1. Map or world").classes("text-lg font-bold")
-        options = _sources(self._place)
+        options = sources_in(self._place)
         if source not in options:
             options.append(source)
         self._source = ui.select(
@@ -207,20 +199,16 @@ class Choosing:
 
     async def _uploaded(self, event: events.UploadEventArguments) -> None:
         """Keeps a file, and opens it if it is a map or a world."""
-        name = safe_name(event.file.name)
-        suffix = Path(name).suffix.lower()
-        if suffix not in OWN:
-            ui.notify(f"{name}: expected one of {', '.join(OWN)}", type="warning")
+        if not is_source(Path(event.file.name)):
+            text = f"{event.file.name}: expected one of {', '.join(OWN)}"
+            ui.notify(text, type="warning")
             return
-        folder = self._place / UPLOADS
-        folder.mkdir(parents=True, exist_ok=True)
-        await event.file.save(folder / name)
-        if suffix in YAML and not _image_of(folder / name):
-            ui.notify(f"{name} is kept; drop its image, too", type="info")
+        at = await keep_upload(event, self._place)
+        source = source_of(self._place, self._place / at)
+        if source is None:
+            ui.notify(f"{at} is kept; drop its image, too", type="info")
             return
-        kind = "world" if suffix == ".wbt" else "map"
-        source = f"{kind}: {UPLOADS}/{name}"
-        self._source.set_options(_sources(self._place))
+        self._source.set_options(sources_in(self._place))
         self._upload.reset()
         self._source.value = source
 
@@ -312,8 +300,7 @@ class Choosing:
     def _show_picture(self, png: bytes) -> None:
         if png != self._shown:
             self._shown = png
-            address = f"data:image/png;base64,{base64.b64encode(png).decode()}"
-            self._image.set_source(address)
+            self._image.set_source(data_address(png, "image/png"))
 
     def _show_numbers(self, draft: Draft) -> None:
         places = (*(draft.start or (None, None)), draft.heading)
@@ -360,32 +347,6 @@ class Choosing:
         ui.navigate.to(address_of("/run", folder))
 
 
-def _sources(place: Path) -> list[str]:
-    """Bundled maps and worlds, and the files of the folder that may be one."""
-    found = [f"map: {name}" for name in names_of("map")]
-    found += [f"world: {name}" for name in names_of("world")]
-    folders = place, place / "maps", place / UPLOADS
-    files = [path for folder in folders for path in folder.glob("*")]
-    for path in sorted(files)[:MOST_FILES]:
-        suffix = path.suffix.lower()
-        if suffix in OWN and path.is_file():
-            if suffix in YAML and not _image_of(path):
-                continue
-            kind = "world" if suffix == ".wbt" else "map"
-            found.append(f"{kind}: {path.relative_to(place)}")
-    return found
-
-
-def _image_of(path: Path) -> bool:
-    """Whether a YAML file is that of a ROS map whose image is there."""
-    try:
-        text = path.read_text(encoding="utf-8")[:10_000]
-    except (OSError, ValueError):
-        return False
-    named = re.search(r"^image:\s*[\"']?([^\"'\n#]+)", text, re.MULTILINE)
-    return bool(named and (path.parent / named[1].strip()).is_file())
-
-
 def _kind(kind: str) -> Kind:
     return "world" if kind == "world" else "map"
 
@@ -399,8 +360,7 @@ def _sentence(checked: Checked, board: Board) -> tuple[str, bool]:
     """What was found, and whether it is good."""
     if checked.task is None:
         return checked.problem, False
-    length = sum(math.dist(a, b) for a, b in itertools.pairwise(checked.path))
-    text = f"A path of {length:.4g} {board.unit}"
+    text = f"A path of {path_length(checked.path):.4g} {board.unit}"
     if checked.narrowest is not None:
         text += (
             f"; its narrowest place is {checked.clearance:.3g} {board.unit} from an "

@@ -8,7 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
 
-from nicegui import ui
+from nicegui import events, ui
+
+from tdac_agent.studio.jobs import FILES
 
 STYLE = """
 body { font-family: system-ui, sans-serif; background: #f6f6f3; color: #23262e; }
@@ -88,11 +90,25 @@ def within(place: Path, at: str) -> Path | None:
     return found if found.is_relative_to(place) else None
 
 
-def safe_name(name: str) -> str:
-    """A file name without anything that a path or a shell would read otherwise."""
-    return re.sub(r"[^\w.-]+", "-", Path(name).name).lstrip(".-") or "file"
+async def keep_upload(event: events.UploadEventArguments, place: Path) -> str:
+    """Keeps an uploaded file; returns its path, relative to the studio's folder.
+
+    Its name has nothing that a path or a shell would read otherwise.
+    """
+    name = re.sub(r"[^\w.-]+", "-", Path(event.file.name).name).lstrip(".-") or "file"
+    (place / FILES).mkdir(parents=True, exist_ok=True)
+    await event.file.save(place / FILES / name)
+    return f"{FILES}/{name}"
 
 
 def status_badge(status: str) -> None:
     """A status in its colour."""
     ui.label(status).classes(f"status {status.replace(' ', '-')}")
+
+
+def report_frame(at: str, version: str) -> None:
+    """The report of a run in one of its states."""
+    ui.element("iframe").classes("report").props(
+        f'src="{address_of("/report", at)}&version={version}#play" '
+        f'sandbox="allow-scripts" title="Report on {at}"'
+    )

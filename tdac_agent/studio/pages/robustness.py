@@ -9,7 +9,7 @@ from nicegui import ui
 from tdac_agent.evaluation.robust_report import RobustReport
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.studio.jobs import STATE, job_of, start
-from tdac_agent.studio.pages.layout import address_of
+from tdac_agent.studio.pages.films import show_film
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
@@ -97,24 +97,7 @@ class Robustness:
             start(self._place, words, film)
         self._film.clear()
         with self._film:
-            label = ui.label(f"drawing the episode of seed {seed} …").classes("note")
-
-        def finished() -> None:
-            job = job_of(self._place, film)
-            if job is not None and job.running:
-                return
-            timer.deactivate()
-            label.text = f"seed {seed}"
-            if not (self._place / film).is_file():
-                label.text = job.output()[-300:] if job else "no video"
-                return
-            with self._film:
-                ui.video(address_of("/file", film), autoplay=True).classes(
-                    "w-full max-w-3xl"
-                )
-
-        with self._film:
-            timer = ui.timer(0.5, finished)
+            show_film(self._place, film, f"seed {seed}")
 
 
 def _is_verified(folder: Path) -> bool:

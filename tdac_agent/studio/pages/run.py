@@ -4,55 +4,33 @@ from __future__ import annotations
 
 import asyncio
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import fastapi
 from nicegui import ui
 
 from tdac_agent.library.listing import row_of
-from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
-from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, load_run
-from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.journal import read_records
+from tdac_agent.runs.run_record import RUN_FILE, load_run
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
-    address_of,
-    copied,
     framed,
+    report_frame,
     shown_command,
     shown_first,
     status_badge,
     within,
 )
+from tdac_agent.studio.pages.questions import Questions
 from tdac_agent.studio.pages.robustness import Robustness
 from tdac_envs.core.errors import TdacError
 
-KINDS = {
-    "generate": "a controller: one whole file in a ```python block",
-    "edit": "a repaired controller, in the form that the prompt asks for",
-    "summarise": "rules for later candidates: a list in a ```json block",
-}
-"""What questions ask for."""
-FIGURES: dict[str, Callable[[dict[str, Any]], str]] = {
-    "status": lambda row: str(row["status"]),
-    "task": lambda row: str(row.get("task", "")),
-    "writer": lambda row: str(row.get("learner", "")),
-    "iterations": lambda row: f"{row.get('k', '–')} of {row.get('iterations', '–')}",
-    "time": lambda row: f"{row.get('seconds') or 0.0:.0f} s",
-    "tokens": lambda row: f"{row.get('tokens_in', 0) + row.get('tokens_out', 0):,}",
-    "cost": lambda row: "–" if row.get("cost") is None else format_usd(row["cost"]),
-}
-"""Figures of runs beside each other, from the rows of the list."""
 SECONDS = 1.0
 """Between two looks at the folder."""
 
 
-def add(application: fastapi.FastAPI, place: Path) -> None:
-    """Adds the pages of one run and of two side by side."""
-    del application
+def add(place: Path) -> None:
+    """Adds the page."""
 
     @ui.page("/run")
     async def page(at: str = "") -> None:
@@ -63,37 +41,6 @@ def add(application: fastapi.FastAPI, place: Path) -> None:
                 ui.label(f"There is no run {at!r} in this folder.").classes("problem")
                 return
             await Watching(place, at, folder).show()
-
-    @ui.page("/compare")
-    async def compare(one: str = "", other: str = "") -> None:
-        with framed("Two runs"):
-            runs = {}
-            for at in (one, other):
-                folder = within(place, at)
-                if folder is None or not (folder / RUN_FILE).is_file():
-                    ui.label(f"There is no run {at!r} here.").classes("problem")
-                    return
-                runs[at] = folder
-            _show_figures(runs)
-            with ui.row().classes("w-full gap-3"):
-                for at, folder in runs.items():
-                    with ui.column().classes("w-full lg:w-[49%] gap-1"):
-                        ui.link(at, address_of("/run", at)).classes("font-bold")
-                        _frame(at, str((folder / RUN_FILE).stat().st_mtime_ns))
-
-
-def _show_figures(runs: dict[str, Path]) -> None:
-    """A table with the figures of runs, a column for each."""
-    rows = {at: row_of(folder) for at, folder in runs.items()}
-    names = ["", *rows]
-    columns = [
-        {"name": name, "label": name, "field": name, "align": "left"} for name in names
-    ]
-    lines = [
-        {"": label, **{at: told(row) for at, row in rows.items()}}
-        for label, told in FIGURES.items()
-    ]
-    ui.table(columns=columns, rows=lines).classes("w-full").props("dense flat")
 
 
 class Watching:
@@ -109,7 +56,6 @@ class Watching:
         self._place, self._at, self._folder = place, at, folder
         self._seen: Any = None
         self._reported = ""
-        self._question: Path | None = None
 
     async def show(self) -> None:
         """Builds the page, and keeps it up to date."""
@@ -130,7 +76,7 @@ class Watching:
         with self._verdict:
             self._verdict_text = ui.label()
         self._wishes = ui.column().classes("w-full gap-1")
-        self._asked = ui.column().classes("w-full gap-1")
+        self._questions = Questions(self._place / f"{self._at}-questions", self._folder)
         self._report = ui.column().classes("w-full")
         self._robust = Robustness(self._place, self._at)
         printed = ui.expansion("What the command printed").classes("w-full")
@@ -144,7 +90,7 @@ class Watching:
         """Shows what has changed."""
         job = job_of(self._place, self._at)
         state = await asyncio.to_thread(_state, self._folder, job)
-        self._show_question(running=state[1])
+        self._questions.look(running=state[1])
         self._robust.look(self._folder)
         self._show_clock(state, job)
         if state == self._seen:
@@ -161,7 +107,7 @@ class Watching:
             self._reported = version
             self._report.clear()
             with self._report:
-                _frame(self._at, version)
+                report_frame(self._at, version)
 
     def _show_row(self, row: dict[str, Any], running: bool, job: Job | None) -> None:
         status = row["status"] if row else "running" if running else "not begun"
@@ -242,73 +188,6 @@ class Watching:
                 "I trust it: continue", on_click=lambda: self._go_on(trusted=True)
             ).props("color=negative")
 
-    def _show_question(self, *, running: bool) -> None:
-        """The open question of a `manual` run, and a box for the answer."""
-        folder = self._place / f"{self._at}-questions"
-        open_ones = [
-            path
-            for path in sorted(folder.glob("*.prompt.md"))
-            if not _answer_to(path).exists()
-        ]
-        question = open_ones[0] if open_ones and running else None
-        if question == self._question:
-            return
-        self._question = question
-        self._asked.clear()
-        if question is None:
-            return
-        text = question.read_text(encoding="utf-8", errors="replace")
-        with self._asked, ui.card().classes("w-full"):
-            unused = _last_unused(self._folder)
-            if unused:
-                ui.label(unused[:1].upper() + unused[1:]).classes("problem")
-            what = _asked_for(self._folder, text)
-            ui.label(f"The run waits for {what}. Copy the prompt to a model:")
-            with ui.row().classes("items-center"):
-                ui.button(
-                    "Copy the prompt", icon="content_copy",
-                    on_click=lambda: copied(text),
-                )  # fmt: skip
-                ui.label(f"{len(text):,} characters").classes("note")
-            shown = ui.expansion("Show the prompt").classes("w-full")
-            with shown, ui.element("pre").classes("output"):
-                ui.label(text)
-            box = ui.textarea("and paste its whole answer here").classes("w-full")
-
-            def send() -> None:
-                if (box.value or "").strip():
-                    write_atomic(_answer_to(question), box.value)
-                else:
-                    ui.notify("the answer is empty", type="warning")
-
-            ui.button("Use this answer", on_click=send)
-
-
-def _asked_for(folder: Path, question: str) -> str:
-    """What a question asks for, by the name under which the run keeps it."""
-    for path in folder.glob("iterations/*/*/*.prompt*.md"):
-        if path.read_text(encoding="utf-8", errors="replace") == question:
-            return KINDS.get(path.name.partition(".")[0], "an answer")
-    return "an answer"
-
-
-def _last_unused(folder: Path) -> str:
-    """Why the newest answer cannot be used; empty if it can."""
-    try:
-        records = read_records(folder / JOURNAL)
-    except (TdacError, OSError, ValueError):
-        return ""
-    answers = ("call.reply", "call.fault", "call.unused")
-    last = next((r for r in reversed(records) if r.get("event") in answers), {})
-    if last.get("event") != "call.unused":
-        return ""
-    count = f"answer {last.get('asked')} of at most {last.get('most')}"
-    return f"{count} cannot be used: {last.get('problem')}."
-
-
-def _answer_to(question: Path) -> Path:
-    return question.with_name(question.name.replace(".prompt.md", ".reply.md"))
-
 
 _State = tuple[dict[str, Any], bool, str, str]
 
@@ -339,11 +218,3 @@ def _progress(row: dict[str, Any], running: bool) -> str:
     if row.get("reason"):
         text += f"; {row['reason']}"
     return text
-
-
-def _frame(at: str, version: str) -> None:
-    """The report of a run in one of its states."""
-    ui.element("iframe").classes("report").props(
-        f'src="{address_of("/report", at)}&version={version}#play" '
-        f'sandbox="allow-scripts" title="Report on {at}"'
-    )

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import io
-import zipfile
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import fastapi
 from nicegui import events, ui
 
 from tdac_agent.campaign.drive import CONFIG_FILE
@@ -19,11 +16,11 @@ from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
 from tdac_agent.studio.jobs import jobs
 from tdac_agent.studio.pages.layout import address_of, framed, shown_first
+from tdac_envs.core.intake import read_zip
 
 MOST_ROWS = 2_000
 MOST_UPLOAD = 256 << 20
 MOST_UNPACKED = 1 << 30
-MOST_FILES = 20_000
 _known: dict[Path, tuple[tuple[int, ...], dict[str, Any]]] = {}
 COLUMNS = [
     {"name": name, "label": name, "field": name, "align": "left", "sortable": True}
@@ -31,9 +28,8 @@ COLUMNS = [
 ]
 
 
-def add(application: fastapi.FastAPI, place: Path) -> None:
+def add(place: Path) -> None:
     """Adds the page."""
-    del application
 
     @ui.page("/runs")
     async def page() -> None:
@@ -158,7 +154,7 @@ def _show_upload(place: Path) -> None:
         data = await event.file.read()
         try:
             folder = unpack(data, Path(event.file.name).stem, place / "runs")
-        except (OSError, ValueError, zipfile.BadZipFile) as error:
+        except (OSError, ValueError) as error:
             ui.notify(f"{event.file.name}: {error}", type="negative")
             return
         ui.navigate.to(address_of("/run", str(folder.relative_to(place))))
@@ -183,29 +179,26 @@ def unpack(data: bytes, name: str, parent: Path) -> Path:
         parent: Folder in which to put it.
 
     Raises:
-        ValueError: It has no run, leads out of its folder, or is too large.
-        zipfile.BadZipFile: It is no `.zip` file.
+        ValueError: It is no `.zip` file, has no run, leads out of its folder, or is too
+            large.
     """
-    with zipfile.ZipFile(io.BytesIO(data)) as packed:
-        entries = [entry for entry in packed.infolist() if not entry.is_dir()]
-        if (
-            len(entries) > MOST_FILES
-            or sum(e.file_size for e in entries) > MOST_UNPACKED
-        ):
-            raise ValueError("it is too large")
-        roots = [e.filename for e in entries if Path(e.filename).name == RUN_FILE]
-        if not roots:
-            raise ValueError(f"it has no {RUN_FILE}")
-        root = min(roots, key=lambda entry: entry.count("/")).removesuffix(RUN_FILE)
-        kept = [entry for entry in entries if entry.filename.startswith(root)]
-        names = [entry.filename.removeprefix(root) for entry in kept]
-        for inner in names:
-            if Path(inner).is_absolute() or ".." in Path(inner).parts:
-                raise ValueError(f"{inner} leads out of the folder")
-        folder = _free(parent, name)
-        for entry, inner in zip(kept, names, strict=True):
-            (folder / inner).parent.mkdir(parents=True, exist_ok=True)
-            (folder / inner).write_bytes(packed.read(entry))
+    parts = read_zip(data, MOST_UNPACKED)
+    roots = [entry for entry in parts if Path(entry).name == RUN_FILE]
+    if not roots:
+        raise ValueError(f"it has no {RUN_FILE}")
+    root = min(roots, key=lambda entry: entry.count("/")).removesuffix(RUN_FILE)
+    kept = {
+        entry.removeprefix(root): content
+        for entry, content in parts.items()
+        if entry.startswith(root) and not entry.endswith("/")
+    }
+    for inner in kept:
+        if Path(inner).is_absolute() or ".." in Path(inner).parts:
+            raise ValueError(f"{inner} leads out of the folder")
+    folder = _free(parent, name)
+    for inner, content in kept.items():
+        (folder / inner).parent.mkdir(parents=True, exist_ok=True)
+        (folder / inner).write_bytes(content)
     return folder
 
 

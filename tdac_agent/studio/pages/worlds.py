@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-import base64
 from pathlib import Path
 
 import cv2
-import fastapi
 import numpy as np
 from nicegui import ui
 
 from tdac_agent.bench.rivals import rival_names
 from tdac_agent.evaluation.set_play import SHOWN
+from tdac_agent.html_report.scene import data_address
 from tdac_agent.library.listing import next_folder
 from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.jobs import STATE, job_of, start
+from tdac_agent.studio.jobs import FILES, STATE, start
+from tdac_agent.studio.pages.films import show_film
 from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
@@ -35,9 +35,8 @@ SECONDS = 0.05
 KEYS = "Arrow keys or W A S D drive; R begins again."
 
 
-def add(application: fastapi.FastAPI, place: Path) -> None:
+def add(place: Path) -> None:
     """Adds the page."""
-    del application
 
     @ui.page("/worlds")
     async def page(level: str = "unknown") -> None:
@@ -183,7 +182,7 @@ class Looking:
         if not isinstance(world, LadderWorld):
             ui.notify("this world is no map; choose another set", type="info")
             return
-        at = f"{STATE}/files/{self._tasks.name}-{split}-{index}.npy"
+        at = f"{FILES}/{self._tasks.name}-{split}-{index}.npy"
         (self._place / at).parent.mkdir(parents=True, exist_ok=True)
         np.save(self._place / at, world.cells)
         pose, goal = world.start, world.goal
@@ -234,28 +233,6 @@ class Looking:
                 show_film(self._place, film, who)
 
 
-def show_film(place: Path, film: str, title: str) -> None:
-    """Shows a video as soon as the job that draws it has ended."""
-    label = ui.label(f"{title}: drawing …").classes("note")
-    column = ui.column().classes("w-full")
-
-    def look() -> None:
-        job = job_of(place, film)
-        if job is not None and job.running:
-            return
-        timer.deactivate()
-        if not (place / film).is_file():
-            label.text = f"{title}: {job.output()[-300:] if job else 'no video'}"
-            return
-        last = (job.output().strip().splitlines() if job else [])[-1:]
-        label.text = f"{title}: {last[0]}" if last else title
-        stamp = (place / film).stat().st_mtime_ns
-        with column:
-            ui.video(f"{address_of('/file', film)}&v={stamp}").classes("w-full")
-
-    timer = ui.timer(0.5, look)
-
-
 def look_at(name: str, split: str, index: int) -> tuple[TaskSet, Image, dict[str, str]]:
     """A world of a set: the set, a picture, and how hard it is."""
     tasks = load_set(name)
@@ -276,11 +253,11 @@ def policies_in(place: Path) -> list[str]:
     found = [*place.glob("*.py"), *place.glob("*/*.zip"), *place.glob("*.zip")]
     found += [file.with_name("controller.py") for file in place.glob("runs/*/set.yaml")]
     found += place.glob("runs/*/policy.zip")
-    found += [*place.glob(f"{STATE}/files/*.py")]
+    found += [*place.glob(f"{FILES}/*.py")]
     return sorted(str(path.relative_to(place)) for path in found if path.exists())[:300]
 
 
 def as_address(picture: Image) -> str:
     """A picture as a data URL."""
     _, data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 88])
-    return f"data:image/jpeg;base64,{base64.b64encode(data.tobytes()).decode()}"
+    return data_address(data.tobytes(), "image/jpeg")

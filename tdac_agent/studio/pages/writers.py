@@ -11,7 +11,7 @@ from nicegui import events, ui
 from tdac_agent.models.prices import load_prices
 from tdac_agent.models.tariff import MAX_COST
 from tdac_agent.studio.jobs import STATE
-from tdac_agent.studio.pages.layout import safe_name
+from tdac_agent.studio.pages.layout import keep_upload
 
 WHO = {
     "builtin": "the built-in template, no language model",
@@ -116,9 +116,5 @@ class Writers:
         )
 
     async def _uploaded(self, event: events.UploadEventArguments) -> None:
-        name = safe_name(event.file.name)
-        folder = self._place / STATE / "files"
-        folder.mkdir(parents=True, exist_ok=True)
-        await event.file.save(folder / name)
-        self._file = f"{STATE}/files/{name}"
+        self._file = await keep_upload(event, self._place)
         self._update()
