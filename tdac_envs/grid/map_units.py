@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 
 from tdac_envs.grid.metric import Framed, Point, resolution_of, to_metres, to_pixels
 
+_DIGITS = 9
+"""Decimals in px and rad, so that metres that were written give the same again."""
+
 
 @dataclass(frozen=True, slots=True)
 class MapFrame:
@@ -81,11 +84,14 @@ class MapUnits:
 
     def pixels(self, point: Point) -> Point:
         """The pixel coordinates of a place in these units."""
-        return point if self.frame is None else to_pixels(self.frame, *point)
+        if self.frame is None:
+            return point
+        x, y = to_pixels(self.frame, *point)
+        return round(x, _DIGITS), round(y, _DIGITS)
 
     def length_in_pixels(self, length: float) -> float:
         """A length in these units, converted to px."""
-        return length / self.per_pixel
+        return length if self.frame is None else round(length / self.per_pixel, _DIGITS)
 
     def heading_in_pixels(self, heading: float) -> float:
         """Converts a heading from the x axis towards the y axis, rad, to the picture.
@@ -93,7 +99,9 @@ class MapUnits:
         In the picture, y points down. In a map's frame, y points up, and the frame may
         be rotated.
         """
-        return heading if self.frame is None else self.frame.origin[2] - heading
+        if self.frame is None:
+            return heading
+        return round(self.frame.origin[2] - heading, _DIGITS)
 
     def heading(self, in_pixels: float) -> float:
         """Converts a heading of the picture, rad; the inverse of the above."""

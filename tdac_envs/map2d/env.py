@@ -19,13 +19,16 @@ from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.task import Pose
+from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.among import begin_among, drive_among
 from tdac_envs.map2d.kernels import begin, drive
+from tdac_envs.map2d.metric_input import in_pixels, options_in_pixels
+from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.robot import Robot
 from tdac_envs.map2d.setup import Setup, override
-from tdac_envs.map2d.source import MapSource, prepare
+from tdac_envs.map2d.source import Frame, MapSource, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import ReadingOptions, Shade
 from tdac_envs.movers.spec import MoversOption, read_specs
@@ -66,6 +69,16 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
     heading: `ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost.
     Rays start at the centre; no hit gives `range_max`.
+
+    ## In metres
+    With `frame="metres"`, for maps with a resolution (ROS `map.yaml`), all places,
+    lengths and speeds of arguments, options, observations, `info` and pictures are in
+    metres, in the frame of the map: the outer corner of the lower-left pixel is at the
+    `origin` of the map, and without a rotation of this origin, x points right and y
+    points up. Headings and turns, also that of `odometry`, are counter-clockwise. The
+    simulation is the same to the bit. `ranges[0]` still is the robot's leftmost ray: ray i
+    points at `+field_of_view/2 - i * field_of_view/(n_rays - 1)` from the heading.
+    `pose()` and `discs()` stay in px.
 
     ## Movers
     With `movers`, discs move about: they follow routes, bounce off walls, or walk in a
@@ -175,6 +188,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             `{"kind": "crowd", "count": 20}`; `"bounce:5"` stands for five movers with
             the defaults, half as fast as the robot and as large.
             `tdac_envs.movers.spec` has all keys.
+        frame: `"pixels"` or `"metres"`; see In metres.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -221,26 +235,40 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         snap: bool = False,
         polarity: Shade | None = None,
         movers: MoversOption = None,
+        frame: Frame = "pixels",
         render_mode: str | None = None,
     ) -> None:
-        specs = read_specs(movers)
-        prepared = prepare(
-            map,
-            start,
-            goal,
+        units = units_of(map, frame)
+        given = in_pixels(
+            units,
+            start=start,
+            goal=goal,
             heading=heading,
             robot_radius=robot_radius,
+            axle_length=axle_length,
+            max_wheel_speed=max_wheel_speed,
+            range_max=range_max,
+            goal_tolerance=goal_tolerance,
+            movers=read_specs(movers),
+        )
+        prepared = prepare(
+            map,
+            given["start"],
+            given["goal"],
+            heading=given["heading"],
+            robot_radius=given["robot_radius"],
             snap=snap,
             said=ReadingOptions(polarity),
+            units=units,
         )
         params = prepared.params
         robot = override(
             params.robot,
-            axle_length=axle_length,
-            max_wheel_speed=max_wheel_speed,
+            axle_length=given["axle_length"],
+            max_wheel_speed=given["max_wheel_speed"],
             n_rays=n_rays,
             field_of_view=field_of_view,
-            range_max=range_max,
+            range_max=given["range_max"],
         )
         assert params.start is not None
         assert params.goal is not None
@@ -250,8 +278,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             params.goal,
             robot,
             dt=dt,
-            goal_tolerance=goal_tolerance,
+            goal_tolerance=given["goal_tolerance"],
             horizon=horizon,
+            units=units,
         )
         setup = Setup(
             nominal=nominal,
@@ -272,7 +301,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             source=None,
             range_noise=range_noise,
             range_dropout=range_dropout,
-            movers=specs,
+            movers=given["movers"],
+            metric=units.frame,
         )
         self.params = params
         self._prepare(setup, render_mode)
@@ -292,6 +322,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.disturbances.odometry:
             space = with_odometry(space, self._limits)
             self._is_inexact = True
+        self._units = MapUnits(setup.metric)
+        self._view = None if setup.metric is None else MetricView(setup.metric)
+        if self._view is not None:
+            space = self._view.space(space)
         self.observation_space = space  # type: ignore[assignment]
         self.robot = Robot.blank(setup.nominal.robot.n_rays, self.delay)
         self.robot.constants[:] = setup.constants()
@@ -311,7 +345,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         """
         super().reset(seed=seed)
         before = self.task
-        self._draw(options or {})
+        self._draw(options_in_pixels(options or {}, self._units))
         if self.setup.has_movers:
             self.movers = movers_of(self.task)
         if self.task.field is not before.field or self.setup.has_movers:
@@ -324,7 +358,19 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self._begin_trail()
         if self.render_mode == "human":
             self.render()
-        return self._observation(), info_of(robot.outcome.tolist())
+        info = info_of(robot.outcome.tolist())
+        return self._observation(), self._told(info)
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Runs one time step with the wheel speeds of an action.
+
+        Raises:
+            ValueError: The action is not two finite numbers.
+        """
+        seen, reward, terminated, truncated, info = super().step(action)
+        return seen, reward, terminated, truncated, self._told(info)
 
     def discs(self) -> NDArray[np.float64]:
         """The movers as they are now, shape (n, 3): x, y, radius, px."""
@@ -366,7 +412,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 seen["ranges"][:] = noisy(seen["ranges"], self.setup, self._random)
             if self.disturbances.odometry:
                 seen["odometry"] = self._odometry()
-        return seen
+        return seen if self._view is None else self._view.seen(seen)
+
+    def _told(self, info: dict[str, Any]) -> dict[str, Any]:
+        return info if self._view is None else self._view.info(info)
 
     def _begin_trail(self) -> None:
         super()._begin_trail()
@@ -387,6 +436,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 goal_tolerance=task.goal_tolerance,
                 robot=task.robot,
                 path=task.shortest_path(task.start),
+                units=self._units,
             )
         gap = math.dist(self._trail[-1], task.goal)
         status = Status(self._steps, task.horizon, gap, self._status)

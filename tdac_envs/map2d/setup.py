@@ -19,6 +19,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.disturbances import Random
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.task import Pose
+from tdac_envs.grid.map_units import MapFrame
 from tdac_envs.map2d.placing import Cast
 from tdac_envs.map2d.rays import fan
 from tdac_envs.map2d.robot import constants_of
@@ -44,6 +45,7 @@ class Setup(DriveSetup):
         range_noise: Relative standard deviation of each range.
         range_dropout: Probability that a ray reads the largest range.
         movers: Movers of all episodes, if the source of the tasks has none.
+        metric: Frame in whose metres the robot observes; None for pixels.
         directions: Directions of the rays, from `rays.fan`.
         cast: The movers, checked on the map.
     """
@@ -52,6 +54,7 @@ class Setup(DriveSetup):
     range_noise: float
     range_dropout: float
     movers: tuple[AnySpec, ...] = ()
+    metric: MapFrame | None = None
     directions: NDArray[np.float64] = field(init=False)
     cast: Cast = field(init=False)
 

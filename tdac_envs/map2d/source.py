@@ -7,12 +7,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import finite, finite_numbers, finite_point, positive
+from tdac_envs.core.arguments import (
+    finite,
+    finite_numbers,
+    finite_point,
+    one_of,
+    positive,
+)
 from tdac_envs.core.errors import MapError, TaskError, hint
 from tdac_envs.core.intake import printable, read_array
 from tdac_envs.grid.grid import OccupancyGrid
@@ -29,6 +35,8 @@ from tdac_envs.mapping.params import (
 from tdac_envs.mapping.snapping import snap
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
+Frame = Literal["pixels", "metres"]
+"""Units and frame of what a user gives and reads, and of what a robot observes."""
 
 _YAML = {".yaml", ".yml"}
 
@@ -182,18 +190,24 @@ def _snapped(grid: OccupancyGrid, params: MapParams, units: MapUnits) -> MapPara
     return params.model_copy(update=changes)
 
 
-def units_of(source: str | Path, *, metres: bool) -> MapUnits:
+def units_of(source: MapSource, frame: str) -> MapUnits:
     """The units of places and lengths on a map: pixels, or metres in its frame.
 
     Args:
-        source: Path of a map file or map folder.
-        metres: Whether the user gives and reads metres.
+        source: As for `prepare`.
+        frame: `"pixels"` or `"metres"`: what the user gives and reads.
 
     Raises:
+        TaskError: There is no such frame.
         MapError: Metres are wanted, but the map cannot be read or has no resolution.
     """
-    if not metres:
+    one_of("frame", frame, get_args(Frame))
+    if frame == "pixels":
         return PIXELS
+    if not isinstance(source, str | Path):
+        raise MapError("an array has no resolution, as metres need: give pixels")
+    if isinstance(source, str) and source in bundled_maps():
+        raise MapError(f"the bundled map {source} has no scale: give pixels")
     path = Path(source)
     check_exists(path)
     if path.is_dir():

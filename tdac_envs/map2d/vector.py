@@ -10,11 +10,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from tdac_envs.core.arguments import whole_number
+from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.batching import make_envs
-from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations
+from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
+from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.among import step_rows_among
 from tdac_envs.map2d.env import Map2DEnv, movers_of
 from tdac_envs.map2d.kernels import step_rows
+from tdac_envs.map2d.metric_input import options_in_pixels
+from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.observed import infos_of, noisy
 from tdac_envs.movers.state import Movers
 
@@ -34,7 +38,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             number of cores.
         each: Arguments that differ between robots, such as `[{"map": "maze"},
             {"map": "office"}]`; robot i takes entry `i % len(each)`. All robots need
-            the same `n_rays`, `delay` and `odometry`; their movers may differ.
+            the same `n_rays`, `delay`, `odometry` and `frame`; their movers may differ.
         render_mode: `"rgb_array"`, for up to 64 robots, or None.
         **options: Arguments of `Map2DEnv` for all robots.
     """
@@ -64,10 +68,38 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             threads=threads,
             render_mode=render_mode,
         )
+        self._units = MapUnits(self.setups[0].metric)
+        self._view = _view_of([setup.metric for setup in self.setups])
         noisy = [setup.has_inexact_ranges for setup in self.setups]
         self._noisy = np.flatnonzero(noisy)
         # Last observation: robots that are not reset keep their noise.
         self._ranges = self.robots.ranges.copy()
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts episodes, as `DrivenVectorEnv.reset` does."""
+        if self._view is None:
+            return super().reset(seed=seed, options=options)
+        own = options_in_pixels(options or {}, self._units)
+        seen, infos = super().reset(seed=seed, options=own)
+        return self._view.seen(seen), self._view.info(infos)
+
+    def step(self, actions: Actions) -> Result:
+        """Runs one time step, as `DrivenVectorEnv.step` does."""
+        view, result = self._view, super().step(actions)
+        if view is None:
+            return result
+        seen, rewards, terminated, truncated, infos = result
+        told = view.info(infos)
+        if "final_obs" in told:
+            for i in np.flatnonzero(told["_final_obs"]).tolist():
+                told["final_obs"][i] = view.seen(told["final_obs"][i], i)
+            told["final_info"] = view.info(told["final_info"])
+        return view.seen(seen), rewards, terminated, truncated, told
 
     @property
     def step_rows(self) -> Callable[..., None]:  # type: ignore[override]
@@ -108,3 +140,17 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         if self._disturbances.odometry:
             seen = self._disturbances.measure(robots, self.robots, self._noise)
             observations["odometry"] = seen
+
+
+def _view_of(frames: Sequence[MapFrame | None]) -> MetricView | None:
+    """What the robots observe in metres; None for pixels.
+
+    Raises:
+        TaskError: Some have metres, and others pixels.
+    """
+    metric = [frame for frame in frames if frame is not None]
+    if not metric:
+        return None
+    if len(metric) < len(frames):
+        raise TaskError("all robots of a batch need the same frame: pixels or metres")
+    return MetricView(metric)

@@ -8,32 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.placing import Cast
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.spec import AnySpec
-
-
-def in_pixels(specs: Sequence[AnySpec], units: MapUnits) -> tuple[AnySpec, ...]:
-    """The movers of a task file with `metres`, converted to px."""
-    return tuple(spec.model_copy(update=_changes(spec, units)) for spec in specs)
-
-
-def _changes(spec: AnySpec, units: MapUnits) -> dict[str, Any]:
-    """What differs in px: lengths, places and headings."""
-    changes: dict[str, Any] = {
-        name: units.length_in_pixels(length)
-        for name in ("radius", "speed")
-        if (length := getattr(spec, name)) is not None
-    }
-    if spec.kind == "route":
-        changes["points"] = tuple(units.pixels(point) for point in spec.points)
-    elif spec.kind == "bounce":
-        if spec.start is not None:
-            changes["start"] = units.pixels(spec.start)
-        if spec.heading is not None:
-            changes["heading"] = units.heading_in_pixels(spec.heading)
-    return changes
 
 
 def check_movers(specs: Sequence[AnySpec], task: Map2DTask) -> None:

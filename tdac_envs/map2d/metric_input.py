@@ -1,0 +1,83 @@
+"""Arguments and options in metres of a map's frame, converted to pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tdac_envs.core.arguments import finite, finite_numbers, finite_point, positive
+from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.movers.spec import AnySpec
+
+LENGTHS = (
+    *("robot_radius", "axle_length", "max_wheel_speed", "range_max"),
+    "goal_tolerance",
+)
+"""Arguments of `Map2DEnv` that are lengths, or lengths per second."""
+
+
+def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
+    """Arguments of `Map2DEnv` in px; None stays.
+
+    Args:
+        units: Units of the arguments.
+        **given: Lengths by name, `start`, `goal`, `heading` and `movers` (specs).
+
+    Raises:
+        TaskError: A value is not valid.
+    """
+    if units.frame is None:
+        return given
+    own = options_in_pixels(given, units)
+    if given["heading"] is not None:
+        own["heading"] = units.heading_in_pixels(finite("heading", given["heading"]))
+    for name in LENGTHS:
+        if given[name] is not None:
+            own[name] = units.length_in_pixels(positive(name, given[name]))
+    own["movers"] = movers_in_pixels(given["movers"], units)
+    return own
+
+
+def options_in_pixels(options: dict[str, Any], units: MapUnits) -> dict[str, Any]:
+    """The options `start` and `goal` of `reset` in px; others stay.
+
+    Raises:
+        TaskError: One of them is not a place.
+    """
+    if units.frame is None:
+        return options
+    own = dict(options)
+    if own.get("start") is not None:
+        own["start"] = _start_in_pixels(own["start"], units)
+    if own.get("goal") is not None:
+        own["goal"] = units.pixels(finite_point("goal", own["goal"]))
+    return own
+
+
+def _start_in_pixels(start: Sequence[float], units: MapUnits) -> tuple[float, ...]:
+    x, y, *turn = finite_numbers("start", start, 3 if np.size(start) == 3 else 2)
+    return (*units.pixels((x, y)), *map(units.heading_in_pixels, turn))
+
+
+def movers_in_pixels(specs: Sequence[AnySpec], units: MapUnits) -> tuple[AnySpec, ...]:
+    """Movers whose places, lengths and headings are in these units, in px."""
+    return tuple(spec.model_copy(update=_changes(spec, units)) for spec in specs)
+
+
+def _changes(spec: AnySpec, units: MapUnits) -> dict[str, Any]:
+    """What differs in px: lengths, places and headings."""
+    changes: dict[str, Any] = {
+        name: units.length_in_pixels(length)
+        for name in ("radius", "speed")
+        if (length := getattr(spec, name)) is not None
+    }
+    if spec.kind == "route":
+        changes["points"] = tuple(units.pixels(point) for point in spec.points)
+    elif spec.kind == "bounce":
+        if spec.start is not None:
+            changes["start"] = units.pixels(spec.start)
+        if spec.heading is not None:
+            changes["heading"] = units.heading_in_pixels(spec.heading)
+    return changes
