@@ -103,11 +103,11 @@ def _tasks(names: list[str], flags: TaskFlags) -> list[Task]:
     Raises:
         TaskError: Flags contradict each other, or a task cannot be used.
     """
-    shown = TaskFlags(metres=flags.metres)
+    shown = TaskFlags(frame=flags.frame)
     if flags.map_image or flags.world:
         named = [replace(shown, task=name) for name in names]
         return [each.load() for each in (*named, flags)]
-    others = replace(flags, metres=False).words()
+    others = replace(flags, frame=None).words()
     if others:
         raise TaskError(f"{others[0]} needs --map or --world")
     return [replace(shown, task=name).load() for name in names or ["maze"]]

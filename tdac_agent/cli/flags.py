@@ -16,13 +16,14 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 from tdac_envs.map2d.source import check_exists
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
+from tdac_envs.mapping.params import FrameName
 
 FIXED_BY_TASK = (
     *("map_image", "world", "ignore", "start", "goal", "heading", "robot_radius"),
     *("robot_image", "movers", "snap", "polarity", "threshold", "instructions"),
 )
 ONLY_FOR_MAPS = (
-    *("map_image", "robot_radius", "robot_image", "movers", "snap", "metres"),
+    *("map_image", "robot_radius", "robot_image", "movers", "snap", "frame"),
     *("polarity", "threshold"),
 )
 
@@ -42,10 +43,15 @@ class TaskFlags:
     robot_image: Path | None = None
     movers: str | None = None
     snap: bool = False
-    metres: bool = False
+    frame: FrameName | None = None
     polarity: Literal["dark", "light"] | None = None
     threshold: float | None = None
     instructions: str | None = None
+
+    @property
+    def in_metres(self) -> bool:
+        """Whether the user gives and reads metres."""
+        return self.frame == "metres"
 
     def load_beside(self, folder: Path) -> Task:
         """The task that `--task`, `--map` or `--world` names, or that of a folder.
@@ -56,7 +62,7 @@ class TaskFlags:
         """
         if self.task or self.map_image or self.world:
             return self.load()
-        others = {each.name for each in fields(self)} - {"metres"}
+        others = {each.name for each in fields(self)} - {"frame"}
         self._refuse(f"{folder} brings its own task", sorted(others))
         return self._shown(load_task(folder))
 
@@ -66,6 +72,9 @@ class TaskFlags:
         for name in (f.name for f in fields(self)):
             value = getattr(self, name)
             if value is None or value is False or name == "ignore":
+                continue
+            if name == "frame":
+                words += ["--metres"] if self.in_metres else []
                 continue
             values = value if isinstance(value, tuple) else (value,)
             given = [] if value is True else map(as_word, values)
@@ -96,13 +105,13 @@ class TaskFlags:
         if own and (self.start is None or self.goal is None):
             raise TaskError(
                 f"the map {source!r} needs --start X Y and --goal X Y "
-                f"({_rulers(Path(source), self.metres)})"
+                f"({_rulers(Path(source), self.in_metres)})"
             )
         return load_task(self._spec(source), base=Path())
 
     def _shown(self, task: Task) -> Task:
         """The task, with `--metres` shown in metres of the map's frame."""
-        if not self.metres:
+        if not self.in_metres:
             return task
         return replace(task, setting=task.setting.in_metres())
 
@@ -136,7 +145,7 @@ class TaskFlags:
     def _spec(self, source: str) -> TaskFile:
         start: tuple[float, ...] | None = self.start
         goal, radius = self.goal, self.robot_radius
-        if self.metres and source in bundled_maps():
+        if self.in_metres and source in bundled_maps():
             raise TaskError("--metres needs a --map with a resolution, as in map.yaml")
         if source in bundled_maps() and start is None:
             start = bundled_map(source).start
@@ -148,13 +157,24 @@ class TaskFlags:
             "goal": goal,
             "movers": self.movers,
             "snap": self.snap,
-            "metres": self.metres,
+            "frame": self.frame or "pixels",
             "polarity": self.polarity,
             "threshold": self.threshold,
             "robot": {"radius": radius, "image": self.robot_image},
             "instructions": _text(self.instructions),
         }
         return _checked(given)
+
+
+def frame_of(frame: FrameName | None, metres: bool) -> FrameName | None:
+    """The frame that `--frame` and `--metres` choose; None for neither.
+
+    Raises:
+        TaskError: They contradict each other.
+    """
+    if metres and frame == "pixels":
+        raise TaskError("--metres is --frame metres: leave out --frame pixels")
+    return "metres" if metres else frame
 
 
 def _rulers(map_file: Path, metres: bool) -> str:

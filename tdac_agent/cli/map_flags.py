@@ -10,6 +10,7 @@ import typer
 from tdac_agent.cli.options import (
     MAP_FILE,
     WORLD_FILE,
+    FrameOption,
     Goal,
     Heading,
     Json,
@@ -35,6 +36,7 @@ def map_command(
     heading: Heading = None,
     robot_radius: Radius = None,
     snap: Snap = False,
+    frame: FrameOption = None,
     metres: Metres = False,
     polarity: Polarity = None,
     threshold: Threshold = None,
@@ -65,12 +67,14 @@ def map_command(
     The preview has rulers, in pixels or metres, to read off start and goal.
     """
     from tdac_agent.cli import maps
+    from tdac_agent.cli.flags import frame_of
     from tdac_envs.mapping.params import ReadingOptions
 
     said = ReadingOptions(polarity, threshold)
     task = maps.MapTask(start, goal, heading, robot_radius)
     back = maps.RosMap(ros, resolution)
-    maps.run(image, task, snap, metres, said, preset, out, back, as_json)
+    chosen = frame_of(frame, metres)
+    maps.run(image, task, snap, chosen, said, preset, out, back, as_json)
 
 
 @app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")

@@ -27,7 +27,12 @@ from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.candidates import Candidate, Preset
 from tdac_envs.mapping.image import load_image
 from tdac_envs.mapping.map_folder import write_map
-from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
+from tdac_envs.mapping.params import (
+    FrameName,
+    MapParams,
+    ReadingOptions,
+    RobotParams,
+)
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates
 from tdac_envs.mapping.ros_writer import ROS_FILES, write_ros_map
 from tdac_envs.mapping.wording import obstacles_text, scale_text
@@ -114,7 +119,7 @@ def run(
     image: str,
     typed: MapTask,
     snap: bool,
-    metres: bool,
+    frame: FrameName | None,
     said: ReadingOptions,
     preset: Preset,
     out: Path | None,
@@ -129,7 +134,7 @@ def run(
     if image in bundled_maps():
         bundled = bundled_map(image)
         path, typed = bundled.image, typed.or_else(bundled)
-    units = units_of(path, metres=metres).with_typed(typed.start, typed.goal)
+    units = units_of(path, frame or "pixels").with_typed(typed.start, typed.goal)
     task = typed.in_pixels(units)
     if task.start is None and task.heading is not None:
         raise TaskError("--heading needs --start X Y")

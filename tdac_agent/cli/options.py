@@ -127,8 +127,17 @@ Metres = Annotated[
     bool,
     typer.Option(
         "--metres",
-        help="Use m and rad in the map's frame (map.yaml) for the input and output of "
-        "places, lengths and headings; a run folder or task may be in px.",
+        help="The same as --frame metres.",
+    ),
+]
+FrameOption = Annotated[
+    Optional[Literal["pixels", "metres"]],  # noqa: UP045
+    typer.Option(
+        "--frame",
+        help="Units of places, lengths and headings, given and printed, and of what a "
+        "controller observes: pixels (y down), or metres in the map's frame as in ROS "
+        "(map.yaml; y up). The controllers of an existing run or task keep theirs.  "
+        "[default: pixels]",
     ),
 ]
 Polarity = Annotated[

@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any, Protocol, get_type_hints
 
 from tdac_agent.cli.options import (
+    FrameOption,
     Goal,
     Heading,
     Ignore,
@@ -48,13 +49,14 @@ def task_flags(
     robot_image: RobotImage = None,
     movers: Movers = None,
     snap: Snap = False,
+    frame: FrameOption = None,
     metres: Metres = False,
     polarity: Polarity = None,
     threshold: Threshold = None,
     instructions: Instructions = None,
 ) -> TaskFlags:
     """The flags that name the task of a command."""
-    from tdac_agent.cli.flags import TaskFlags
+    from tdac_agent.cli.flags import TaskFlags, frame_of
 
     return TaskFlags(
         task=task,
@@ -68,7 +70,7 @@ def task_flags(
         robot_image=robot_image,
         movers=movers,
         snap=snap,
-        metres=metres,
+        frame=frame_of(frame, metres),
         polarity=polarity,
         threshold=threshold,
         instructions=instructions,

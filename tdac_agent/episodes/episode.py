@@ -56,6 +56,7 @@ class Record:
         collisions_before: Initial value of the collision counter.
         seed: Seed of the environment.
         options: Options of the environment's `reset`, instead of a start.
+        seen: What the policy observes of an observation; see `Setting.seen`.
     """
 
     env: JudgedEnv
@@ -65,6 +66,7 @@ class Record:
     collisions_before: int = 0
     seed: int | None = None
     options: dict[str, Any] | None = None
+    seen: Callable[[Observation], Observation] | None = None
     outcome: Outcome | None = None
     contact: Contact | None = None
     _poses: list[NDArray[np.float64]] = field(default_factory=list)
@@ -87,7 +89,8 @@ class Record:
         if self.start is not None:
             options = {"start": self.start}
         observation, info = self.env.reset(seed=self.seed, options=options)
-        return observation, self._note(observation, info)
+        info = self._note(observation, info)
+        return self._shown(observation), info
 
     def step(
         self, action: Any
@@ -116,7 +119,7 @@ class Record:
         elif len(self._actions) >= self.max_steps:
             self.outcome = "stopped"
             truncated = self.truncates
-        return observation, reward, terminated, truncated, info
+        return self._shown(observation), reward, terminated, truncated, info
 
     def trajectory(self) -> Trajectory:
         """Returns the record so far."""
@@ -139,6 +142,9 @@ class Record:
     def rooms(self) -> NDArray[np.float64]:
         """Returns the clearances so far; see `Rollout.rooms`."""
         return np.array(self._rooms, np.float64)
+
+    def _shown(self, observation: Observation) -> Observation:
+        return observation if self.seen is None else self.seen(observation)
 
     def _note(self, observation: Observation, info: dict[str, Any]) -> dict[str, Any]:
         """Records a moment; returns the `info` that the controller may see."""

@@ -27,7 +27,7 @@ def context_of(task: Task) -> dict[str, Any]:
 
 def _of_any(task: Task) -> dict[str, Any]:
     nominal, progress = task.nominal, task.spec.progress
-    interface, limits = interface_of(task.make_env()), Limits()
+    interface, limits = interface_of(task.setting.observed()), Limits()
     return {
         "environment": task.spec.env,
         "env_description": interface.description,

@@ -189,7 +189,7 @@ def _task(folder: Path) -> Task:
     setting: Any = task.setting
     try:
         raw = read_file(folder / "params.json", TEXT_BYTES)
-        params = type(setting.params).model_validate(parse_json(raw))
+        params = setting.params.read(parse_json(raw))
     except (OSError, ValueError) as error:
         raise RunError(
             f"cannot resume {folder}: params.json: {one_line_reason(error)}"

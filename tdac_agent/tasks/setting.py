@@ -120,6 +120,13 @@ class Params(Protocol):
     def notes(self) -> tuple[str, ...]:
         """Remarks that the user should check."""
 
+    def read(self, written: Any) -> Any:
+        """Returns the parameters of such a file, from its parsed contents.
+
+        Raises:
+            ValidationError: A field is missing, wrong or unknown.
+        """
+
     def model_dump_json(self, *, indent: int | None = None) -> str:
         """Returns the file's text."""
 
@@ -169,6 +176,12 @@ class Setting(Protocol):
     def without_movers(self) -> Setting:
         """Returns the same task without moving obstacles."""
 
+    def observed(self) -> JudgedEnv:
+        """Constructs the environment as a controller observes it."""
+
+    def seen(self, observation: Observation) -> Observation:
+        """Converts an observation of `make_env` to what a controller observes."""
+
     def told(self, length: float) -> str:
         """Formats a length in the units that the user has chosen: `12 px`, `0.6 m`."""
 
@@ -203,6 +216,9 @@ class Setting(Protocol):
 
     def preview(self) -> Image:
         """Draws the map or world as it was read, uint8 RGB."""
+
+    def ends(self) -> dict[str, Any]:
+        """Returns the `task.yaml` keys `start`, `goal` and `tolerance`."""
 
     def portable(self) -> dict[str, Any]:
         """Returns the `task.yaml` keys that refer to the files of `write_files`."""

@@ -25,6 +25,7 @@ from tdac_agent.tasks.task_file import (
     TaskFile,
     bundled_task,
     bundled_tasks,
+    check_frame,
     read_task_file,
 )
 from tdac_envs.core.errors import TaskError
@@ -77,9 +78,14 @@ class Task:
         return self.spec.progress.steps or default
 
     def with_profile(self, profile: Profile | None) -> Task:
-        """Returns the task with another profile; None keeps its own."""
+        """Returns the task with another profile; None keeps its own.
+
+        Raises:
+            TaskError: Controllers in metres cannot have it.
+        """
         if profile is None:
             return self
+        check_frame(self.spec.frame, profile)
         spec = self.spec.model_copy(update={"profile": profile})
         return replace(self, spec=spec)
 
@@ -260,9 +266,7 @@ def portable_task_file(task: Task, own_suite: str | None = None) -> str:
     spec.update(task.setting.portable())
     if task.suite is not None and own_suite is not None:
         spec["suite"] = own_suite
-    spec["start"] = [float(v) for v in nominal.start]
-    spec["goal"] = [float(v) for v in nominal.goal]
-    spec["tolerance"] = nominal.goal_tolerance
+    spec.update(task.setting.ends())
     spec["dt"] = nominal.dt
     spec["horizon"] = nominal.horizon
     return yaml.safe_dump(spec, sort_keys=False)

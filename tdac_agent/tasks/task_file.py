@@ -12,13 +12,14 @@ from pydantic import (
     ConfigDict,
     Field,
     ValidationError,
+    model_validator,
 )
 
 from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
 from tdac_envs.core.arguments import MOST_STEPS, in_radians
 from tdac_envs.core.errors import TaskError, first_problem, hint
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
-from tdac_envs.mapping.params import MOST_RAYS, Length, Place
+from tdac_envs.mapping.params import MOST_RAYS, FrameName, Length, Place
 from tdac_envs.movers.spec import AnySpec, Spec, read_specs
 
 TASK_FILE = "task.yaml"
@@ -104,9 +105,9 @@ class TaskFile(_Strict):
     ] = Field(None, description="x, y and, if given, the heading in rad.")
     goal: tuple[Place, Place] | None = None
     snap: bool = Field(False, description="Move start and goal to free places.")
-    metres: bool = Field(
-        False,
-        description="Places, lengths and heading are m and rad in the map's frame.",
+    frame: FrameName = Field(
+        "pixels",
+        description="Units and frame of this file, and of what a controller observes.",
     )
     polarity: Literal["dark", "light"] | None = Field(
         None, description="Which pixels of the map image are obstacles."
@@ -129,6 +130,27 @@ class TaskFile(_Strict):
     instructions: str = Field("", description="Additional text for the prompt.")
 
     model_config = ConfigDict(populate_by_name=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_its_profile(cls, given: Any) -> Any:
+        """Controllers in metres have the profile `policy`, which need not be said."""
+        if isinstance(given, dict) and given.get("frame") == "metres":
+            return {"profile": "policy", **given}
+        return given
+
+
+def check_frame(frame: FrameName, profile: Profile) -> None:
+    """Refuses the functions of the paper, which use pixels, for a task in metres.
+
+    Raises:
+        TaskError: Frame and profile do not fit.
+    """
+    if frame == "metres" and profile == "paper":
+        raise TaskError(
+            "profile: the functions of the profile `paper` use pixels; in metres "
+            "(`frame`), give the profile `policy`"
+        )
 
 
 def read_task_file(path: Path, asked: object) -> TaskFile:

@@ -6,9 +6,14 @@ positive turn goes clockwise on the screen. Arrays are indexed [y, x]. Pixel (i,
 is the square [i - 1/2, i + 1/2) x [j - 1/2, j + 1/2); everything outside the map is
 occupied. File names without a folder are looked up beside this file.
 
+Where `frame` in params.json is "metres", places, lengths and headings are in metres and
+radians of the map's frame instead, with y UP, and a positive turn goes to the left. The
+map stays an array of pixels: `to_cell`, `to_point` and `to_pixels` convert.
+
 Of an e-puck in a world (`world.wbt`), only `HERE`, `load_params` and `show` are of use.
 """
 
+import functools
 import json
 import math
 import os
@@ -38,30 +43,59 @@ def load_occupancy(path: str | Path = "occupancy.npy") -> NDArray[np.bool_]:
 
 
 def load_params(path: str | Path = "params.json") -> dict[str, Any]:
-    """The task, lengths in pixels and angles in radians unless named otherwise.
+    """The task, lengths in px (or m, as `frame` says), angles in rad unless named so.
 
     Returns:
         `start` [x, y], `heading`, `goal` [x, y], `width`, `height`, `inflation`
-        (margin proposed for planning), `resolution` (metres per pixel or None) and
-        `robot`, a dict of `radius`, `axle_length`, `max_wheel_speed` (px/s),
-        `n_rays`, `field_of_view_deg` and `range_max`; and how the map was made.
+        (margin proposed for planning), `frame` ("pixels" or "metres"), `resolution`
+        (metres per pixel or None), `origin` (pose of the map's lower-left corner, m and
+        rad) and `robot`, a dict of `radius`, `axle_length`, `max_wheel_speed` (px/s or
+        m/s), `n_rays`, `field_of_view_deg` and `range_max`; and how the map was made.
     """
     params: dict[str, Any] = json.loads((HERE / path).read_text(encoding="utf-8"))
     return params
 
 
+def to_pixels(x: float, y: float, heading: float = 0.0) -> tuple[float, float, float]:
+    """A place or pose in pixels; the same if `frame` is "pixels"."""
+    frame = _frame()
+    if frame is None:
+        return x, y, heading
+    resolution, height, x0, y0, yaw = frame
+    right = math.cos(yaw) * (x - x0) + math.sin(yaw) * (y - y0)
+    up = math.cos(yaw) * (y - y0) - math.sin(yaw) * (x - x0)
+    return right / resolution - 0.5, height - 0.5 - up / resolution, yaw - heading
+
+
+def to_cell(x: float, y: float) -> tuple[int, int]:
+    """The pixel (i, j) that contains a place; the map there is `occ[j, i]`."""
+    u, v, _ = to_pixels(x, y)
+    return math.floor(u + 0.5), math.floor(v + 0.5)
+
+
+def to_point(i: float, j: float) -> tuple[float, float]:
+    """The centre of pixel (i, j), in the frame of this task."""
+    frame = _frame()
+    if frame is None:
+        return float(i), float(j)
+    resolution, height, x0, y0, yaw = frame
+    right, up = (i + 0.5) * resolution, (height - 0.5 - j) * resolution
+    x = x0 + math.cos(yaw) * right - math.sin(yaw) * up
+    return x, y0 + math.sin(yaw) * right + math.cos(yaw) * up
+
+
 class Ultrasonic:
     """The robot's range sensor: a fan of exact rays over the occupancy grid.
 
-    Ray i points at `heading + angles[i]`, from -fov/2 (`ranges[0]`, the robot's
-    LEFTMOST ray, as y points down) to +fov/2 (`ranges[-1]`, its rightmost). A single
-    ray points straight ahead.
+    `ranges[0]` is the robot's LEFTMOST ray, `ranges[-1]` its rightmost. Ray i points at
+    `heading + angles[i]`: from -fov/2 to +fov/2 in pixels (y points down), from +fov/2
+    to -fov/2 in metres. A single ray points straight ahead.
 
     Args:
         occ: Shape (height, width), bool, True = occupied.
         n_rays: Number of rays.
         field_of_view_deg: Whole angle of the fan, degrees.
-        range_max: Reading of a ray that hits nothing, px.
+        range_max: Reading of a ray that hits nothing, px or m.
     """
 
     def __init__(
@@ -76,8 +110,12 @@ class Ultrasonic:
         self.range_max = float(range_max)
         fov = math.radians(field_of_view_deg) if n_rays > 1 else 0.0
         first, step = -0.5 * fov, fov / max(n_rays - 1, 1)
-        self.angles = first + step * np.arange(n_rays)
-        self._ways = [(math.cos(turn), math.sin(turn)) for turn in self.angles.tolist()]
+        angles = first + step * np.arange(n_rays)
+        self._ways = [(math.cos(turn), math.sin(turn)) for turn in angles.tolist()]
+        frame = _frame()
+        self.angles = angles if frame is None else -angles
+        self._pixel = 1.0 if frame is None else frame[0]
+        self._reach = self.range_max / self._pixel
         # A rim of obstacles stands for the outside; bytes are quick to index.
         self._cells = np.pad(occ, 1, constant_values=True).tobytes()
 
@@ -85,13 +123,13 @@ class Ultrasonic:
         """Distances from the robot's centre to the first obstacle along each ray.
 
         Returns:
-            Shape (n_rays,), float32, px; `range_max` without a hit, and 0 where
+            Shape (n_rays,), float32, px or m; `range_max` without a hit, and 0 where
             (x, y) itself is occupied.
         """
-        x, y, heading = float(x), float(y), float(heading)
+        x, y, heading = to_pixels(float(x), float(y), float(heading))
         c, s = math.cos(heading), math.sin(heading)
         hits = [self._cast(x, y, c * a - s * b, s * a + c * b) for a, b in self._ways]
-        return np.array(hits, np.float32)
+        return np.array(hits, np.float32) * np.float32(self._pixel)
 
     def _cast(self, x: float, y: float, dx: float, dy: float) -> float:
         """Walks from pixel to pixel in the order in which the ray enters them."""
@@ -114,8 +152,8 @@ class Ultrasonic:
             else:
                 distance, j = next_y, j + step_y
                 next_y = (j + ahead_y - v) * per_y
-            if distance >= self.range_max:
-                return self.range_max
+            if distance >= self._reach:
+                return self._reach
             if cells[j * pitch + i]:
                 return max(distance, 0.0)
 
@@ -162,7 +200,8 @@ class Graphics:
         self._trail: list[tuple[float, float]] = []
 
     def _to_screen(self, x: float, y: float) -> tuple[float, float]:
-        return (x + 0.5) * self._scale, (y + 0.5) * self._scale
+        u, v, _ = to_pixels(x, y)
+        return (u + 0.5) * self._scale, (v + 0.5) * self._scale
 
     def draw(self, pose: Sequence[float], ranges: Sequence[float] = ()) -> bool:
         """Shows the robot at `pose` (x, y, heading) with its rays.
@@ -178,18 +217,22 @@ class Graphics:
         fov = math.radians(self._robot["field_of_view_deg"])
         for i, distance in enumerate(map(float, ranges)):
             turn = -fov / 2 + i * fov / (len(ranges) - 1) if len(ranges) > 1 else 0.0
+            turn = turn if _frame() is None else -turn
             tip_x = x + distance * math.cos(heading + turn)
             tip_y = y + distance * math.sin(heading + turn)
             tip = self._to_screen(tip_x, tip_y)
             pygame.draw.aaline(screen, (226, 150, 70), centre, tip)
         if len(self._trail) > 1:
             pygame.draw.lines(screen, (98, 84, 190), False, self._trail, 2)
-        self._draw_body(centre, heading)
+        self._draw_body(centre, to_pixels(x, y, heading)[2])
         pygame.display.flip()
         return all(event.type != pygame.QUIT for event in pygame.event.get())
 
     def _draw_body(self, centre: tuple[float, float], heading: float) -> None:
-        pygame, radius = self._pygame, max(self._robot["radius"] * self._scale, 3.0)
+        frame = _frame()
+        pixel = 1.0 if frame is None else frame[0]
+        pygame = self._pygame
+        radius = max(self._robot["radius"] / pixel * self._scale, 3.0)
         if self._body is not None:
             zoom = 2 * radius / self._body.get_width()
             turned = pygame.transform.rotozoom(self._body, -math.degrees(heading), zoom)
@@ -249,7 +292,8 @@ def show(
 def _environment() -> tuple[str, dict[str, Any]]:
     """Name and arguments of the environment of this folder's task."""
     if not (HERE / "world.wbt").exists():
-        return "TDAC-Map2D-v0", {"map": str(HERE)}
+        frame = load_params().get("frame", "pixels")
+        return "TDAC-Map2D-v0", {"map": str(HERE), "frame": frame}
     params = load_params()
     same = ("goal", "goal_tolerance", "dt", "horizon")
     return "TDAC-EPuck-v0", {
@@ -257,6 +301,17 @@ def _environment() -> tuple[str, dict[str, Any]]:
         "start": [*params["start"], params["heading"]],
         **{key: params[key] for key in same},
     }
+
+
+@functools.lru_cache(maxsize=1)
+def _frame() -> tuple[float, float, float, float, float] | None:
+    """Resolution, height (px), and origin (x, y, yaw) of the map; None for pixels."""
+    if not (HERE / "params.json").exists():
+        return None
+    params = load_params()
+    if params.get("frame", "pixels") == "pixels":
+        return None
+    return (params["resolution"], params["height"], *params["origin"])
 
 
 def _has_window() -> bool:

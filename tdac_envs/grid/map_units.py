@@ -93,6 +93,17 @@ class MapUnits:
         """A length in these units, converted to px."""
         return length if self.frame is None else round(length / self.per_pixel, _DIGITS)
 
+    def written_length(self, length: float) -> float:
+        """A length in px, converted for a file; reading it gives the same."""
+        return length if self.frame is None else round(length * self.per_pixel, 12)
+
+    def written_place(self, x: float, y: float) -> Point:
+        """A place in px, converted for a file; see `written_length`."""
+        if self.frame is None:
+            return float(x), float(y)
+        u, v = self.coordinates(x, y)
+        return round(u, 12), round(v, 12)
+
     def heading_in_pixels(self, heading: float) -> float:
         """Converts a heading from the x axis towards the y axis, rad, to the picture.
 

@@ -28,9 +28,9 @@ from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.robot import Robot
 from tdac_envs.map2d.setup import Setup, override
-from tdac_envs.map2d.source import Frame, MapSource, prepare, units_of
+from tdac_envs.map2d.source import MapSource, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
-from tdac_envs.mapping.params import ReadingOptions, Shade
+from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
 from tdac_envs.movers.spec import MoversOption, read_specs
 from tdac_envs.movers.state import Movers
 
@@ -76,8 +76,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     metres, in the frame of the map: the outer corner of the lower-left pixel is at the
     `origin` of the map, and without a rotation of this origin, x points right and y
     points up. Headings and turns, also that of `odometry`, are counter-clockwise. The
-    simulation is the same to the bit. `ranges[0]` still is the robot's leftmost ray: ray i
-    points at `+field_of_view/2 - i * field_of_view/(n_rays - 1)` from the heading.
+    simulation is the same to the bit. `ranges[0]` still is the robot's leftmost ray:
+    ray i points at `field_of_view/2 - i * field_of_view/(n_rays - 1)`.
     `pose()` and `discs()` stay in px.
 
     ## Movers
@@ -235,7 +235,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         snap: bool = False,
         polarity: Shade | None = None,
         movers: MoversOption = None,
-        frame: Frame = "pixels",
+        frame: FrameName = "pixels",
         render_mode: str | None = None,
     ) -> None:
         units = units_of(map, frame)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from tdac_envs.core.arguments import finite, finite_numbers, finite_point, positive
 from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.grid.metric import Point
 from tdac_envs.movers.spec import AnySpec
 
 LENGTHS = (
@@ -63,21 +64,36 @@ def _start_in_pixels(start: Sequence[float], units: MapUnits) -> tuple[float, ..
 
 def movers_in_pixels(specs: Sequence[AnySpec], units: MapUnits) -> tuple[AnySpec, ...]:
     """Movers whose places, lengths and headings are in these units, in px."""
-    return tuple(spec.model_copy(update=_changes(spec, units)) for spec in specs)
+    convert = units.length_in_pixels, units.pixels, units.heading_in_pixels
+    return tuple(_converted(spec, *convert) for spec in specs)
 
 
-def _changes(spec: AnySpec, units: MapUnits) -> dict[str, Any]:
-    """What differs in px: lengths, places and headings."""
+def movers_in(units: MapUnits, specs: Sequence[AnySpec]) -> tuple[AnySpec, ...]:
+    """Movers in px, converted for a file; the inverse of the above."""
+
+    def place(point: Point) -> Point:
+        return units.written_place(*point)
+
+    convert = units.written_length, place, units.heading
+    return tuple(_converted(spec, *convert) for spec in specs)
+
+
+def _converted(
+    spec: AnySpec,
+    length: Callable[[float], float],
+    place: Callable[[Point], Point],
+    heading: Callable[[float], float],
+) -> AnySpec:
     changes: dict[str, Any] = {
-        name: units.length_in_pixels(length)
+        name: length(own)
         for name in ("radius", "speed")
-        if (length := getattr(spec, name)) is not None
+        if (own := getattr(spec, name)) is not None
     }
     if spec.kind == "route":
-        changes["points"] = tuple(units.pixels(point) for point in spec.points)
+        changes["points"] = tuple(map(place, spec.points))
     elif spec.kind == "bounce":
         if spec.start is not None:
-            changes["start"] = units.pixels(spec.start)
+            changes["start"] = place(spec.start)
         if spec.heading is not None:
-            changes["heading"] = units.heading_in_pixels(spec.heading)
-    return changes
+            changes["heading"] = heading(spec.heading)
+    return spec.model_copy(update=changes)

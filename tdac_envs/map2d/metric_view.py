@@ -33,9 +33,10 @@ class MetricView:
     """
 
     def __init__(self, frames: MapFrame | Sequence[MapFrame]) -> None:
-        one = isinstance(frames, MapFrame)
-        rows = np.array([_numbers(f) for f in ([frames] if one else frames)])
-        columns = rows[0] if one else rows.T
+        if isinstance(frames, MapFrame):
+            columns = np.array(_numbers(frames))
+        else:
+            columns = np.array([_numbers(frame) for frame in frames]).T
         self._resolution, self._height, self._x, self._y = columns[:4]
         self._yaw, self._cosine, self._sine = columns[4:]
 
@@ -70,7 +71,7 @@ class MetricView:
         boxes: dict[str, Any] = dict(whole.spaces)
         low, high = boxes["goal"].low, boxes["goal"].high
         corners = [[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]
-        places = np.array([self._poses(np.float64(corner)) for corner in corners])
+        places = np.array([self._poses(np.array(corner)) for corner in corners])
         # Of a rotated map, the last bit of a place at the rim may differ.
         least = np.nextafter(places.min(axis=0), np.float32(-np.inf))
         most = np.nextafter(places.max(axis=0), np.float32(np.inf))

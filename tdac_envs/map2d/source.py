@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.image import check_size, load_image, read_bytes
 from tdac_envs.mapping.params import (
     DEFAULT_OPTIONS,
+    FrameName,
     MapParams,
     ReadingOptions,
     RobotParams,
@@ -35,8 +36,6 @@ from tdac_envs.mapping.params import (
 from tdac_envs.mapping.snapping import snap
 
 MapSource = str | Path | NDArray[Any] | Sequence[Sequence[Any]]
-Frame = Literal["pixels", "metres"]
-"""Units and frame of what a user gives and reads, and of what a robot observes."""
 
 _YAML = {".yaml", ".yml"}
 
@@ -198,16 +197,16 @@ def units_of(source: MapSource, frame: str) -> MapUnits:
         frame: `"pixels"` or `"metres"`: what the user gives and reads.
 
     Raises:
-        TaskError: There is no such frame.
+        TaskError: There is no such frame, or the map can have no metres.
         MapError: Metres are wanted, but the map cannot be read or has no resolution.
     """
-    one_of("frame", frame, get_args(Frame))
+    one_of("frame", frame, get_args(FrameName))
     if frame == "pixels":
         return PIXELS
     if not isinstance(source, str | Path):
-        raise MapError("an array has no resolution, as metres need: give pixels")
+        raise TaskError("frame: an array has no scale, which metres need; give pixels")
     if isinstance(source, str) and source in bundled_maps():
-        raise MapError(f"the bundled map {source} has no scale: give pixels")
+        raise TaskError(f"frame: the bundled map {source} has no scale; give pixels")
     path = Path(source)
     check_exists(path)
     if path.is_dir():

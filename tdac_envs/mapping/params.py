@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_envs.core.arguments import LARGEST, SMALLEST, positive
 from tdac_envs.core.errors import MapError, TaskError, first_problem
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
+from tdac_envs.grid.map_units import MapUnits
 
 PIXELS_PER_METRE = 3779.52
 """Pixels per metre of the paper's 2-D setting (96 dpi)."""
@@ -22,6 +23,8 @@ Length = Annotated[float, Field(gt=0, ge=SMALLEST, le=LARGEST)]
 """A length above 0."""
 MOST_RAYS = 4096
 Shade = Literal["dark", "light"]
+FrameName = Literal["pixels", "metres"]
+"""Units and frame of what a user gives and reads, and of what a robot observes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,10 +122,39 @@ class MapParams(_Record):
     resolution: Length | None = Field(None, description="Metres per pixel.")
     origin: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
     notes: tuple[str, ...] = Field((), description="Changes made, e.g. by snap.")
+    frame: FrameName = Field(
+        "pixels",
+        description="Units of the file's places and lengths, and of what a controller "
+        "observes. Here, they are always pixels.",
+    )
+
+    def written(self) -> dict[str, Any]:
+        """The contents of the file: in metres of the map's frame, if `frame` says so.
+
+        What tells how the map was made stays in px.
+        """
+        own = self.model_dump(mode="json")
+        if self.frame == "metres":
+            own.update(_converted(own, MapUnits.metres(self), inwards=False))
+        return own
 
     def save(self, path: Path) -> None:
         """Writes the file `path`."""
-        path.write_text(json.dumps(self.model_dump(mode="json"), indent=2) + "\n")
+        path.write_text(json.dumps(self.written(), indent=2) + "\n")
+
+    @classmethod
+    def read(cls, written: Any) -> MapParams:
+        """The parameters of a file's contents.
+
+        Raises:
+            ValidationError: A field is missing, wrong or unknown.
+        """
+        own = cls.model_validate(written)
+        if own.frame == "pixels":
+            return own
+        units = MapUnits.metres(own)
+        changes = _converted(own.model_dump(), units, inwards=True)
+        return cls.model_validate({**own.model_dump(), **changes})
 
     @classmethod
     def load(cls, path: Path) -> MapParams:
@@ -132,10 +164,33 @@ class MapParams(_Record):
             MapError: It is missing, not JSON, or has a wrong or unknown field.
         """
         try:
-            return cls.model_validate(parse_json(read_file(path, TEXT_BYTES)))
+            return cls.read(parse_json(read_file(path, TEXT_BYTES)))
         except OSError as error:
             raise MapError(f"cannot read {path}: {error.strerror}") from error
         except ValidationError as error:
             raise MapError(f"{path}: {first_problem(error)}") from error
         except ValueError as error:
             raise MapError(f"{path}: {error}") from error
+
+
+_ROBOT_LENGTHS = ("radius", "axle_length", "max_wheel_speed", "range_max")
+
+
+def _converted(
+    own: dict[str, Any], units: MapUnits, *, inwards: bool
+) -> dict[str, Any]:
+    """The places, headings and lengths of a file, to pixels (inwards) or metres."""
+    length = units.length_in_pixels if inwards else units.written_length
+
+    def place(point: Any) -> tuple[float, float]:
+        return units.pixels(tuple(point)) if inwards else units.written_place(*point)
+
+    robot = own["robot"]
+    lengths = {name: length(robot[name]) for name in _ROBOT_LENGTHS}
+    places = {key: place(own[key]) for key in ("start", "goal") if own[key] is not None}
+    return {
+        **places,
+        "heading": units.heading_in_pixels(own["heading"]),
+        "inflation": length(own["inflation"]),
+        "robot": {**robot, **lengths},
+    }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -45,6 +45,15 @@ class EPuckParams(_Record):
     horizon: int = Field(description="Steps.")
     robot: EPuckRobot
     notes: tuple[str, ...] = Field((), description="Assumptions of the world reader.")
+
+    @classmethod
+    def read(cls, written: Any) -> EPuckParams:
+        """The parameters of a file's contents.
+
+        Raises:
+            ValidationError: A field is missing, wrong or unknown.
+        """
+        return cls.model_validate(written)
 
 
 def params_of(

@@ -16,6 +16,7 @@ from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.units import METRES, Units
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
+from tdac_envs.drive.env import Observation
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import TABLE
@@ -70,6 +71,14 @@ class EPuckSetting:
     def without_movers(self) -> Setting:
         """Returns this task: nothing but the robot moves in a world."""
         return self
+
+    def observed(self) -> EPuckEnv:
+        """Constructs this task's environment."""
+        return self.make_env()
+
+    def seen(self, observation: Observation) -> Observation:
+        """Returns the observation, which is in metres anyway."""
+        return observation
 
     def told(self, length: float) -> str:
         """Formats a length in mm."""
@@ -129,6 +138,15 @@ class EPuckSetting:
         from tdac_envs.worlds.picture import draw_world
 
         return draw_world(self.nominal.ground.world)
+
+    def ends(self) -> dict[str, Any]:
+        """See `Setting`."""
+        nominal = self.nominal
+        return {
+            "start": [float(v) for v in nominal.start],
+            "goal": [float(v) for v in nominal.goal],
+            "tolerance": nominal.goal_tolerance,
+        }
 
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the flat world in the folder."""

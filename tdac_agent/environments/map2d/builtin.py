@@ -89,15 +89,20 @@ class Parameters(Tuned):
     )
 
 
-def template_for(robot: RobotParams, dt: float) -> Template[Parameters]:
+def template_for(
+    robot: RobotParams, dt: float, resolution: float | None = None
+) -> Template[Parameters]:
     """Returns the template for a robot.
 
     Args:
         robot: Values of the robot's constants.
         dt: Duration of a step, s.
+        resolution: Metres per pixel, if it observes metres.
     """
     file = Path(__file__).with_name("controller.py.j2")
-    return Template(Parameters, file, {"robot": robot, "dt": dt})
+    return Template(
+        Parameters, file, {"robot": robot, "dt": dt, "resolution": resolution}
+    )
 
 
 def render_controller(parameters: Parameters, robot: RobotParams, dt: float) -> str:

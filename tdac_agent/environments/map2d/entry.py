@@ -26,7 +26,7 @@ class Map2D(Environment):
     id = "TDAC-Map2D-v0"
     folder = Path(__file__).parent
     units = PIXELS
-    keys = ("map", "robot", "movers", "snap", "metres", "polarity", "threshold")
+    keys = ("map", "robot", "movers", "snap", "frame", "polarity", "threshold")
     names = Names(
         constants=(
             *("MAP_IMG", "PARAMS_JSON", "ROBOT_IMG", "AXLE_LENGTH_PX"),
@@ -108,7 +108,9 @@ class Map2D(Environment):
         from tdac_agent.environments.map2d.setting import map_setting
 
         own = map_setting(setting)
-        return template_for(own.params.robot, own.nominal.dt)
+        params = own.params
+        resolution = params.resolution if params.frame == "metres" else None
+        return template_for(params.robot, own.nominal.dt, resolution)
 
 
 def _own(task: Nominal) -> Map2DTask:

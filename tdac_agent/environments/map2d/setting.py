@@ -8,17 +8,20 @@ from typing import Any
 
 import cv2
 
-from tdac_agent.environments.map2d.moving import as_option, check_movers, in_pixels
+from tdac_agent.environments.map2d.moving import as_option, check_movers
 from tdac_agent.tasks.setting import Original, Setting
-from tdac_agent.tasks.task_file import RobotSpec, TaskFile
+from tdac_agent.tasks.task_file import RobotSpec, TaskFile, check_frame
 from tdac_agent.tasks.units import PIXELS, Units
 from tdac_envs.core.errors import MapError, RefusedError, TaskError
 from tdac_envs.drawing.canvas import Image
+from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS as MAP_PIXELS
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.env import Map2DEnv
+from tdac_envs.map2d.metric_input import movers_in, movers_in_pixels
+from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.picture import ROBOT_IMAGE
 from tdac_envs.map2d.source import prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
@@ -46,6 +49,7 @@ class Map2DSetting:
         image: Map image, or None.
         robot_image: Picture of the robot.
         movers: Moving obstacles, px.
+        view: What a controller observes, if it is told metres.
         shown_in: Units of what the user reads; the environment's units are pixels.
     """
 
@@ -55,6 +59,7 @@ class Map2DSetting:
     robot_image: Path
     movers: tuple[AnySpec, ...] = ()
     shown_in: MapUnits = MAP_PIXELS
+    view: MetricView | None = None
 
     @property
     def original(self) -> Original | None:
@@ -88,6 +93,17 @@ class Map2DSetting:
         """See `Setting`."""
         return replace(self, movers=())
 
+    def observed(self) -> Map2DEnv:
+        """See `Setting`."""
+        env = self.make_env()
+        if self.view is None:
+            return env
+        return Map2DEnv.of(replace(env.setup, metric=self._told_in.frame))
+
+    def seen(self, observation: Observation) -> Observation:
+        """See `Setting`."""
+        return observation if self.view is None else self.view.seen(observation)
+
     def told(self, length: float) -> str:
         """Formats a length in `shown_in`."""
         return self.shown.figure(length)
@@ -105,9 +121,8 @@ class Map2DSetting:
         scale = scale_text(params.resolution)
         lines = [f"map: {obstacles_text(params)}; {scale}"]
         if self.shown_in != MAP_PIXELS:
-            lines.append(
-                "metres of the map's frame; the controller and its tests use px"
-            )
+            told = "" if self.view else "; the controller and its tests use px"
+            lines.append(f"metres of the map's frame{told}")
             lines.append(robot_text(params.robot, self.shown_in))
         return lines
 
@@ -145,7 +160,8 @@ class Map2DSetting:
 
     def facts(self) -> dict[str, Any]:
         """Returns the environment's arguments, with the map's hash."""
-        return {**self.env_kwargs(), "map": self.world_sha256()}
+        frame = {} if self.view is None else {"frame": self.params.frame}
+        return {**self.env_kwargs(), "map": self.world_sha256(), **frame}
 
     def world_sha256(self) -> str:
         """Returns the hash of the grid."""
@@ -166,20 +182,37 @@ class Map2DSetting:
 
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
-        robot = self.nominal.robot
+        robot, units = self.nominal.robot, self._told_in
+        length = units.written_length
         return {
-            **as_option(self.movers),
+            **as_option(movers_in(units, self.movers)),
+            **({} if self.view is None else {"frame": self.params.frame}),
             "map": ".",
             "robot": {
-                "radius": robot.radius,
-                "axle": robot.axle_length,
-                "max_wheel_speed": robot.max_wheel_speed,
+                "radius": length(robot.radius),
+                "axle": length(robot.axle_length),
+                "max_wheel_speed": length(robot.max_wheel_speed),
                 "n_rays": robot.n_rays,
                 "field_of_view": robot.field_of_view_deg,
-                "range_max": robot.range_max,
+                "range_max": length(robot.range_max),
                 "image": "robot.png",
             },
         }
+
+    def ends(self) -> dict[str, Any]:
+        """See `Setting`."""
+        nominal, units = self.nominal, self._told_in
+        x, y, heading = nominal.start
+        return {
+            "start": [*units.written_place(x, y), units.heading(heading)],
+            "goal": [*units.written_place(*nominal.goal)],
+            "tolerance": units.written_length(nominal.goal_tolerance),
+        }
+
+    @property
+    def _told_in(self) -> MapUnits:
+        """Units of a task file and of what a controller observes."""
+        return MAP_PIXELS if self.view is None else MapUnits.metres(self.params)
 
 
 def map_setting(setting: Setting) -> Map2DSetting:
@@ -202,10 +235,9 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     """
     bundled = spec.map in bundled_maps()
     source = spec.map if bundled else str(base / spec.map)
-    if bundled and spec.metres:
-        raise TaskError(f"metres: the bundled map {spec.map} has no scale; give pixels")
+    check_frame(spec.frame, spec.profile)
     typed = None if spec.start is None else (spec.start[0], spec.start[1])
-    units = units_of(source, metres=spec.metres).with_typed(typed, spec.goal)
+    units = units_of(source, spec.frame).with_typed(typed, spec.goal)
     spec = _in_pixels(spec, units)
     prepared = prepare(
         source,
@@ -217,6 +249,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         units=units,
     )
     params = _with_robot(prepared.params, spec.robot)
+    params = params.model_copy(update={"frame": spec.frame})
     try:
         nominal = _feasible(prepared.grid, params, spec, units)
     except TaskError as error:
@@ -237,7 +270,13 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         _check_robot_image(robot_image)
     name = spec.map if bundled else Path(spec.map).stem
     setting = Map2DSetting(
-        params, nominal, prepared.image, robot_image, spec.movers, units
+        params,
+        nominal,
+        prepared.image,
+        robot_image,
+        spec.movers,
+        units,
+        None if units.frame is None else MetricView(units.frame),
     )
     return name, setting
 
@@ -253,7 +292,7 @@ def robot_text(robot: RobotParams, units: MapUnits) -> str:
 
 def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
     """The task file with its places and lengths converted to px."""
-    if not spec.metres:
+    if spec.frame == "pixels":
         return spec
     changes: dict[str, Any] = {}
     if spec.start is not None:
@@ -272,7 +311,7 @@ def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
         if length is not None
     }
     changes["robot"] = spec.robot.model_copy(update=robot)
-    changes["movers"] = in_pixels(spec.movers, units)
+    changes["movers"] = movers_in_pixels(spec.movers, units)
     return spec.model_copy(update=changes)
 
 

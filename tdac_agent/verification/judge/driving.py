@@ -79,6 +79,7 @@ def drive_seed(setup: EpisodeSetup, seed: int) -> SeededResult:
     if setup.policy.kind != "controller":
         return _driven_here(setup, record, seed)
     name, source = f"seed {seed}", source_of(setup.policy)
+    record.seen = setup.task.setting.seen
     child = setup.child_pool.take(setup.tier, setup.limits)
     try:
         child.copy_files(setup.workdir, source)

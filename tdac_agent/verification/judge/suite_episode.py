@@ -112,6 +112,7 @@ def drive(
     """
     limit = request.steps if request.steps is not None else task.nominal.horizon
     record = Record(task.make_env(), request.start, limit, seed=request.seed)
+    record.seen = task.setting.seen
     if request.drive == "truncated run_episode":
         record.truncates, record.collisions_before = True, 2
     child = child_pool.take(settings.tier, settings.limits)

@@ -88,7 +88,7 @@ def test_a_map_replaces_the_picture_of_its_refusal(tdac, ros):
 
 def test_a_task_in_metres_is_the_one_in_pixels(ros):
     """Start, heading, goal, radius and tolerance are converted; words stay metres."""
-    flags = {"map_image": str(ros), "metres": True}
+    flags = {"map_image": str(ros), "frame": "metres"}
     ends = {"start": (1.05, 5.95), "goal": (11.05, 5.95)}
     task = TaskFlags(**flags, **ends, heading=math.pi / 2, robot_radius=0.6).load()
     assert task.nominal.start == pytest.approx((30, 30, -math.pi / 2))
@@ -106,7 +106,7 @@ def test_metres_of_a_task_file(ros):
     """The key `metres` means what the flag means."""
     file = ros.parent / "task.yaml"
     file.write_text(
-        "map: plan.yaml\nmetres: true\nstart: [1.05, 5.95]\ngoal: [11.05, 5.95]\n"
+        "map: plan.yaml\nframe: metres\nstart: [1.05, 5.95]\ngoal: [11.05, 5.95]\n"
         "tolerance: 0.5\nrobot: {radius: 0.6, range_max: 5.0}\n"
     )
     task = load_task(file)
@@ -117,7 +117,7 @@ def test_metres_of_a_task_file(ros):
 
 def test_a_bundled_map_has_no_metres(tmp_path):
     file = tmp_path / "task.yaml"
-    file.write_text("map: maze\nmetres: true\n")
+    file.write_text("map: maze\nframe: metres\n")
     with pytest.raises(TaskError, match="the bundled map maze has no scale"):
         load_task(file)
 

@@ -35,7 +35,7 @@ def folder(plan, tmp_path):
     """A folder like that of a run: a controller, and its task in pixels."""
     file = tmp_path / "task.yaml"
     file.write_text(
-        f"map: {plan}\nmetres: true\nstart: [1.05, 5.95]\ngoal: [11.05, 5.95]\n"
+        f"map: {plan}\nframe: metres\nstart: [1.05, 5.95]\ngoal: [11.05, 5.95]\n"
         "robot: {radius: 0.6}\nprofile: policy\nhorizon: 300\n"
     )
     lay_out(load_task(file), tmp_path / "run")

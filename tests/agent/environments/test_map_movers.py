@@ -5,7 +5,7 @@ import pytest
 import yaml
 from small import write_small_task
 
-from tdac_agent.environments.map2d.moving import in_pixels, sentence_on
+from tdac_agent.environments.map2d.moving import sentence_on
 from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import lay_out, load_task
@@ -13,6 +13,7 @@ from tdac_agent.training.plan import make_batch, make_plan
 from tdac_agent.verification.suite.starts import episode_seed, spread_starts
 from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.map_units import MapFrame, MapUnits
+from tdac_envs.map2d.metric_input import movers_in_pixels
 from tdac_envs.movers.spec import read_specs
 
 TWO = [{"kind": "bounce", "count": 2}]
@@ -109,7 +110,7 @@ def test_movers_in_metres():
         {"kind": "bounce", "start": [1.05, 2.05], "heading": 0.5, "speed": 2},
         {"kind": "route", "points": [[1.05, 9.95], [2.05, 9.95]], "radius": 0.5},
     ]
-    bounce, route = in_pixels(read_specs(given), units)
+    bounce, route = movers_in_pixels(read_specs(given), units)
     assert bounce.start == pytest.approx((10.0, 79.0))
     assert (bounce.heading, bounce.speed) == pytest.approx((-0.5, 20.0))
     assert bounce.radius is None

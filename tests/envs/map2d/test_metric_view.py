@@ -14,6 +14,7 @@ from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.vector import Map2DVectorEnv
 
+
 def small_cells():
     """A room of 160 x 120 px with a block in it, True = occupied."""
     cells = np.zeros((120, 160), np.bool_)
@@ -59,7 +60,11 @@ def test_the_simulation_is_the_same_to_the_bit(plan):
         file, **TASK, odometry=True, range_noise=0.05, wheel_slip=0.1,
         movers=[{**mover, "points": points}],
     )  # fmt: skip
-    own = {"speed": 2.0, "radius": 0.4, "points": [units.coordinates(*p) for p in points]}
+    own = {
+        "speed": 2.0,
+        "radius": 0.4,
+        "points": [units.coordinates(*p) for p in points],
+    }
     metres = Map2DEnv(
         file, **in_metres(units), odometry=True, range_noise=0.05, wheel_slip=0.1,
         movers=[{**mover, **own}],
@@ -156,8 +161,8 @@ def test_check_env_pickle_and_options(plan):
 @pytest.mark.parametrize(
     ("options", "reason"),
     [
-        ({"map": "maze"}, "the bundled map maze has no scale: give pixels"),
-        ({"map": small_cells()}, "an array has no resolution"),
+        ({"map": "maze"}, "the bundled map maze has no scale; give pixels"),
+        ({"map": small_cells()}, "an array has no scale"),
         ({"frame": "meters"}, "frame"),
         ({"robot_radius": -1}, "robot_radius"),
         ({"start": (1, 2, 3, 4)}, "start"),

@@ -158,7 +158,7 @@ class TestMetres:
     def test_of_a_ros_map(self, cells, tmp_path):
         """The corner of the lower-left pixel lies at the origin, (-1, 2) m."""
         source = ros_map(tmp_path, cells)
-        units = units_of(source, metres=True)
+        units = units_of(source, "metres")
         assert units.pixels((-1.0, 2.0)) == pytest.approx((-0.5, 39.5))
         assert units.length_in_pixels(0.3) == pytest.approx(6.0)
 
@@ -166,12 +166,12 @@ class TestMetres:
         prepared = prepare(ros_map(tmp_path, cells), robot_radius=3, **ENDS)
         np.save(tmp_path / "occupancy.npy", cells)
         prepared.params.save(tmp_path / "params.json")
-        goal = units_of(tmp_path, metres=True).pixels((0.0, 3.0))
+        goal = units_of(tmp_path, "metres").pixels((0.0, 3.0))
         assert goal == pytest.approx((19.5, 19.5))
 
     def test_a_picture_has_no_metres(self, picture):
         with pytest.raises(MapError, match="no resolution"):
-            units_of(picture, metres=True)
+            units_of(picture, "metres")
 
 
 class TestRefused:
