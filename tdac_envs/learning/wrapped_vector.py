@@ -159,7 +159,8 @@ class WrappedVectorEnv(VectorWrapper):
         self._stages = [self._stage(name) for name in self.names]
 
     def _stage(self, name: str) -> Callable[[Any, Array], Any]:
-        own, frame = self._space, _frame(self.batch)
+        own, setups = self._space, self.batch.setups
+        frame = _joined([Frame.of_setup(setup) for setup in setups])
         if name == "goal-relative":
             self._space = frame.relative_space(own)
             if lacks_pose(own):
@@ -171,15 +172,16 @@ class WrappedVectorEnv(VectorWrapper):
             check_closeness(own)
             return lambda seen, _: frame.closeness(seen)
         if name == "guidance":
-            check_guidance(self.batch.setups[0])
+            check_guidance(setups[0])
+            true = _joined([Frame.of_task(setup.nominal) for setup in setups])
             self._space = guided_space(own)
             routes = self._routes = self._routes or Routes(self.batch)
             return lambda seen, poses: {
                 **seen,
-                "guidance": frame.guidance_to(routes.ahead(poses), poses, routes.reach),
+                "guidance": true.guidance_to(routes.ahead(poses), poses, routes.reach),
             }
         if name == "map-view":
-            check_map_view(self.batch.setups[0])
+            check_map_view(setups[0])
             self._space = viewed_space(own)
             views = self._views = self._views or MapViews(self.batch.tasks)
             return lambda seen, poses: {**seen, "map": views.around(poses)}
@@ -225,9 +227,8 @@ class WrappedVectorEnv(VectorWrapper):
             final[i] = seen[i] if single else {key: v[i] for key, v in seen.items()}
 
 
-def _frame(batch: DrivenVectorEnv) -> Frame:
+def _joined(frames: Sequence[Frame]) -> Frame:
     """The frame of all robots, with a radius and a largest reading for each robot."""
-    frames = [Frame.of_task(setup.nominal) for setup in batch.setups]
     first = frames[0]
     radii = np.array([[frame.radius] for frame in frames])
     largest = np.array([[frame.largest] for frame in frames])

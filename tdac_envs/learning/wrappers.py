@@ -59,7 +59,7 @@ class Frame:
 
     @classmethod
     def of(cls, env: Env) -> Frame:
-        """The frame of an environment, wrapped or not.
+        """The frame of the observations of an environment, wrapped or not.
 
         Raises:
             TaskError: It is not an environment of `tdac_envs`.
@@ -67,11 +67,20 @@ class Frame:
         plain: Any = env.unwrapped
         if not hasattr(plain, "nominal"):
             raise TaskError(f"expected an environment of tdac_envs, got {plain}")
-        return cls.of_task(plain.nominal)
+        return cls.of_setup(plain.setup)
+
+    @classmethod
+    def of_setup(cls, setup: Any) -> Frame:
+        """The frame of what a robot observes."""
+        frame, metric = cls.of_task(setup.nominal), getattr(setup, "metric", None)
+        if metric is None:
+            return frame
+        scale = metric.resolution
+        return cls(frame.radius * scale, True, frame.readings, frame.largest * scale)
 
     @classmethod
     def of_task(cls, task: Map2DTask | EPuckTask) -> Frame:
-        """The frame of a task's robot."""
+        """The frame of a task's robot and its true poses."""
         if isinstance(task, Map2DTask):
             return cls(task.body_radius, False, "ranges", float(task.robot.range_max))
         return cls(task.body_radius, True, "ps", float(LARGEST))
@@ -296,9 +305,9 @@ class Guidance(
     def __init__(self, env: Env, reach: float = REACH) -> None:
         gym.utils.RecordConstructorArgs.__init__(self, reach=reach)
         gym.ObservationWrapper.__init__(self, env)
-        self.frame = Frame.of(env)
         plain: Any = env.unwrapped
         check_guidance(plain.setup)
+        self.frame = Frame.of_task(plain.nominal)
         self.reach = reach
         space = guided_space(env.observation_space)
         self.observation_space = space  # type: ignore[assignment]

@@ -180,3 +180,21 @@ def test_mixed_frames(plan):
     each = [{"map": file, **TASK}, {"map": file, **in_metres(units)}]
     with pytest.raises(tdac_envs.TaskError, match="the same frame"):
         Map2DVectorEnv(2, each=each)
+
+
+@pytest.mark.parametrize("many", [False, True])
+def test_a_learner_sees_the_same(plan, many):
+    """The wrappers for RL make metres and pixels alike."""
+    file, units = plan
+    seen = []
+    for options in (TASK, in_metres(units)):
+        env = (
+            Map2DVectorEnv(2, map=file, **options)
+            if many
+            else gym.make("TDAC-Map2D-v0", map=str(file), **options)
+        )
+        wrapped = tdac_envs.wrap_for_rl(env)
+        first, _ = wrapped.reset(seed=0)
+        second = wrapped.step(SPEEDS[:2] if many else SPEEDS[0])[0]
+        seen.append(np.stack([first, second]))
+    assert seen[0] == pytest.approx(seen[1], abs=1e-5)
