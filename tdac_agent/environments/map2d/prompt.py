@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from tdac_agent.environments.map2d.moving import sentence_on
-from tdac_agent.environments.map2d.setting import map_setting
+from tdac_agent.environments.map2d.setting import Map2DSetting, map_setting
+from tdac_agent.prompting.manual import interface_of
 from tdac_agent.prompting.source_excerpt import needed_part
 from tdac_agent.tasks.task import SENSORS_FILE, Task
 from tdac_envs.map2d.terrain import widest_connected_radius
@@ -15,6 +17,20 @@ HOW_THE_MAP_WAS_MADE = {
     *("score", "score_terms", "notes"),
 }
 """Fields of `params.json` that no controller needs."""
+METRES = """\
+The world is an occupancy grid made from a map image. Places and lengths are metres in
+the frame of the map (that of ROS `map.yaml`): the outer corner of the lower-left pixel
+is at `origin`, and without a rotation of this origin x points right and y points UP on
+the picture. Headings are measured from +x towards +y, so a positive turn is
+counter-clockwise. The map itself is an array of pixels, `occ[j, i]`; `sensors.to_cell`,
+`to_pixels` and `to_point` convert. Everything outside the map is occupied. The robot
+moves along the exact arc of its wheel speeds, which are constant during a step. The
+disc swept along this arc is tested exactly against the occupied squares, so no step can
+jump through a thin wall."""
+RAYS = """\
+Ray i points at `field_of_view/2 - i * field_of_view/(n_rays - 1)` from the heading:
+`ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost. Rays start at the
+centre; no hit gives `range_max`."""
 
 
 def facts_of(task: Task) -> dict[str, Any]:
@@ -23,14 +39,15 @@ def facts_of(task: Task) -> dict[str, Any]:
     nominal = setting.nominal
     terrain, grid = nominal.terrain, nominal.terrain.grid
     start = (nominal.start.x, nominal.start.y)
-    params = setting.params.model_dump_json(indent=2, exclude=HOW_THE_MAP_WAS_MADE)
+    written = setting.params.written()
+    params = {k: v for k, v in written.items() if k not in HOW_THE_MAP_WAS_MADE}
     return {
         "robot_text": "a differential-drive robot over a 2-D map",
         "files_text": "`params.json`, `occupancy.npy`, `occupancy.png`, `robot.png`",
         "loaders_text": (
             "`load_params() -> dict`, `load_occupancy() -> bool array [y, x]`"
         ),
-        "params_text": params,
+        "params_text": json.dumps(params, indent=2),
         "widest": widest_connected_radius(terrain.clear, start, nominal.goal),
         "movers_text": sentence_on(setting.movers),
         "number": 6,
@@ -41,4 +58,16 @@ def facts_of(task: Task) -> dict[str, Any]:
         "tolerance": nominal.goal_tolerance,
         "radius": nominal.body_radius,
         "sensors_text": needed_part(SENSORS_FILE.read_text(encoding="utf-8")),
+        "length": setting.told_in.length,
+        "frame": setting.params.frame,
+        **({} if setting.view is None else _in_metres(setting)),
+    }
+
+
+def _in_metres(setting: Map2DSetting) -> dict[str, str]:
+    """What differs if a controller observes metres."""
+    table = interface_of(setting.observed()).observation.partition("\n\n")[0]
+    return {
+        "env_description": METRES,
+        "observation_table": f"{table.replace('px', 'm')}\n\n{RAYS}",
     }

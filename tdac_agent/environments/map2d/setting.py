@@ -98,7 +98,7 @@ class Map2DSetting:
         env = self.make_env()
         if self.view is None:
             return env
-        return Map2DEnv.of(replace(env.setup, metric=self._told_in.frame))
+        return Map2DEnv.of(replace(env.setup, metric=self.told_in.frame))
 
     def seen(self, observation: Observation) -> Observation:
         """See `Setting`."""
@@ -182,7 +182,7 @@ class Map2DSetting:
 
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
-        robot, units = self.nominal.robot, self._told_in
+        robot, units = self.nominal.robot, self.told_in
         length = units.written_length
         return {
             **as_option(movers_in(units, self.movers)),
@@ -201,7 +201,7 @@ class Map2DSetting:
 
     def ends(self) -> dict[str, Any]:
         """See `Setting`."""
-        nominal, units = self.nominal, self._told_in
+        nominal, units = self.nominal, self.told_in
         x, y, heading = nominal.start
         return {
             "start": [*units.written_place(x, y), units.heading(heading)],
@@ -210,7 +210,7 @@ class Map2DSetting:
         }
 
     @property
-    def _told_in(self) -> MapUnits:
+    def told_in(self) -> MapUnits:
         """Units of a task file and of what a controller observes."""
         return MAP_PIXELS if self.view is None else MapUnits.metres(self.params)
 
