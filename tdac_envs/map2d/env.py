@@ -28,6 +28,7 @@ from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.robot import Robot
 from tdac_envs.map2d.setup import Setup, override
+from tdac_envs.map2d.sonar import NOISE
 from tdac_envs.map2d.source import MapSource, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
@@ -165,7 +166,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             min(20, d0 / 4).
         on_collision: `"terminate"` or `"block"`; see Episode End.
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`; see Starting State.
-        range_noise: Relative standard deviation of each range.
+        sensor: `"rays"`, which are exact, or `"sonar"`: a range is the nearest echo in
+            a beam of 30 degrees around its ray, and a surface that a ray meets at more
+            than 22.5 degrees from the normal gives none (`docs/disturbances.md`).
+        range_noise: Relative standard deviation of each range. Default: 0, or 0.05 with
+            sonar.
         range_dropout: Probability that a ray reads `range_max` in a step.
         wheel_slip: Relative standard deviation of each wheel's speed.
         wheel_gains: Bound b of the wheels' hidden gains, uniform in [1 - b, 1 + b] and
@@ -221,7 +226,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         goal_tolerance: float | None = None,
         on_collision: str = "terminate",
         variation: str = "nominal",
-        range_noise: float = 0.0,
+        sensor: str = "rays",
+        range_noise: float | None = None,
         range_dropout: float = 0.0,
         wheel_slip: float = 0.0,
         wheel_gains: float = 0.0,
@@ -299,10 +305,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             ),
             weights=weights_of(reward_weights),
             source=None,
-            range_noise=range_noise,
+            range_noise=_noise_of(sensor, range_noise),
             range_dropout=range_dropout,
             movers=given["movers"],
             metric=units.frame,
+            sensor=sensor,
         )
         self.params = params
         self._prepare(setup, render_mode)
@@ -394,10 +401,19 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         (words,) = self.addresses.words
         kernels = (begin_among, drive_among) if among else (begin, drive)
         calls: list[Callable[[], None]] = [partial(call, words) for call in kernels]
+        if self.setup.sonar is not None:
+            calls = [partial(self._then_listen, call) for call in calls]
         self._call_begin, self._call_drive = calls
         robot = self.robot
         seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
         self._copies = [array.copy for array in seen]
+
+    def _then_listen(self, call: Callable[[], None]) -> None:
+        """Calls a kernel, and replaces its ranges by those of the sonars."""
+        call()
+        robot = self.robot
+        discs, terrain = self.discs(), self.task.terrain
+        self.setup.sonar.read(terrain, robot.state, discs, robot.ranges)
 
     def _observation(self) -> Observation:
         pose, goal, wheels, ranges = self._copies
@@ -443,6 +459,13 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         return self._scene.frame(
             robot.state[:3].tolist(), robot.ranges, self._trail, status, self._ghosts
         )
+
+
+def _noise_of(sensor: str, given: float | None) -> float:
+    """The relative noise of ranges that a user asks for."""
+    if given is not None:
+        return given
+    return NOISE if sensor == "sonar" else 0.0
 
 
 def movers_of(task: Map2DTask) -> Movers:

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from tdac_envs.core.arguments import (
     non_negative,
     number_up_to,
+    one_of,
     positive,
     whole_number,
 )
@@ -23,6 +24,7 @@ from tdac_envs.grid.map_units import MapFrame
 from tdac_envs.map2d.placing import Cast
 from tdac_envs.map2d.rays import fan
 from tdac_envs.map2d.robot import constants_of
+from tdac_envs.map2d.sonar import Sonar
 from tdac_envs.map2d.task import (
     Map2DTask,
     default_horizon,
@@ -46,6 +48,8 @@ class Setup(DriveSetup):
         range_dropout: Probability that a ray reads the largest range.
         movers: Movers of all episodes, if the source of the tasks has none.
         metric: Frame in whose metres the robot observes; None for pixels.
+        sensor: `"rays"` or `"sonar"`.
+        sonar: The sonars; None with rays.
         directions: Directions of the rays, from `rays.fan`.
         cast: The movers, checked on the map.
     """
@@ -55,6 +59,8 @@ class Setup(DriveSetup):
     range_dropout: float
     movers: tuple[AnySpec, ...] = ()
     metric: MapFrame | None = None
+    sensor: str = "rays"
+    sonar: Sonar | None = field(init=False)
     directions: NDArray[np.float64] = field(init=False)
     cast: Cast = field(init=False)
 
@@ -67,6 +73,9 @@ class Setup(DriveSetup):
         robot = self.nominal.robot
         view = np.radians(robot.field_of_view_deg)
         object.__setattr__(self, "directions", fan(float(view), robot.n_rays))
+        one_of("sensor", self.sensor, ("rays", "sonar"))
+        ring = Sonar(float(view), robot.n_rays, robot.range_max)
+        object.__setattr__(self, "sonar", ring if self.sensor == "sonar" else None)
         cast = Cast.of(self.movers, self.nominal)
         object.__setattr__(self, "cast", cast)
         if self.movers and self.variation == "nominal" and self.source is None:

@@ -72,6 +72,9 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         self._view = _view_of([setup.metric for setup in self.setups])
         noisy = [setup.has_inexact_ranges for setup in self.setups]
         self._noisy = np.flatnonzero(noisy)
+        self._listening = [
+            i for i, setup in enumerate(self.setups) if setup.sonar is not None
+        ]
         # Last observation: robots that are not reset keep their noise.
         self._ranges = self.robots.ranges.copy()
 
@@ -132,6 +135,8 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         }
 
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
+        for i in np.intersect1d(self._listening, robots).tolist():
+            self._listen(i, observations["ranges"])
         if self._noisy.size:
             for i in np.intersect1d(self._noisy, robots).tolist():
                 exact, random = self.robots.ranges[i], self._noise(i)
@@ -140,6 +145,13 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         if self._disturbances.odometry:
             seen = self._disturbances.measure(robots, self.robots, self._noise)
             observations["odometry"] = seen
+
+    def _listen(self, i: int, ranges: NDArray[np.float32]) -> None:
+        """Replaces the ranges of robot i by those of its sonars."""
+        robots, discs = self.robots.row(i), self._movers[i].discs()
+        terrain = self.tasks[i].terrain
+        self.setups[i].sonar.read(terrain, robots.state, discs, robots.ranges)
+        ranges[i] = robots.ranges
 
 
 def _view_of(frames: Sequence[MapFrame | None]) -> MetricView | None:
