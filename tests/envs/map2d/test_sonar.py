@@ -22,7 +22,7 @@ def half_plane(turn):
 
 
 def one_sonar(cells, heading=0.0, **more):
-    """An environment with a single sonar that looks along the heading, without noise."""
+    """A single sonar that looks along the heading, without noise."""
     options = {"range_noise": 0.0, "n_rays": 1, "range_max": 120.0, **more}
     return Map2DEnv(
         cells, (*AT, heading), (100.0, 150.0), robot_radius=4, sensor="sonar", **options
