@@ -1,0 +1,156 @@
+"""Each command of README and docs is run as it stands, one page after another.
+
+What takes longer than `PATIENCE` is interrupted as with Ctrl-C, and must end as an
+interrupted command does. Left out are commands that need a key, another program, a
+person or a display: `LEFT_OUT` says which.
+"""
+
+import importlib.util
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from test_site import CASES
+
+from tdac_envs.mapping.bundled import bundled_map
+from tdac_envs.worlds.bundled import world_file
+
+pytestmark = pytest.mark.slow
+
+PATIENCE = 30.0
+"""Seconds until a command is interrupted."""
+LEFT_OUT = {
+    "needs a key": re.compile(r"(anthropic|openai):(?!.*--dry-run)(?!.*localhost)"),
+    "needs a server of models": re.compile("localhost:"),
+    "needs another program": re.compile("command:"),
+    "needs a person": re.compile("manual:"),
+    "needs a display": re.compile(r"^tdac play (?!.*--video)|studio --open"),
+}
+NEEDS = {"stable_baselines3": re.compile(r"tdac train|\.zip"), "nicegui": "tdac studio"}
+"""Extras, and the commands that need them."""
+
+GO_TO_GOAL = """
+import math
+
+
+def policy(obs):
+    if "pose" not in obs:
+        return 0.3, 0.3
+    x, y, heading = map(float, obs["pose"])
+    goal_x, goal_y = map(float, obs["goal"])
+    off = math.remainder(math.atan2(goal_y - y, goal_x - x) - heading, math.tau)
+    return (0.5, -0.5) if off > 0.3 else (-0.5, 0.5) if off < -0.3 else (1.0, 1.0)
+"""
+TASK = """
+map: ../../plan.png
+start: [90, 302, -1.57]
+goal: [178, 386]
+robot: {radius: 12}
+tolerance: 15
+"""
+CAMPAIGN = """
+schema: 1
+name: my
+about: one run without a model
+tasks: [maze]
+learners: [builtin]
+runs: 1
+iterations: 2
+"""
+PREPARED = [
+    "tdac synth",
+    "tdac synth --task office",
+    "tdac synth --task epuck",
+    "tdac synth --set unknown --episodes 8",
+    "tdac bench go-to-goal --set unknown -n 2 --out mine",
+    "tdac bench other.py --set unknown -n 2 --out theirs",
+    "tdac bench go-to-goal --set unknown -n 2 --out arena",
+    "tdac campaign my.yaml",
+]
+LEARNED = "tdac train --task maze --steps 4096"
+"""The policy of this run stands for all those that the pages name."""
+
+
+def runs_here(line):
+    """Whether a command needs nothing that a test cannot have."""
+    return not any(re.search(pattern, line) for pattern in LEFT_OUT.values())
+
+
+def run(line, folder, patience):
+    """Exit code and output of a command, interrupted when patience is over."""
+    words = [Path(sys.executable).with_name("tdac")]
+    process = subprocess.Popen(
+        [*words, *shlex.split(line, comments=True)[1:]], cwd=folder, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        text, _ = process.communicate(timeout=patience)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGINT)
+        text, _ = process.communicate(timeout=120)
+    return process.returncode, text
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """A folder with the files and runs that the pages name."""
+    folder = tmp_path_factory.mktemp("site")
+    patch = pytest.MonkeyPatch()
+    patch.setenv("XDG_STATE_HOME", str(folder / "state"))
+    shutil.copy(bundled_map("maze").image, folder / "plan.png")
+    room = np.full((100, 200), 254, np.uint8)
+    cv2.imwrite(str(folder / "depot.png"), room)
+    ros = "image: depot.png\nresolution: 0.05\norigin: [-2, 0, 0]\n"
+    (folder / "depot.yaml").write_text(ros)
+    for name in ("controller.py", "mine.py", "other.py", "my_controller.py"):
+        (folder / name).write_text(GO_TO_GOAL)
+    (folder / "plans" / "kitchen").mkdir(parents=True)
+    (folder / "plans" / "kitchen" / "task.yaml").write_text(TASK)
+    (folder / "my.yaml").write_text(CAMPAIGN)
+    (folder / "my.salt").write_bytes(bytes(range(32)))
+    (folder / "mine.j2").write_text("Write controller.py. {{ env_description }}")
+    for name, world in (("maze", "maze"), ("my", "arena"), ("empty", "arena")):
+        shutil.copy(world_file(world), folder / f"{name}.wbt")
+    lines = list(PREPARED)
+    if importlib.util.find_spec("stable_baselines3"):
+        lines.append(LEARNED)
+    for line in lines:
+        code, text = run(line, folder, 600)
+        assert code in (0, 1), f"{line}\n{text}"
+        assert "Traceback" not in text, text
+    for name in ("ppo.zip", "a.zip", "b.zip", "runs/ppo/policy.zip"):
+        learned = folder / "runs" / "ppo-maze-1" / "policy.zip"
+        if learned.exists():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(learned, folder / name)
+    yield folder
+    patch.undo()
+
+
+def test_what_is_left_out():
+    """Few commands are, and most of them for want of a key."""
+    left_out = [line for _, line in CASES if not runs_here(line)]
+    assert len(left_out) < len(CASES) / 4
+
+
+LINES = [(page, line) for page, line in CASES if runs_here(line)]
+
+
+@pytest.mark.parametrize(
+    ("page", "line"), LINES, ids=[f"{p.stem}:{line[:50]}" for p, line in LINES]
+)
+def test_a_command_runs(page, line, place):
+    """It does what it says, or is interrupted cleanly; no usage error, no traceback."""
+    for package, pattern in NEEDS.items():
+        if re.search(pattern, line):
+            pytest.importorskip(package)
+    code, text = run(line, place, PATIENCE)
+    assert "Traceback" not in text, text
+    assert code in (0, 1, 130), f"exit {code}\n{text}"
