@@ -197,7 +197,7 @@ def _worlds(tasks: TaskSet) -> str:
     """Which generators make the worlds, or how many each split has of a file."""
     if tasks.files is None or tasks.file.files is None:
         names = ", ".join(each.name for each in tasks.file.worlds)
-        return f"{names}, in turn"
+        return f"{names}, in turn" if len(tasks.file.worlds) > 1 else names
     counts = ", ".join(
         f"{count} {split}" for split, count in tasks.files.counts.items()
     )
@@ -206,7 +206,7 @@ def _worlds(tasks: TaskSet) -> str:
     text = f"{counts}{times}; of {tasks.file.files.path}"
     skipped = tasks.files.skipped
     if skipped:
-        text += f"; {len(skipped)} left out, such as {skipped[0]}"
+        text += f"; {len(skipped)} left out (--json lists them), such as {skipped[0]}"
     return text
 
 
@@ -240,10 +240,12 @@ def _disturbed(file: SetFile) -> str:
 def _group(group: MoversOfSet) -> str:
     """A group of movers: kind, number, radius and speed."""
     count, radius, speed = (
-        f"{low:g} to {high:g}" for low, high in (group.count, group.radius, group.speed)
+        f"{low:g}" if low == high else f"{low:g} to {high:g}"
+        for low, high in (group.count, group.radius, group.speed)
     )
     kind = "people of a crowd" if group.kind == "crowd" else "bouncing discs"
-    return f"{count} {kind}, radius {radius} px, {speed} px/s"
+    rest = f"radius {radius} px, {speed} px/s; fewer where they block every way"
+    return f"{count} {kind}, {rest}"
 
 
 def _world_rows(world: dict[str, Any], unit: str) -> dict[str, str]:

@@ -158,6 +158,7 @@ def verify(
         from tdac_agent.cli import verify as command
         from tdac_agent.cli.robust_flags import DisturbanceFlags, RobustFlags
         from tdac_agent.cli.set_flags import SetFlags
+        from tdac_agent.tasks.task_file import SET_FILE
 
         disturbed = DisturbanceFlags(
             range_noise=range_noise,
@@ -169,6 +170,9 @@ def verify(
             range_dropout=range_dropout,
         )
         wanted = RobustFlags(robust, first_seed, accept_at, margin, disturbed)
+        brings = (Path(controller) / SET_FILE).is_file() and not named_task().words()
+        if set_name is None and brings:
+            set_name = controller  # the run's own task set
         on_set = SetFlags(set_name, split, worlds, salt_file, hidden_folder)
         if on_set != SetFlags():
             from tdac_agent.cli import verify_set

@@ -306,7 +306,7 @@ def _rollout(
 ) -> Rollout:
     times = 1000 * np.array(calls) if calls else np.zeros(1)
     task = record.env.task
-    slow = mean_call > task.dt
+    slow = mean_call > task.dt and not isinstance(error, Exception)
     return Rollout(
         name=name,
         held_out=held_out,

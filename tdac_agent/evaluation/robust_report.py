@@ -52,12 +52,13 @@ class Interval(_Record):
     """A confidence interval for the success rate.
 
     Exact (Clopper and Pearson 1934): its coverage is at least `confidence` at any rate.
+    Where a world is driven several times, worlds are resampled.
     """
 
     low: float
     high: float
     confidence: float
-    method: Literal["Clopper-Pearson"] = "Clopper-Pearson"
+    method: Literal["Clopper-Pearson", "bootstrap over worlds"] = "Clopper-Pearson"
 
 
 class SequentialResult(_Record):

@@ -138,7 +138,10 @@ class LearnedRuns:
             self.tasks, self.split, self.salt, self.entrant.sha256
         )
         seconds = time.monotonic() - began
-        report = summarise(provenance, episodes, None, seconds, told=told)
+        different = self.tasks.different(self.split)
+        report = summarise(
+            provenance, episodes, None, seconds, told=told, different=different
+        )
         if out is not None and told:
             keep_report(report, out)
         elif out is not None:

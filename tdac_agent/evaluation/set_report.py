@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections import Counter
 from collections.abc import Sequence
 from statistics import fmean
 
+import numpy as np
 from pydantic import ConfigDict, Field
 
 from tdac_agent.evaluation.robust_report import (
@@ -15,6 +17,8 @@ from tdac_agent.evaluation.robust_report import (
     result_of,
     success_interval,
 )
+from tdac_agent.metrics.exact import CONFIDENCE
+from tdac_agent.metrics.rates import rate_of_runs
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.verification.judge.sequential import SequentialTest
@@ -28,6 +32,8 @@ from tdac_agent.verification.suite.contract import (
 from tdac_envs.ladder.set_file import CpuSpec
 from tdac_envs.ladder.task_sets import TaskSet
 
+LEAST_GROUP = 5
+"""Hidden worlds of a generator below which its scores would tell single worlds."""
 MOST_TOLD = 3
 """Failures whose diagnosis is reported."""
 TOUCHED = {
@@ -149,6 +155,7 @@ def summarise(
     seconds: float,
     *,
     told: bool,
+    different: int | None = None,
     checks: Checks | None = None,
     clock_dependent: str | None = None,
 ) -> SetReport:
@@ -160,6 +167,7 @@ def summarise(
         test: The sequential test that may have stopped them.
         seconds: Wall time, s.
         told: Whether single worlds may be reported.
+        different: Number of different worlds, if each is driven several times.
         checks: The static and contract tests. If one failed, there are no episodes.
         clock_dependent: See `clock_dependence`.
     """
@@ -171,6 +179,8 @@ def summarise(
     groups: dict[str, list[WorldEpisode]] = {}
     for episode in episodes:
         groups.setdefault(episode.generator, []).append(episode)
+    if not told:
+        groups = {name: own for name, own in groups.items() if len(own) >= LEAST_GROUP}
     scored = test is None and bool(episodes)
     texts = [each.text or f"world {each.index}: {each.error}" for each in failed]
     return SetReport(
@@ -178,7 +188,7 @@ def summarise(
         tests=checks.outcomes,
         worlds=len(episodes),
         successes=successes,
-        interval=success_interval(successes, len(episodes)) if scored else None,
+        interval=_interval(episodes, different) if scored else None,
         scores=scores_of(episodes) if scored else None,
         by_generator=(
             {name: scores_of(group) for name, group in groups.items()} if scored else {}
@@ -191,6 +201,26 @@ def summarise(
         seconds=round(seconds, 3),
         clock_dependent=clock_dependent,
     )
+
+
+def _interval(
+    episodes: Sequence[WorldEpisode], different: int | None
+) -> Interval | None:
+    """The interval of the success rate; its unit is the world."""
+    successes = sum(episode.success for episode in episodes)
+    if different is None or len(episodes) <= different:
+        return success_interval(successes, len(episodes))
+    passed, tried = np.zeros(different, int), np.zeros(different, int)
+    for episode in episodes:
+        passed[episode.index % different] += episode.success
+        tried[episode.index % different] += 1
+    if ((passed == 0) | (passed == tried)).all():
+        return success_interval(int((passed > 0).sum()), different)
+    rate = rate_of_runs(passed, tried)
+    if math.isnan(rate.low):
+        return None
+    ends = {"low": rate.low, "high": rate.high, "confidence": CONFIDENCE}
+    return Interval(**ends, method="bootstrap over worlds")
 
 
 def cause_of(episode: WorldEpisode) -> str:

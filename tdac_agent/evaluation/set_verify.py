@@ -252,6 +252,7 @@ def _driven(
             test,
             seconds,
             told=told,
+            different=tasks.different(request.split),
             checks=checks,
             clock_dependent=clock,
         )
@@ -281,8 +282,11 @@ def compile_for_set(tasks: TaskSet) -> None:
 
 
 def most_worlds(tasks: TaskSet, split: str) -> int:
-    """Number of worlds after which a sequential test on a split is undecided."""
-    count = tasks.count(split)
+    """Number of worlds after which a sequential test on a split is undecided.
+
+    It drives each world once: further runs on a world are not independent of it.
+    """
+    count = tasks.different(split)
     return MOST_WORLDS if count is None else min(MOST_WORLDS, count)
 
 

@@ -83,6 +83,9 @@ def _reason(problem: Any) -> str:
     kind, limits = problem["type"], problem.get("ctx", {})
     if kind in _REASONS:
         return _REASONS[kind]
+    if kind == "union_tag_invalid":
+        tag, known = limits["tag"], limits["expected_tags"]
+        return f"unknown {limits['discriminator']} '{tag:.60}'; expected one of {known}"
     if kind in _LIMITS:
         key, text = _LIMITS[kind]
         if key == "ge" and 0.0 < limits[key] < 1e-6:

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    model_validator,
+)
 
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.generators.draft import ordered
@@ -29,6 +36,11 @@ TRIES = 10
 """Movers of a world are drawn so often before there are fewer of them."""
 
 
+def _both_ends(given: Any) -> Any:
+    """A single number stands for both ends."""
+    return (given, given) if isinstance(given, int | float) else given
+
+
 Count = Annotated[int, Field(ge=0, le=MOST_MOVERS)]
 
 
@@ -38,13 +50,15 @@ class MoversOfSet(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     kind: Literal["bounce", "crowd"]
-    count: Annotated[tuple[Count, Count], AfterValidator(ordered)]
-    speed: Annotated[tuple[Speed, Speed], AfterValidator(ordered)] = Field(
-        description="px/s"
-    )
-    radius: Annotated[tuple[Length, Length], AfterValidator(ordered)] = Field(
-        description="px"
-    )
+    count: Annotated[
+        tuple[Count, Count], AfterValidator(ordered), BeforeValidator(_both_ends)
+    ]
+    speed: Annotated[
+        tuple[Speed, Speed], AfterValidator(ordered), BeforeValidator(_both_ends)
+    ] = Field(description="px/s")
+    radius: Annotated[
+        tuple[Length, Length], AfterValidator(ordered), BeforeValidator(_both_ends)
+    ] = Field(description="px")
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     ValidationError,
@@ -71,7 +72,10 @@ class HorizonSpec(_Strict):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.least > self.most:
-            raise ValueError("expected least to be at most most")
+            raise ValueError(
+                f"expected `least` to be at most `most`, got {self.least} and "
+                f"{self.most}"
+            )
         return self
 
     def steps(self, least_steps: float) -> int:
@@ -118,6 +122,18 @@ class CpuSpec(_Strict):
         return self.bank + self.step * steps
 
 
+def _robot_of(given: Any) -> Any:
+    """The robot of a file: an e-puck if it has a `kind`, else that of maps."""
+    if not isinstance(given, dict):
+        return given
+    model = EPuckParams if "kind" in given else RobotParams
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        # The validation error names the key `robot`.
+        raise ValueError(first_problem(error, model.model_fields)) from None
+
+
 class SetFile(_Strict):
     """Contents of `set.yaml`, schema 1."""
 
@@ -130,7 +146,9 @@ class SetFile(_Strict):
     files: FilesSpec | None = Field(
         None, description="Worlds from files; `worlds: {folder: …}` is short for it."
     )
-    robot: RobotParams | EPuckParams = LEVEL_ROBOT
+    robot: Annotated[RobotParams | EPuckParams, BeforeValidator(_robot_of)] = (
+        LEVEL_ROBOT
+    )
     dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
     goal_tolerance: Length = Field(4.0, le=100, description="px or m")
     observed: Annotated[tuple[Observed, ...], AfterValidator(_distinct)] = Field(
@@ -170,10 +188,21 @@ class SetFile(_Strict):
             raise ValueError("errors of the odometry need `odometry` in `observed`")
         if self.map and self.frame != "map":
             raise ValueError("a set with `map: true` needs `frame: map`")
+        if self.files is not None and self.files.runs > 1 and not self._is_random:
+            raise ValueError(
+                "`runs` needs `disturbances` that are random, such as range_noise: "
+                "without them, all runs on a world are the same"
+            )
         self._check_robot()
         for number in range(len(self.worlds)):
             self.spec(number)  # checks the sizes of the robot and of a step
         return self
+
+    @property
+    def _is_random(self) -> bool:
+        """Whether two episodes in a world differ."""
+        values = self.disturbances.model_dump(exclude={"motor_lag", "delay"})
+        return any(values.values()) or bool(self.movers)
 
     def _check_robot(self) -> None:
         """Checks that worlds and observations are those of the robot."""
@@ -281,7 +310,9 @@ class SetFile(_Strict):
 
 
 def read_set_file(path: Path) -> SetFile:
-    """Reads a `set.yaml`; without a `name`, the set has that of its file.
+    """Reads a `set.yaml`.
+
+    Without a `name`, the set has that of its file, or of the folder of a `set.yaml`.
 
     Raises:
         TaskError: The file cannot be read, or a value is not valid.
@@ -290,10 +321,13 @@ def read_set_file(path: Path) -> SetFile:
         values: Any = parse_yaml(read_file(path, TEXT_BYTES))
         if not isinstance(values, dict):
             raise ValueError("expected keys with values, such as `worlds: [...]`")
-        return SetFile.model_validate({"name": path.stem, **_placed(values, path)})
+        name = path.absolute().parent.name if path.stem == "set" else path.stem
+        return SetFile.model_validate({"name": name, **_placed(values, path)})
     except ValidationError as error:
         known = [field.alias or name for name, field in SetFile.model_fields.items()]
         known += [f"files.{name}" for name in FilesSpec.model_fields]
+        for key, model in _PARTS.items():
+            known += [f"{key}.{name}" for name in model.model_fields]
         problem = first_problem(error, known).replace("files.", "worlds.")
         raise TaskError(f"{path}: {problem}") from None
     except (OSError, ValueError) as error:
@@ -316,6 +350,12 @@ def _placed(values: dict[Any, Any], path: Path) -> dict[Any, Any]:
     return {**values, key: placed}
 
 
+_PARTS: dict[str, type[BaseModel]] = {
+    "disturbances": DisturbanceSpec,
+    "horizon": HorizonSpec,
+    "admission": AdmissionSpec,
+    "cpu": CpuSpec,
+}
 BUILT_IN = Path(__file__).parent / "sets"
 """Folder of the sets that come with the package."""
 
@@ -337,12 +377,16 @@ def find_set_file(name: str | Path) -> SetFile:
         TaskError: There is none, or it is not valid.
     """
     names = shipped_names()
+    if not isinstance(name, str | Path):
+        raise TaskError(f"expected the name or path of a task set, got {name!r:.100}")
     if str(name) in names:
         return read_set_file(BUILT_IN / f"{name}.yaml")
     path = Path(name)
     if path.suffix in (".yaml", ".yml"):
         return read_set_file(path)
+    if (path / "set.yaml").is_file():
+        return read_set_file(path / "set.yaml")
     raise TaskError(
         f"unknown task set {str(name)!r}; expected {', '.join(names)} or the path of "
-        f"a set.yaml{hint(str(name), names)}"
+        f"a set.yaml or its folder{hint(str(name), names)}"
     )

@@ -73,6 +73,11 @@ class TaskSet:
         """
         return None if self.files is None else self.files.counts.get(split, 0)
 
+    def different(self, split: str) -> int | None:
+        """Number of different worlds of a split; None if there is no limit."""
+        count = self.count(split)
+        return count if self.files is None or not count else count // self.files.runs
+
     def runs(self, split: str, worlds: int) -> int:
         """How often the first `worlds` worlds of a split are the same ones.
 
@@ -126,9 +131,11 @@ class TaskSet:
         self._check_file_split(split)
         count = self.files.counts[split]
         if worlds > count:
+            others = {k: n for k, n in self.files.counts.items() if n and k != split}
+            way_out = ", ".join(f"{n} in {k!r}" for k, n in others.items())
             raise TaskError(
                 f"{argument} {worlds}: set {self.name!r} has {count} worlds in its "
-                f"split {split!r}"
+                f"split {split!r}{f'; there are {way_out}' if way_out else ''}"
             )
 
     def world(self, split: str, index: int, salt: bytes | None = None) -> AnyWorld:
@@ -244,10 +251,14 @@ class TaskSet:
                 f"set {self.name!r} has worlds from files; leave out the salt"
             )
         if self.files is None and split == "hidden" and salt is None:
-            raise TaskError("split 'hidden' needs a salt; give a salt file")
+            raise TaskError(
+                "split 'hidden' needs a salt: give a file of 16 random bytes or more "
+                "(--salt-file FILE, or salt_file=)"
+            )
         if salt is not None and not LEAST_SALT <= len(salt) <= MOST_SALT:
             raise TaskError(
-                f"expected a salt of {LEAST_SALT} to {MOST_SALT} bytes, got {len(salt)}"
+                f"the salt has {len(salt)} bytes; expected {LEAST_SALT} to "
+                f"{MOST_SALT}"
             )
         if self.files is not None and split == "hidden":
             salt = bytes.fromhex(self.files.hidden_sha256 or "")
@@ -272,8 +283,9 @@ class TaskSet:
         count = self.files.counts[split]
         if not count:
             raise TaskError(
-                f"set {self.name!r} has no worlds in its split {split!r}: whole groups "
-                "of one origin go to a split, and they went elsewhere"
+                f"set {self.name!r} has no worlds in its split {split!r}: maps that "
+                "are equal or of one origin go to a split together, and a small "
+                "folder may leave a split empty; name fewer `splits`, or add maps"
             )
         if not 0 <= index < count:
             raise TaskError(

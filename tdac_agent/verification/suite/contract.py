@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 import warnings
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from importlib.util import decode_source
 
 ALLOWED_IMPORTS = frozenset(
@@ -102,10 +102,15 @@ def _target_names(target: ast.expr) -> list[str]:
     return []
 
 
-def import_error(tree: ast.Module) -> str | None:
-    """Says which imports are not allowed, and what is; None if all of them are."""
+def import_error(tree: ast.Module, without: Collection[str] = ()) -> str | None:
+    """Says which imports are not allowed, and what is; None if all of them are.
+
+    Args:
+        tree: The source.
+        without: Modules that are not there in this case.
+    """
     problems = import_problems(tree)
-    allowed = " ".join(sorted(ALLOWED_IMPORTS - {"__future__"}))
+    allowed = " ".join(sorted(ALLOWED_IMPORTS - {"__future__", *without}))
     return f"{'; '.join(problems)}; allowed modules: {allowed}" if problems else None
 
 

@@ -41,7 +41,9 @@ class MapEntry(BaseModel):
     origin: str | None = Field(
         None, validation_alias=AliasChoices("origin", "repo"), max_length=500
     )
-    polarity: str | None = Field(None, description="dark or light obstacles")
+    polarity: Literal["dark", "light", "dark_obstacle", "light_obstacle"] | None = (
+        Field(None, description="dark or light obstacles")
+    )
     truth: str | None = Field(
         None, description="Picture of the obstacles in black, instead of the map."
     )

@@ -27,9 +27,13 @@ def test_the_built_in_controller(tdac, tmp_path):
     code, out, _ = tdac("synth", "--resume", "run")
     assert code == 0
     assert "has already finished" in out
-    code, out, err = tdac("verify", "run")
+    code, out, _ = tdac("verify", "run")  # on its own task set
+    assert code == 0
+    assert "few" in out.split()[0]
+    assert "verified" in out
+    code, out, err = tdac("verify", "run", "--task", "maze", "-n", "2")
     assert (code, out) == (2, "")
-    assert "no single task: give --set run/set.yaml" in err
+    assert "-n needs --set NAME" in err
     code, out, _ = tdac("runs", ".", "--json")
     (row,) = json.loads(out)
     assert (row["status"], row["go_on"]) == ("selected", "")

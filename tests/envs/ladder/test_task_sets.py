@@ -94,7 +94,7 @@ def test_the_key_is_that_of_the_words():
     [
         (("dve", 0), r"unknown split 'dve'; .* \(did you mean 'dev'\?\)"),
         (("hidden", 0), "split 'hidden' needs a salt"),
-        (("hidden", 0, b"short"), "expected a salt of 16 to 4096 bytes, got 5"),
+        (("hidden", 0, b"short"), "the salt has 5 bytes; expected 16 to 4096"),
         (("dev", 0, SALT), "split 'dev' has a public salt"),
         (("dev", -1), "expected index"),
         (("dev", 1.5), "expected index"),
@@ -116,7 +116,7 @@ def test_worlds_that_do_not_exist(arguments, message):
         ({"observed": ["gps"]}, "observed.0: "),
         ({"map": True}, "a set with `map: true` needs `frame: map`"),
         ({"disturbances": {"odometry_noise": 0.1}}, "need `odometry` in `observed`"),
-        ({"horizon": {"least": 9, "most": 8}}, "expected least to be at most most"),
+        ({"horizon": {"least": 9, "most": 8}}, "`least` to be at most `most`, got 9 and 8"),
         ({"name": "a/b"}, "name: "),
         ({"schema": 2}, "schema: "),
     ],
