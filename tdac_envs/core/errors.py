@@ -85,7 +85,8 @@ def _reason(problem: Any) -> str:
         return _REASONS[kind]
     if kind == "union_tag_invalid":
         tag, known = limits["tag"], limits["expected_tags"]
-        return f"unknown {limits['discriminator']} '{tag:.60}'; expected one of {known}"
+        name = limits["discriminator"].strip("'")
+        return f"unknown {name} '{tag:.60}'; expected one of {known}"
     if kind in _LIMITS:
         key, text = _LIMITS[kind]
         if key == "ge" and 0.0 < limits[key] < 1e-6:
@@ -124,6 +125,7 @@ _REASONS = {
     "extra_forbidden": "unknown key",
     "missing": "is missing",
     "model_type": "expected a mapping",
+    "tuple_type": "expected a list",
 }
 _LIMITS = {
     "greater_than_equal": ("ge", "at least"),

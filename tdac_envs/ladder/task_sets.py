@@ -257,8 +257,7 @@ class TaskSet:
             )
         if salt is not None and not LEAST_SALT <= len(salt) <= MOST_SALT:
             raise TaskError(
-                f"the salt has {len(salt)} bytes; expected {LEAST_SALT} to "
-                f"{MOST_SALT}"
+                f"the salt has {len(salt)} bytes; expected {LEAST_SALT} to {MOST_SALT}"
             )
         if self.files is not None and split == "hidden":
             salt = bytes.fromhex(self.files.hidden_sha256 or "")

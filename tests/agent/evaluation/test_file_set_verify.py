@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
@@ -43,6 +43,18 @@ def test_the_barn_score_takes_the_given_length(barn):
     scores = sorted(episode.barn_score for episode in report.episodes)
     assert scores == pytest.approx([50 / steps[0], 80 / steps[0]])
     assert set(report.by_generator) == {"barn"}
+
+
+def test_the_unit_of_an_interval_is_a_world(tmp_path, barn):
+    """Ten runs on each of two worlds say what two worlds do, and no more."""
+    path = tmp_path / "barn.yaml"
+    again = path.read_text().replace("[test]}", "[test], runs: 10}")
+    path.write_text(f"{again}disturbances: {{wheel_slip: 0.01}}\n")
+    tasks = load_set(path)
+    report = verify_on_set(AHEAD, tasks, "test", 20)
+    assert (report.worlds, report.successes) == (20, 20)
+    assert report.interval.low == pytest.approx(0.158, abs=0.001)
+    assert most_worlds(tasks, "test") == 2
 
 
 def test_more_worlds_than_there_are(barn):

@@ -18,6 +18,7 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.evaluation.ledger import user_ledger
 from tdac_agent.evaluation.set_report import SetReport, clock_dependence
 from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.judge.set_checks import static_checks
 from tdac_agent.verification.judge.set_files import level_params, write_files
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -445,6 +446,27 @@ def test_the_command(tdac, tmp_path):
     code, out, _ = tdac("verify", str(still), "--set", "unknown")
     assert code == 1
     assert "not verified: rejected at 95.0 %" in out
+
+
+def test_our_own_controller_by_its_name(tdac):
+    """As in bench, evaluate and play; a file of this name needs its suffix."""
+    words = ("--set", "known", "--split", "dev", "-n", "1", "--json")
+    code, out, _ = tdac("verify", "builtin", *words)
+    assert code == 0
+    assert json.loads(out)["provenance"]["controller_sha256"] == sha256_of(
+        KNOWN.read_bytes()
+    )
+
+
+def test_few_hidden_worlds_of_a_generator_have_no_row(judge, tmp_path, monkeypatch):
+    """It would tell a single world."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    salt = tmp_path / "my.salt"
+    salt.write_bytes(b"a salt of some bytes, for rows")
+    report = verify_on_set(
+        STILL, load_set("unknown"), "hidden", 5, salt_file=salt, judge=judge
+    )
+    assert (report.worlds, report.by_generator) == (5, {})
 
 
 def test_the_command_tells_a_refused_file(tdac, tmp_path):

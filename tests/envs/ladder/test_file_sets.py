@@ -188,6 +188,7 @@ def test_tasks_that_are_not_feasible(folder):
         ({"goal": [500, 20]}, r"20\.png.*goal \(500, 20\) lies outside"),
         ({"goal": [22, 20]}, r"20\.png.*within the tolerance"),
         ({"goal": "there"}, "index.json, task 0: goal: "),
+        ({"polarity": "blue"}, "index.json, task 0: polarity: "),
         ({"file": "no.png"}, r"no\.png: "),
         ({"file": "../mine.yaml"}, "mine.yaml is not in the folder"),
     ],
@@ -373,6 +374,7 @@ def test_the_shipped_worlds_of_barn():
         ({"tests": ["other"]}, "`tests`: there is no world 'other'"),
         ({"tests": ["wall"], "splits": ["test"]}, "needs the splits train, dev and"),
         ({"runs": 0}, "runs"),
+        ({"runs": 2}, "`runs` needs `disturbances` that are random"),
     ],
 )
 def test_worlds_for_tests_that_are_refused(tmp_path, worlds, message):

@@ -116,9 +116,21 @@ def test_worlds_that_do_not_exist(arguments, message):
         ({"observed": ["gps"]}, "observed.0: "),
         ({"map": True}, "a set with `map: true` needs `frame: map`"),
         ({"disturbances": {"odometry_noise": 0.1}}, "need `odometry` in `observed`"),
-        ({"horizon": {"least": 9, "most": 8}}, "`least` to be at most `most`, got 9 and 8"),
+        (
+            {"horizon": {"least": 9, "most": 8}},
+            "`least` to be at most `most`, got 9 and 8",
+        ),
         ({"name": "a/b"}, "name: "),
         ({"schema": 2}, "schema: "),
+        ({"robot": {"radius": 0}}, "robot: radius: expected more than 0, got 0"),
+        ({"robot": {"kind": "turtle"}}, r"robot: kind: "),
+        (
+            {"disturbances": {"wheelslip": 0.1}},
+            r"did you mean 'disturbances.wheel_slip'",
+        ),
+        ({"worlds": [{"name": "mazez"}]}, "unknown name 'mazez'; expected one of"),
+        ({"movers": "crowd:20"}, "movers: expected a list"),
+        ({"movers": [{"kind": "bounce", "count": "x"}]}, "movers.0.count: "),
     ],
 )
 def test_files_that_are_refused(set_yaml, values, message):
@@ -129,7 +141,26 @@ def test_files_that_are_refused(set_yaml, values, message):
     assert "\n" not in str(caught.value)
 
 
+def test_a_number_stands_for_both_ends(set_yaml):
+    """Of the numbers that are drawn for each world."""
+    movers = {"kind": "bounce", "count": 3, "speed": 15, "radius": [4, 6]}
+    (group,) = load_set(set_yaml(movers=[movers])).file.movers
+    assert (group.count, group.speed, group.radius) == ((3, 3), (15, 15), (4, 6))
+
+
+def test_a_folder_is_the_set_that_is_in_it(tmp_path):
+    """Its name is that of the folder."""
+    place = tmp_path / "narrow"
+    place.mkdir()
+    (place / "set.yaml").write_text("worlds: [{name: mazes}]\n")
+    assert load_set(place).name == load_set(place / "set.yaml").name == "narrow"
+
+
 def test_unknown_sets(tmp_path):
+    with pytest.raises(
+        TaskError, match="expected the name or path of a task set, got 3"
+    ):
+        load_set(3)
     with pytest.raises(TaskError, match=r"'unkown'; .* \(did you mean 'unknown'\?\)"):
         load_set("unkown")
     with pytest.raises(TaskError, match=r"no\.yaml: No such file"):
