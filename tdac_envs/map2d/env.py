@@ -333,6 +333,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self._view = None if setup.metric is None else MetricView(setup.metric)
         if self._view is not None:
             space = self._view.space(space)
+            self.info_of = partial(_metric_info, self._view)
         self.observation_space = space  # type: ignore[assignment]
         self.robot = Robot.blank(setup.nominal.robot.n_rays, self.delay)
         self.robot.constants[:] = setup.constants()
@@ -365,19 +366,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self._begin_trail()
         if self.render_mode == "human":
             self.render()
-        info = info_of(robot.outcome.tolist())
-        return self._observation(), self._told(info)
-
-    def step(
-        self, action: NDArray[np.float32]
-    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Runs one time step with the wheel speeds of an action.
-
-        Raises:
-            ValueError: The action is not two finite numbers.
-        """
-        seen, reward, terminated, truncated, info = super().step(action)
-        return seen, reward, terminated, truncated, self._told(info)
+        return self._observation(), self.info_of(robot.outcome.tolist())
 
     def discs(self) -> NDArray[np.float64]:
         """The movers as they are now, shape (n, 3): x, y, radius, px."""
@@ -430,9 +419,6 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 seen["odometry"] = self._odometry()
         return seen if self._view is None else self._view.seen(seen)
 
-    def _told(self, info: dict[str, Any]) -> dict[str, Any]:
-        return info if self._view is None else self._view.info(info)
-
     def _begin_trail(self) -> None:
         super()._begin_trail()
         steps = math.ceil(GHOST_SECONDS / self.task.dt)
@@ -459,6 +445,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         return self._scene.frame(
             robot.state[:3].tolist(), robot.ranges, self._trail, status, self._ghosts
         )
+
+
+def _metric_info(view: MetricView, outcome: list[float]) -> dict[str, Any]:
+    """The `info` of a step in metres."""
+    return view.info(info_of(outcome))
 
 
 def _noise_of(sensor: str, given: float | None) -> float:
