@@ -274,9 +274,8 @@ def test_runs_on_the_same_world(judge, tmp_path, files):
     barn = {"barn": str(BUILT_IN / "barn" / "worlds.json"), "splits": ["test"]}
     barn |= {"tests": [], "runs": 2}
     path = tmp_path / "twice.yaml"
-    path.write_text(
-        yaml.safe_dump({"worlds": barn, "goal_tolerance": 40, "horizon": short})
-    )
+    own = {"goal_tolerance": 40, "horizon": short, "disturbances": {"wheel_slip": 0.01}}
+    path.write_text(yaml.safe_dump({"worlds": barn, **own}))
     assert load_set(path).runs("test", 500) == 2
     found = bench(files[:2], [path], "test", 3, out=tmp_path / "a", judge=judge)
     assert {row.worlds for row in found.rows} == {3}
