@@ -25,6 +25,7 @@ from tdac_agent.studio.pages.questions import Questions
 from tdac_agent.studio.pages.robustness import Robustness
 from tdac_envs.core.errors import TdacError
 
+ELSEWHERE = "This run was not begun here: its verdict is what its files say."
 SECONDS = 1.0
 """Between two looks at the folder."""
 
@@ -123,6 +124,9 @@ class Watching:
         self._download.visible = done
         self._judge.visible = done and status == "selected"
         self._wishes.clear()
+        if row and is_from_elsewhere(self._folder):
+            with self._wishes:
+                ui.label(ELSEWHERE).classes("note text-sm")
         if not running and not row and job is not None:
             with self._wishes:
                 last = job.output().strip().splitlines()[-1:] or ["nothing was printed"]
@@ -203,6 +207,14 @@ def _state(folder: Path, job: Job | None) -> _State:
     judged = len(list(folder.glob("iterations/*/*/report.json")))
     version = f"{judged}-{row['status']}" if judged or not running else ""
     return row, running, version, output
+
+
+def is_from_elsewhere(folder: Path) -> bool:
+    """Whether another installation, or nobody known, began a run."""
+    try:
+        return not is_own_folder(load_run(folder))
+    except (TdacError, OSError):
+        return False
 
 
 def _progress(row: dict[str, Any], running: bool) -> str:

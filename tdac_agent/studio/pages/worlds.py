@@ -72,6 +72,7 @@ class Looking:
                 "world", value=0, min=0, precision=0, on_change=self._open
             ).classes("w-28")
             ui.button("Next", on_click=self._next).props("outline")
+        self._about = ui.label().classes("note text-sm")
         with ui.row().classes("w-full gap-6 items-start"):
             self._image = ui.interactive_image().classes("board world")
             with ui.column().classes("gap-3 w-80"):
@@ -132,6 +133,7 @@ class Looking:
         if chosen != self._chosen:  # another one has been chosen meanwhile
             return
         self._tasks = tasks
+        self._about.text = tasks.file.description
         self._show(picture)
         self._facts.clear()
         with self._facts:

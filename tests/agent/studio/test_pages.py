@@ -120,6 +120,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     press(page, "Write and verify a controller")
     wait(page, lambda b: "/run?" in b.current_url)
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    assert "not begun here" not in text_of(page)
     frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
     page.switch_to.frame(frame)
     says(page, "all tests passed" if "all tests" in text_of(page) else "verified")

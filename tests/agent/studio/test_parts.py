@@ -7,16 +7,20 @@ import shlex
 import time
 import zipfile
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
+import tdac_agent
 from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.studio.board import board_of, names_of
 from tdac_agent.studio.draft import Draft, check
 from tdac_agent.studio.driving import Drive
 from tdac_agent.studio.jobs import job_of, jobs, start
+from tdac_agent.studio.pages.run import is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
@@ -129,6 +133,13 @@ def test_what_is_not_unpacked(tmp_path, files, message):
     with pytest.raises(ValueError, match=message):
         unpack(packed(**files), "run", tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_from_elsewhere_is_marked():
+    """Such as the recorded run that `tdac demo` replays."""
+    folder = Path(tdac_agent.__file__).parent / "runs" / "demo"
+    assert load_run(folder).status == "verified"
+    assert is_from_elsewhere(folder)
 
 
 def test_keys_drive(tmp_path):
