@@ -47,6 +47,18 @@ def policy(obs):
     off = math.remainder(math.atan2(goal_y - y, goal_x - x) - heading, math.tau)
     return (0.5, -0.5) if off > 0.3 else (-0.5, 0.5) if off < -0.3 else (1.0, 1.0)
 """
+WEBOTS = """
+from controller import Robot
+
+robot = Robot()
+step = int(robot.getBasicTimeStep())
+wheels = [robot.getDevice(f"{side} wheel motor") for side in ("left", "right")]
+for wheel, speed in zip(wheels, (2.0, 1.5)):
+    wheel.setPosition(float("inf"))
+    wheel.setVelocity(speed)
+while robot.step(step) != -1:
+    pass
+"""
 TASK = """
 map: ../../plan.png
 start: [90, 302, -1.57]
@@ -110,21 +122,27 @@ def place(tmp_path_factory):
     cv2.imwrite(str(folder / "depot.png"), room)
     ros = "image: depot.png\nresolution: 0.05\norigin: [-2, 0, 0]\n"
     (folder / "depot.yaml").write_text(ros)
-    for name in ("controller.py", "mine.py", "other.py", "my_controller.py"):
+    for name in ("controller.py", "mine.py", "other.py"):
         (folder / name).write_text(GO_TO_GOAL)
     (folder / "plans" / "kitchen").mkdir(parents=True)
     (folder / "plans" / "kitchen" / "task.yaml").write_text(TASK)
     (folder / "my.yaml").write_text(CAMPAIGN)
     (folder / "my.salt").write_bytes(bytes(range(32)))
     (folder / "mine.j2").write_text("Write controller.py. {{ env_description }}")
-    for name, world in (("maze", "maze"), ("my", "arena"), ("empty", "arena")):
+    for name, world in (("maze", "maze"), ("my", "arena")):
         shutil.copy(world_file(world), folder / f"{name}.wbt")
+    arena, _, _ = world_file("arena").read_text().partition("WoodenBox {")
+    (folder / "empty.wbt").write_text(arena)
+    (folder / "my_controller.py").write_text(WEBOTS)
     yield folder
     patch.undo()
 
 
 def prepare(line, folder):
     """Runs, once, the commands that one needs to have been run."""
+    if "LegoTallWall" in line:  # a node that is not modelled
+        world = folder / "my.wbt"
+        world.write_text(world.read_text() + "LegoTallWall {\n}\n")
     for pattern, first in PREPARED.items():
         mark = folder / "prepared" / str(abs(hash(first)))
         if not re.search(pattern, line) or mark.exists():

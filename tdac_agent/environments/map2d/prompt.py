@@ -17,6 +17,8 @@ HOW_THE_MAP_WAS_MADE = {
     *("score", "score_terms", "notes"),
 }
 """Fields of `params.json` that no controller needs."""
+CONVERSIONS = ("to_pixels", "to_cell", "to_point")
+"""Functions of `sensors.py` that only a controller in metres needs."""
 METRES = """\
 The world is an occupancy grid made from a map image. Places and lengths are metres in
 the frame of the map (that of ROS `map.yaml`): the outer corner of the lower-left pixel
@@ -57,7 +59,10 @@ def facts_of(task: Task) -> dict[str, Any]:
         "height": grid.height,
         "tolerance": nominal.goal_tolerance,
         "radius": nominal.body_radius,
-        "sensors_text": needed_part(SENSORS_FILE.read_text(encoding="utf-8")),
+        "sensors_text": needed_part(
+            SENSORS_FILE.read_text(encoding="utf-8"),
+            CONVERSIONS if setting.view is None else (),
+        ),
         "length": setting.told_in.length,
         "frame": setting.params.frame,
         **({} if setting.view is None else _in_metres(setting)),

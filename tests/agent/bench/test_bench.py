@@ -57,6 +57,7 @@ def files(tmp_path):
     return [f"{name}={tmp_path / f'{name}.py'}" for name in sources]
 
 
+@pytest.mark.slow
 def test_rows_are_what_verify_says(judge, tmp_path, files):
     """Scores, contacts and intervals; a broken entrant is a row with its reason."""
     out = tmp_path / "out"
@@ -177,6 +178,7 @@ def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
         assert own.time_score.mean() == pytest.approx(row.time.value)
 
 
+@pytest.mark.slow
 def test_folders_together(judge, tmp_path, level, files):
     """Two benches on the same worlds are one; on others they are refused."""
     given = {"split": "dev", "judge": judge}
@@ -195,6 +197,7 @@ def test_folders_together(judge, tmp_path, level, files):
         merged([tmp_path / "0", tmp_path / "3"])
 
 
+@pytest.mark.slow
 def test_processes_of_an_executor(tdac, judge, tmp_path, level, files, monkeypatch):
     """The same bytes as one after another; a broken file is a row here, too."""
     monkeypatch.chdir(tmp_path)

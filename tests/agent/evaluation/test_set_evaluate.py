@@ -100,6 +100,7 @@ def test_finished_policies_are_not_driven_again(judge, tmp_path, level, files):
         evaluate_on_set(files[:1], tasks, **given)
 
 
+@pytest.mark.slow
 def test_builtin_is_the_controller_of_the_level(judge, level):
     """A set with the observations of `unknown` has that of `unknown`."""
     known = evaluate_on_set(["builtin"], load_set("known"), "dev", 2, judge=judge)

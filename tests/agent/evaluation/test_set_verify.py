@@ -431,6 +431,7 @@ def test_arguments_that_are_refused(set_yaml, arguments, message):
         verify_on_set(STILL, set_yaml(), *arguments)
 
 
+@pytest.mark.slow
 def test_the_command(tdac, tmp_path):
     """Exit 0 with scores or an accepting test, 1 with a rejecting one."""
     words = ("verify", str(KNOWN), "--set", "known", "--split", "dev", "-n", "2")

@@ -135,6 +135,7 @@ def test_what_sensors_convert(files):
         assert (left > 0) == (name == "metres")
 
 
+@pytest.mark.slow
 def test_the_folder_runs_by_itself(files):
     """`sensors.show` uses the frame of its params.json."""
     folder, _ = files

@@ -121,6 +121,7 @@ def test_its_evaluation_is_that_of_the_judge(trained, algo):
     assert steps == pytest.approx(best.mean_length)
 
 
+@pytest.mark.slow
 def test_a_policy_in_a_bench(trained, few, tmp_path, monkeypatch):
     """Beside a program, on hidden worlds, too; one that does not fit is a row."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
