@@ -271,7 +271,10 @@ def _map_picture(cells: BoolGrid, scale: float) -> Image:
     elif scale > 1.0:
         cover = cv2.resize(cover, size, interpolation=cv2.INTER_NEAREST)
     floor = (cover < 0.5).astype(np.uint8)
-    distance = cv2.distanceTransform(floor, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    # Without any wall, what OpenCV returns depends on the number of its threads.
+    distance: NDArray[Any] = np.full(floor.shape, 1e3, np.float32)
+    if not floor.all():
+        distance = cv2.distanceTransform(floor, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     # A colour table, to draw a whole map within milliseconds.
     entries = cv2.convertScaleAbs(distance, alpha=_ENTRIES_PER_PX)
     picture: Any = cv2.applyColorMap(entries, _map_colours())

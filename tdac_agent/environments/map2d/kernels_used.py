@@ -31,6 +31,7 @@ def use_kernels() -> None:
     earliest_arrival(disc.task)
     drive_by_orca(disc.task, Disturbances(), np.random.default_rng(0))
     velocity_among(np.zeros((1, 5)), np.zeros(2), 1.0, 1.0, 0.1, np.empty(2))
+    use_robot("TDAC-Map2D-v0", map=grid.cells, sensor="sonar", **ends)
     rays.sees(disc.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
     _use_ladder()
 
