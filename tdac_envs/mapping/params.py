@@ -5,9 +5,15 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
 from tdac_envs.core.arguments import LARGEST, SMALLEST, positive
 from tdac_envs.core.errors import MapError, TaskError, first_problem
@@ -127,6 +133,12 @@ class MapParams(_Record):
         description="Units of the file's places and lengths, and of what a controller "
         "observes. Here, they are always pixels.",
     )
+
+    @model_validator(mode="after")
+    def _has_a_scale(self) -> Self:
+        if self.frame == "metres" and self.resolution is None:
+            raise ValueError("the frame `metres` needs a resolution")
+        return self
 
     def written(self) -> dict[str, Any]:
         """The contents of the file: in metres of the map's frame, if `frame` says so.

@@ -13,7 +13,7 @@ from small import small_cells
 
 from tdac_agent import verify
 from tdac_agent.tasks.task import lay_out, load_task
-from tdac_envs.core.errors import TaskError
+from tdac_envs.core.errors import MapError, TaskError
 from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.mapping.params import MapParams
@@ -99,6 +99,18 @@ def test_the_folder_of_a_task_is_the_same_task(files):
     assert params["robot"]["radius"] == pytest.approx(0.6)
     assert params["origin"][2] == units.heading(0.0)
     assert MapParams.load(folder / "run" / "params.json") == task.params
+
+
+def test_metres_without_a_resolution_are_refused(files):
+    """The file is named."""
+    folder, _ = files
+    place = lay_out(load_task(folder / "metres.yaml"), folder / "damaged")
+    params = json.loads((place / "params.json").read_text())
+    (place / "params.json").write_text(json.dumps({**params, "resolution": None}))
+    with pytest.raises(
+        MapError, match=r"damaged/params\.json: the frame `metres` needs"
+    ):
+        load_task(place)
 
 
 def kit_of(folder):
