@@ -152,10 +152,10 @@ def prepare(line, folder):
         assert "Traceback" not in text, text
         mark.parent.mkdir(exist_ok=True)
         mark.touch()
-        if first.startswith("tdac train"):
-            for name in ("ppo.zip", "a.zip", "b.zip", "runs/ppo/policy.zip"):
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy(folder / LEARNED, folder / name)
+    for name in re.findall(r"[\w/-]+\.zip", line):
+        if not (folder / name).exists():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(folder / LEARNED, folder / name)
 
 
 def test_what_is_left_out():
