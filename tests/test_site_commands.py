@@ -5,6 +5,7 @@ interrupted command does. Left out are commands that need a key, another program
 person or a display: `LEFT_OUT` says which.
 """
 
+import functools
 import re
 import shlex
 import shutil
@@ -138,20 +139,22 @@ def place(tmp_path_factory):
     patch.undo()
 
 
+@functools.cache
+def run_once(first, folder):
+    """Runs a command that others need."""
+    code, text = run(first, folder, 600)
+    assert code in (0, 1), f"{first}\n{text}"
+    assert "Traceback" not in text, text
+
+
 def prepare(line, folder):
     """Runs, once, the commands that one needs to have been run."""
     if "LegoTallWall" in line:  # a node that is not modelled
         world = folder / "my.wbt"
         world.write_text(world.read_text() + "LegoTallWall {\n}\n")
     for pattern, first in PREPARED.items():
-        mark = folder / "prepared" / str(abs(hash(first)))
-        if not re.search(pattern, line) or mark.exists():
-            continue
-        code, text = run(first, folder, 600)
-        assert code in (0, 1), f"{first}\n{text}"
-        assert "Traceback" not in text, text
-        mark.parent.mkdir(exist_ok=True)
-        mark.touch()
+        if re.search(pattern, line):
+            run_once(first, folder)
     for name in re.findall(r"[\w/-]+\.zip", line):
         if not (folder / name).exists():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)

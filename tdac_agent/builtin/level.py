@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tdac_agent.models.provider import PermanentFault, Reply, Request
+from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
@@ -29,7 +30,8 @@ class LevelController:
     def __init__(self, tasks: TaskSet) -> None:
         level = level_of(tasks)
         self._file = LEVELS / f"{level}.py"
-        self.missing = () if level is not None else (_none_for(tasks),)
+        instead = "name a model with --learner"
+        self.missing = () if level is not None else (_none_for(tasks, instead),)
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`. Adds no rules.
@@ -46,11 +48,27 @@ class LevelController:
         return Reply(f"```python\n{source}```\n", notes=(note,))
 
 
-def _none_for(tasks: TaskSet) -> str:
+def controller_of(tasks: TaskSet, instead: str) -> Path:
+    """The file of our own controller for a set.
+
+    Args:
+        tasks: The task set.
+        instead: What to do without one, for the message.
+
+    Raises:
+        TaskError: There is none.
+    """
+    level = level_of(tasks)
+    if level is None:
+        raise TaskError(_none_for(tasks, instead))
+    return LEVELS / f"{level}.py"
+
+
+def _none_for(tasks: TaskSet, instead: str) -> str:
     known = ", ".join(path.stem for path in sorted(LEVELS.glob("*.py")))
     return (
         f"no built-in controller for the task set {tasks.name} (only for {known}, and "
-        "for sets with the same observations): name a model with --learner"
+        f"for sets with the same observations): {instead}"
     )
 
 

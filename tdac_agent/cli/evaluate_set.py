@@ -27,8 +27,9 @@ MOST_CAUSES = 6
 WIDEST = 16
 LEGEND = (
     "knows: what the policy may use; sensors include the goal, and the pose where the "
-    "set observes it. 95 %: exact interval of the rate (Clopper-Pearson). SCT: success "
-    "x OT / T; SPL: success x L / driven; BARN: at most 0.5 (docs/task-sets.md). hit: "
+    "set observes it. 95 %: exact interval of the rate (Clopper-Pearson); with several "
+    "runs on each world, worlds are resampled. SCT: success x OT / T; SPL: success x "
+    "L / driven; BARN: at most 0.5 (docs/task-sets.md). hit: "
     "episodes with a contact; late: at the horizon; error: the policy's own, or too "
     "much CPU time."
 )

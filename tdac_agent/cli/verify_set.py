@@ -14,20 +14,20 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.progress import TimeRemainingColumn as TimeLeft
 from rich.table import Table
 
-from tdac_agent.builtin.level import LEVELS, level_of
+from tdac_agent.builtin.level import controller_of
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.robust_view import decision_text, error_rates, rate_text
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.set_flags import SetFlags
 from tdac_agent.cli.verify import check_folder, controller_file
-from tdac_agent.errors import ControllerFileError
+from tdac_agent.evaluation.entrants import BUILTIN
 from tdac_agent.evaluation.kept_sets import REPORT_FILE, TRAJECTORIES
 from tdac_agent.evaluation.set_report import HiddenCount, Scores, SetReport
 from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.ladder.task_sets import load_set
 
 MOST_CAUSES = 6
 
@@ -46,7 +46,10 @@ def run(
         check_folder(out)
     assert flags.name is not None
     tasks = load_set(flags.name, flags.hidden_folder)
-    file = _file_of(controller, tasks)
+    if controller == BUILTIN:
+        file = controller_of(tasks, "give a file")
+    else:
+        file = controller_file(controller)
     if flags.worlds is not None:
         tasks.check_count(flags.split or "test", flags.worlds, "-n")
     gc.freeze()
@@ -92,20 +95,6 @@ def run(
         show(report, console)
         _say_how_to_go_on(report, flags.name, controller, out, console)
     return 0 if report.passed else 1
-
-
-def _file_of(controller: str, tasks: TaskSet) -> Path:
-    """The controller file of a path, or that of our own controller of the set.
-
-    Raises:
-        ControllerFileError: There is none.
-    """
-    if controller != "builtin":
-        return controller_file(controller)
-    level = level_of(tasks)
-    if level is None:
-        raise ControllerFileError(f"there is no builtin for the set {tasks.name}")
-    return LEVELS / f"{level}.py"
 
 
 def show(report: SetReport, console: Console) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from tdac_agent.builtin.level import LEVELS, level_of
+from tdac_agent.builtin.level import controller_of
 from tdac_agent.episodes.sb3_file import SavedPolicy
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.entrants import Entrant, entrants_of
@@ -55,14 +55,7 @@ def _builtin(entrant: Entrant, tasks: TaskSet) -> Entrant:
     Raises:
         TaskError: There is none.
     """
-    level = level_of(tasks)
-    if level is None:
-        known = ", ".join(path.stem for path in sorted(LEVELS.glob("*.py")))
-        raise TaskError(
-            f"no built-in controller for the task set {tasks.name} (only for {known}, "
-            "and for sets with the same observations): leave out builtin"
-        )
-    file = LEVELS / f"{level}.py"
+    file = controller_of(tasks, "leave out builtin")
     policy = replace(entrant.policy, file=file)
     return replace(entrant, policy=policy, sha256=sha256_of(file.read_bytes()))
 

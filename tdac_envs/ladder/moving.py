@@ -42,6 +42,8 @@ def _both_ends(given: Any) -> Any:
 
 
 Count = Annotated[int, Field(ge=0, le=MOST_MOVERS)]
+ENDS = AfterValidator(ordered), BeforeValidator(_both_ends)
+"""Of two ends between which a number is drawn."""
 
 
 class MoversOfSet(BaseModel):
@@ -50,15 +52,9 @@ class MoversOfSet(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     kind: Literal["bounce", "crowd"]
-    count: Annotated[
-        tuple[Count, Count], AfterValidator(ordered), BeforeValidator(_both_ends)
-    ]
-    speed: Annotated[
-        tuple[Speed, Speed], AfterValidator(ordered), BeforeValidator(_both_ends)
-    ] = Field(description="px/s")
-    radius: Annotated[
-        tuple[Length, Length], AfterValidator(ordered), BeforeValidator(_both_ends)
-    ] = Field(description="px")
+    count: Annotated[tuple[Count, Count], *ENDS]
+    speed: Annotated[tuple[Speed, Speed], *ENDS] = Field(description="px/s")
+    radius: Annotated[tuple[Length, Length], *ENDS] = Field(description="px")
 
     @model_validator(mode="after")
     def _check(self) -> Self:

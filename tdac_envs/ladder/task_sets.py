@@ -76,7 +76,9 @@ class TaskSet:
     def different(self, split: str) -> int | None:
         """Number of different worlds of a split; None if there is no limit."""
         count = self.count(split)
-        return count if self.files is None or not count else count // self.files.runs
+        return (
+            count if self.files is None or count is None else count // self.files.runs
+        )
 
     def runs(self, split: str, worlds: int) -> int:
         """How often the first `worlds` worlds of a split are the same ones.
@@ -86,7 +88,8 @@ class TaskSet:
         """
         if self.files is None or self.files.runs == 1:
             return 1
-        different = self.files.counts[split] // self.files.runs
+        different = self.different(split)
+        assert different is not None
         if worlds > different and worlds % different:
             raise TaskError(
                 f"worlds {worlds}: set {self.name!r} has {different} different ones "

@@ -74,8 +74,10 @@ class Setup(DriveSetup):
         view = np.radians(robot.field_of_view_deg)
         object.__setattr__(self, "directions", fan(float(view), robot.n_rays))
         one_of("sensor", self.sensor, ("rays", "sonar"))
-        ring = Sonar(float(view), robot.n_rays, robot.range_max)
-        object.__setattr__(self, "sonar", ring if self.sensor == "sonar" else None)
+        sonar = None
+        if self.sensor == "sonar":
+            sonar = Sonar(float(view), robot.n_rays, robot.range_max)
+        object.__setattr__(self, "sonar", sonar)
         cast = Cast.of(self.movers, self.nominal)
         object.__setattr__(self, "cast", cast)
         if self.movers and self.variation == "nominal" and self.source is None:

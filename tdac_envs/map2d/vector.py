@@ -72,9 +72,8 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         self._view = _view_of([setup.metric for setup in self.setups])
         noisy = [setup.has_inexact_ranges for setup in self.setups]
         self._noisy = np.flatnonzero(noisy)
-        self._listening = [
-            i for i, setup in enumerate(self.setups) if setup.sonar is not None
-        ]
+        sonar = [setup.sonar is not None for setup in self.setups]
+        self._listening = np.flatnonzero(sonar)
         # Last observation: robots that are not reset keep their noise.
         self._ranges = self.robots.ranges.copy()
 
@@ -135,8 +134,9 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         }
 
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
-        for i in np.intersect1d(self._listening, robots).tolist():
-            self._listen(i, observations["ranges"])
+        if self._listening.size:
+            for i in np.intersect1d(self._listening, robots).tolist():
+                self._listen(i, observations["ranges"])
         if self._noisy.size:
             for i in np.intersect1d(self._noisy, robots).tolist():
                 exact, random = self.robots.ranges[i], self._noise(i)
