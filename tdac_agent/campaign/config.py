@@ -11,12 +11,15 @@ from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.choice import OFFLINE, check_name
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.runs.run_record import Setting
+from tdac_agent.set_synthesis.synthesize import EPISODES, FEEDBACK_EPISODES
+from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.storage.shipped import shipped, shipped_names
 from tdac_agent.storage.yaml_file import read_yaml
 
 SAME = "same"
 """Optimizer name for the learner itself."""
 Keep = Literal["all", "records"]
+_VARIED = ("learners", "optimizers", "settings", "prompts")
 
 
 class CampaignError(RunError):
@@ -32,7 +35,10 @@ class CampaignConfig(BaseModel):
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")
     about: str = ""
     tasks: tuple[str, ...] = Field(
-        min_length=1, description="Bundled names, or files relative to this file."
+        (), description="Bundled names, or files relative to this file."
+    )
+    sets: tuple[str, ...] = Field(
+        (), description="Names of task sets, or files relative to this file."
     )
     learners: tuple[str, ...] = Field(min_length=1, description="As for --learner.")
     optimizers: tuple[str, ...] = Field(
@@ -51,11 +57,21 @@ class CampaignConfig(BaseModel):
         description="N of `best of N`; by default as many answers as the dual tier "
         "may request: K·(J + 2).",
     )
+    episodes: int = Field(
+        EPISODES, ge=2, le=MOST_EPISODES, description="As for --episodes, on sets."
+    )
+    feedback_episodes: int = Field(
+        FEEDBACK_EPISODES,
+        ge=1,
+        le=MOST_EPISODES,
+        description="As for --feedback-episodes, on sets.",
+    )
     seed: int | None = Field(
         None,
         ge=0,
-        description="Seed of the jittered starts of the first run; later runs count up "
-        "from it. The default is derived from a secret of the installation.",
+        description="Seed of the first run, which determines jittered starts and the "
+        "worlds of `dev`; later runs count up from it. The default is derived from a "
+        "secret of the installation.",
     )
     base_url: str | None = Field(None, description="As for --base-url.")
     max_output: int = Field(MAX_OUTPUT_TOKENS, ge=1, description="As for --max-output.")
@@ -67,7 +83,9 @@ class CampaignConfig(BaseModel):
 
     @model_validator(mode="after")
     def _usable(self) -> Self:
-        for name in ("tasks", "learners", "optimizers", "settings", "prompts"):
+        if not self.tasks and not self.sets:
+            raise ValueError("tasks: expected at least one, or one of sets")
+        for name in ("tasks", "sets", *_VARIED):
             values = getattr(self, name)
             again = {value for value in values if values.count(value) > 1}
             if again:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.campaign.gate import gated
-from tdac_agent.campaign.plan import PlannedRun
+from tdac_agent.campaign.plan import SET_LIMITS, PlannedRun
 from tdac_agent.errors import Fault
 from tdac_agent.executors.executor import Work
 from tdac_agent.models.budget import Budget
@@ -20,21 +20,29 @@ from tdac_agent.models.choice import choose_models
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run
+from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT
+from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.installation import seed_of
+from tdac_agent.tasks.installation import seed_from
 from tdac_agent.tasks.task import Task, load_task
-from tdac_agent.tasks.task_file import TASK_FILE
+from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 PATIENCE = RetryPolicy(seconds=4 * 3600.0)
 """Longer than for a single run, since no user is waiting."""
-REPORTED_EVENTS = frozenset({"call.intent", "call.fault", "verify.start"})
-REPORTED_KEYS = ("event", "kind", "k", "j", "fault")
+REPORTED_EVENTS = frozenset(
+    {"call.intent", "call.fault", "verify.start", "drive.start", "hidden.start"}
+)
+REPORTED_KEYS = ("event", "kind", "k", "j", "fault", "what", "worlds")
 RUNS = "runs"
 """Folder of the runs, inside the campaign folder."""
-KEPT = frozenset({RUN_FILE, JOURNAL, TASK_FILE, "controller.py", "report.json"})
+KEPT = frozenset(
+    {RUN_FILE, JOURNAL, TASK_FILE, "controller.py", "report.json"}
+    | {SET_FILE, HIDDEN_REPORT}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,11 +168,11 @@ def _synthesize(
     planned: PlannedRun, terms: Terms, judge: WarmJudge | None, tell: Tell | None
 ) -> Run:
     cell = planned.cell
-    task = _task(cell.task)
+    about: Task | TaskSet = _set(cell.task) if cell.on_set else _task(cell.task)
     models = choose_models(
         cell.learner,
         cell.optimizer,
-        task.setting,
+        about if isinstance(about, TaskSet) else about.setting,
         cell.base_url,
         key_over_http=terms.key_over_http,
     )
@@ -173,37 +181,41 @@ def _synthesize(
     optimizer = learner if same else gated(models[1], gates, terms.workers)
     folder = terms.runs / planned.name
     folder.parent.mkdir(parents=True, exist_ok=True)
-    return synthesize(
-        task,
-        learner,
-        optimizer,
-        out=folder,
-        iterations=cell.iterations,
-        patience=cell.patience,
-        refine=cell.refine,
-        seed=_seed(planned, task, folder),
-        base_url=cell.base_url,
-        prompt=cell.prompt,
-        max_output=cell.max_output,
-        budget=terms.budget(planned),
-        index=planned.index,
-        retry=PATIENCE,
-        judge=judge,
-        on_event=tell,
-    )
+    wanted: dict[str, Any] = {
+        "out": folder,
+        "iterations": cell.iterations,
+        "patience": cell.patience,
+        "refine": cell.refine,
+        "base_url": cell.base_url,
+        "prompt": cell.prompt,
+        "max_output": cell.max_output,
+        "budget": terms.budget(planned),
+        "index": planned.index,
+        "retry": PATIENCE,
+        "judge": judge,
+        "on_event": tell,
+    }
+    if isinstance(about, TaskSet):
+        wanted["seed"] = _seed(planned, about.sha256, folder)
+        limits = {name: getattr(cell, name) for name in SET_LIMITS}
+        return synthesize_on_set(
+            about, learner, optimizer, then_verify=True, **limits, **wanted
+        )
+    wanted["seed"] = _seed(planned, about.sha256(), folder)
+    return synthesize(about, learner, optimizer, **wanted)
 
 
-def _seed(planned: PlannedRun, task: Task, folder: Path) -> int:
+def _seed(planned: PlannedRun, task_sha256: str, folder: Path) -> int:
     """The seed of a run: the planned one, the recorded one, or an unpredictable one.
 
-    Runs of all kinds with the same index on the same task share it.
+    Runs of all kinds with the same index on the same task or task set share it.
     """
     if planned.seed is not None:
         return planned.seed
     before = existing_run(folder)
     if before is not None and before.seed is not None:
         return before.seed
-    return seed_of(f"run {planned.index}".encode(), task)
+    return seed_from(f"run {planned.index}".encode(), task_sha256)
 
 
 @functools.lru_cache(maxsize=1)
@@ -217,6 +229,12 @@ def _budget(terms: Terms) -> Budget:
 def _task(name: str) -> Task:
     """A task; cached, since a worker executes many runs of it."""
     return load_task(name, trust=True)  # permitted when the campaign was planned
+
+
+@functools.lru_cache(maxsize=4)
+def _set(name: str) -> TaskSet:
+    """A task set; cached likewise."""
+    return load_set(name)
 
 
 def read_outcome(name: str, runs: Path) -> Outcome | None:

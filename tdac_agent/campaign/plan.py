@@ -16,12 +16,24 @@ from tdac_agent.campaign.config import SAME, CampaignConfig, CampaignError
 from tdac_agent.campaign.permissions import required_permissions
 from tdac_agent.models.choice import Options, answers_sha256
 from tdac_agent.models.prices import FREE
-from tdac_agent.prompting.prompt import VARIANTS, generate_prompt, load_template
+from tdac_agent.prompting.prompt import (
+    VARIANTS,
+    PromptTemplate,
+    generate_prompt,
+    load_template,
+)
+from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.run_record import Setting
+from tdac_agent.tasks.setting import Setting as TaskSetting
 from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.tasks.task_file import bundled_task
 from tdac_agent.tasks.trust import permit
 from tdac_agent.verification.verify import suite_sha256
+from tdac_envs.ladder.set_file import shipped_names as shipped_sets
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+
+SET_LIMITS = ("episodes", "feedback_episodes")
+"""Limits of runs on task sets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,8 +42,8 @@ class Cell:
 
     Attributes:
         folder: Name of the folder of its runs.
-        task: Bundled name or absolute path of the task.
-        task_name: Name of the task, for display.
+        task: Bundled name or absolute path of the task or task set.
+        task_name: Name of the task, or `set NAME`, for display.
         learner: LLM1.
         optimizer: LLM2.
         setting: Which parts of the loop are used.
@@ -41,6 +53,8 @@ class Cell:
         refine: Whether failures become rules.
         base_url: URL of the models' server; None for the default.
         max_output: Token limit of an answer.
+        episodes: Limit of simulated episodes on a task set; None on a task.
+        feedback_episodes: Most episodes of a test on a task set; None on a task.
     """
 
     folder: str
@@ -55,6 +69,13 @@ class Cell:
     refine: bool
     base_url: str | None
     max_output: int
+    episodes: int | None = None
+    feedback_episodes: int | None = None
+
+    @property
+    def on_set(self) -> bool:
+        """Whether its runs are on a task set."""
+        return self.episodes is not None
 
     @property
     def asks_models(self) -> bool:
@@ -69,7 +90,7 @@ class PlannedRun:
     Attributes:
         cell: Kind of the run.
         index: Number of the run within its cell, from 1.
-        seed: Seed of its jittered starts; None if the file has none.
+        seed: Seed of its jittered starts or worlds; None if the file has none.
     """
 
     cell: Cell
@@ -122,14 +143,25 @@ class Plan:
     Attributes:
         cells: The kinds of run, in the file's order.
         tasks: Tasks by `Cell.task`.
+        sets: Task sets by `Cell.task`.
         runs: R: runs of each kind.
         seed: Seed of the first run; None if the file has none.
     """
 
     cells: tuple[Cell, ...]
     tasks: Mapping[str, Task]
+    sets: Mapping[str, TaskSet]
     runs: int
     seed: int | None
+
+    def setting(self, cell: Cell) -> TaskSetting | TaskSet:
+        """What models may have to know of the task of a cell."""
+        return self.sets[cell.task] if cell.on_set else self.tasks[cell.task].setting
+
+    def question(self, cell: Cell, template: PromptTemplate) -> str:
+        """The first question of a cell's runs."""
+        about = (self.sets if cell.on_set else self.tasks)[cell.task]
+        return _question(about, template)
 
     def __len__(self) -> int:
         return len(self.cells) * self.runs
@@ -162,31 +194,36 @@ def make_plan(config: CampaignConfig, base: Path, *, trust: bool = False) -> Pla
     tasks = {
         name: (path := _task(name, base), load_task(path)) for name in config.tasks
     }
+    sets = {name: (path := _set(name, base), load_set(path)) for name in config.sets}
     wishes = required_permissions(config, base, [task for _, task in tasks.values()])
     permit(f"the campaign {config.name}", wishes, trust=trust)
     tasks = {n: (path, replace(t, trusted=True)) for n, (path, t) in tasks.items()}
     prompts = {name: _prompt(name, base) for name in config.prompts}
+    about: list[tuple[str, Task | TaskSet]] = [*tasks.values(), *sets.values()]
     kinds = product(
-        config.tasks,
+        about,
         config.learners,
         config.optimizers,
         config.prompts,
         config.settings,
     )
     cells = [
-        _cell(
-            config, *tasks[task], learner, optimizer, prompt, prompts[prompt], setting
-        )
-        for task, learner, optimizer, prompt, setting in kinds
+        _cell(config, *each, learner, optimizer, prompt, prompts[prompt], setting)
+        for each, learner, optimizer, prompt, setting in kinds
     ]
-    known = dict(tasks.values())
-    return Plan(tuple(dict.fromkeys(cells)), known, config.runs, config.seed)
+    return Plan(
+        tuple(dict.fromkeys(cells)),
+        dict(tasks.values()),
+        dict(sets.values()),
+        config.runs,
+        config.seed,
+    )
 
 
 def _cell(
     config: CampaignConfig,
     path: str,
-    task: Task,
+    task: Task | TaskSet,
     learner: str,
     optimizer: str,
     prompt: str,
@@ -195,8 +232,9 @@ def _cell(
 ) -> Cell:
     """One kind of run; its folder name has a hash of all that its runs depend on."""
     iterations, patience, refine = loop_of(config, setting)
+    on_set = isinstance(task, TaskSet)
     facts: dict[str, Any] = {
-        "task_name": task.name,
+        "task_name": f"set {task.name}" if on_set else task.name,
         "learner": learner,
         "optimizer": learner if optimizer == SAME else optimizer,
         "setting": setting,
@@ -206,23 +244,44 @@ def _cell(
         "base_url": config.base_url,
         "max_output": config.max_output,
     }
-    question = generate_prompt(task, (), load_template(template))
+    if on_set:
+        facts |= {name: getattr(config, name) for name in SET_LIMITS}
+    question = _question(task, load_template(template))
     hashed = facts | {
-        "task": task.sha256(),
-        "suite": suite_sha256(task),
+        **_hashes(task),
         "prompt": hashlib.sha256(question.encode("utf-8", "surrogatepass")).hexdigest(),
         "version": importlib.metadata.version("tdac"),
         "seed": config.seed,
     }
-    options = Options(task.setting, config.base_url)
+    setting_of_task = task if isinstance(task, TaskSet) else task.setting
+    options = Options(setting_of_task, config.base_url)
     for model in {facts["learner"], facts["optimizer"]}:
         answers = answers_sha256(model, options)
         if answers is not None:
             hashed[f"answers of {model}"] = answers
     digest = hashlib.sha256(json.dumps(hashed, sort_keys=True).encode()).hexdigest()
-    shown = [task.name, learner, setting, *([prompt] if prompt != "full" else [])]
+    shown = [
+        facts["task_name"],
+        learner,
+        setting,
+        *([prompt] if prompt != "full" else []),
+    ]
     folder = f"{slug('-'.join(shown))}-{digest[:8]}"
     return Cell(folder=folder, task=path, prompt=template, **facts)
+
+
+def _question(about: Task | TaskSet, template: PromptTemplate) -> str:
+    """The first question on a task or task set."""
+    if isinstance(about, TaskSet):
+        return set_prompt(about, (), template)
+    return generate_prompt(about, (), template)
+
+
+def _hashes(about: Task | TaskSet) -> dict[str, str]:
+    """Hashes of what a candidate is tested with."""
+    if isinstance(about, TaskSet):
+        return {"set": about.sha256}
+    return {"task": about.sha256(), "suite": suite_sha256(about)}
 
 
 def loop_of(config: CampaignConfig, setting: Setting) -> tuple[int, int, bool]:
@@ -246,6 +305,11 @@ def slug(text: str, most: int = 60) -> str:
 def _task(name: str, base: Path) -> str:
     """The name of a bundled task, or the absolute path of another one."""
     return name if bundled_task(name) is not None else str((base / name).resolve())
+
+
+def _set(name: str, base: Path) -> str:
+    """The name of a shipped task set, or the absolute path of another one."""
+    return name if name in shipped_sets() else str((base / name).resolve())
 
 
 def _prompt(name: str, base: Path) -> str:

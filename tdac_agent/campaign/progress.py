@@ -176,4 +176,8 @@ def _activity(record: dict[str, Any]) -> str:
             return f"{at} waiting after a {record.get('fault')} fault"
         case "verify.start":
             return f"{at} testing"
+        case "drive.start":
+            return f"{at} {record.get('what')}: {record.get('worlds')} worlds"
+        case "hidden.start":
+            return "hidden worlds"
     return at

@@ -106,11 +106,13 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
         finally:
             # Imported late: pandas and scipy take seconds to load.
             from tdac_agent.campaign.collect import collect, write_tables
-            from tdac_agent.cli.campaign_summary import show_summary
+            from tdac_agent.cli.campaign_summary import show_set_summary, show_summary
 
-            summary = write_tables(collect(plan, terms.runs), folder)
-            show_summary(summary, console)
-            _print_ending(console, progress, folder, wanted)
+            tables = collect(plan, terms.runs)
+            written = write_tables(tables, plan, folder)
+            show_summary(tables.summary, console)
+            show_set_summary(tables.set_summary, console)
+            _print_ending(console, progress, folder, wanted, written)
     if as_json:
         sys.stdout.write(json.dumps(_as_json(progress, folder), indent=2) + "\n")
     return _exit_code(progress)
@@ -135,11 +137,10 @@ def check_models(
     """
     models: list[Provider] = []
     for cell in dict.fromkeys(planned.cell for planned in remaining):
-        setting = plan.tasks[cell.task].setting
         models += choose_models(
             cell.learner,
             cell.optimizer,
-            setting,
+            plan.setting(cell),
             cell.base_url,
             key_over_http=key_over_http,
         )
@@ -183,13 +184,17 @@ def _print_notes(console: Console, plan: Plan, terms: Terms) -> None:
 
 
 def _print_ending(
-    console: Console, progress: Progress, folder: Path, wanted: CampaignCommand
+    console: Console,
+    progress: Progress,
+    folder: Path,
+    wanted: CampaignCommand,
+    tables: list[Path],
 ) -> None:
     for problem, count in progress.problems.most_common():
         print_sentences(console, f"{count} × {problem}", "yellow")
     console.print(progress_line(progress), soft_wrap=True)
     console.print(
-        f"  tables: {folder}/runs.csv, candidates.csv, summary.csv\n"
+        f"  tables in {folder}: {', '.join(path.name for path in tables)}\n"
         f"  HTML report: tdac report {shlex.quote(str(folder))}",
         soft_wrap=True,
     )

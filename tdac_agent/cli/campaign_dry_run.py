@@ -21,7 +21,7 @@ from tdac_agent.models.choice import check_name
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.prices import PriceList, load_prices, price_file
 from tdac_agent.prompting.prompt import load_template
-from tdac_agent.synthesis.cost_forecast import CostForecast, predict_cost
+from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 
 LEGEND = (
     "K: iterations; J: repairs per iteration; questions: of all runs if no controller "
@@ -107,15 +107,15 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
 
 
 def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
-    forecast: CostForecast = predict_cost(
-        plan.tasks[cell.task],
+    forecast: CostForecast = cost_of(
+        cell.task_name,
+        plan.question(cell, load_template(cell.prompt)),
         cell.learner,
         cell.optimizer,
         prices,
         iterations=cell.iterations,
         patience=cell.patience,
         refine=cell.refine,
-        template=load_template(cell.prompt),
         base_url=cell.base_url,
         max_output=cell.max_output,
     )

@@ -71,7 +71,8 @@ class LiveView:
 
     def _line(self, outcome: Outcome) -> str:
         at = "" if outcome.tau is None else f" in iteration {outcome.tau}"
-        why = f": {outcome.reason}" if outcome.reason else ""
+        told = outcome.reason and outcome.status != "verified"
+        why = f": {outcome.reason}" if told else ""
         done = f"[{self._progress.finished}/{self._progress.planned}]"
         colour = COLOURS.get(outcome.status, "yellow")
         status = f"{outcome.status}{at}, {format_duration(outcome.seconds)}{why}"

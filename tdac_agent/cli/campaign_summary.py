@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from rich.markup import escape
 
 from tdac_agent.cli.campaign_table import ALWAYS, SOMETIMES, make_table
 from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.metrics import Rate
 
 WIDE = 110
@@ -18,41 +20,88 @@ WIDE = 110
 
 
 def show_summary(summary: pd.DataFrame, console: Console) -> None:
-    """Prints the metrics of each kind of run."""
+    """Prints the metrics of each kind of run on single tasks."""
     if summary.empty:
         return
-    names = [*ALWAYS]
-    names += [n for n in SOMETIMES[1:] if summary[n].nunique() > 1]
-    if (summary["optimizer"] != summary["learner"]).any():
-        names.insert(2, "optimizer")
-    between = " " if console.width >= WIDE else "\n"
-    rows = summary.to_dict("records")
-    figures = [_figures(row, between) for row in rows]
-    shown = [name for name in figures[0] if any(one[name] for one in figures)]
-    table = make_table(names, shown)
-    for row, figure in zip(rows, figures, strict=True):
-        labels = [Path(str(row[n])).name if n == "prompt" else row[n] for n in names]
-        table.add_row(*(escape(str(n)) for n in labels), *(figure[n] for n in shown))
-    console.print(table)
+    shown = _show(summary, "task", console, _figures)
     legend = "95 % intervals; τ: mean iteration of success (docs/metrics.md)"
     if "tokens" in shown:
         legend += "\ntokens and USD: of all runs, per verified run"
     console.print(f"[dim]{legend}[/]", soft_wrap=True)
 
 
-def _figures(row: dict[Any, Any], between: str) -> dict[str, str]:
-    """The cells of a kind of run by column; empty where there is no value."""
+def show_set_summary(summary: pd.DataFrame, console: Console) -> None:
+    """Prints the metrics of each kind of run on task sets."""
+    if summary.empty:
+        return
+    shown = _show(summary, "task set", console, _set_figures)
+    legend = (
+        "verified: on hidden worlds, each run with its own; time score: of the "
+        "selected controllers on the worlds by which they were selected (optimistic); "
+        "episodes: simulated on dev, per run; 95 % intervals over runs"
+    )
+    if "tokens" in shown:
+        legend += "; tokens and USD: of all runs, per verified run"
+    print_sentences(console, legend, "dim")
+
+
+def _show(
+    summary: pd.DataFrame,
+    about: str,
+    console: Console,
+    figures_of: Callable[[dict[Any, Any], str], dict[str, str]],
+) -> list[str]:
+    """Prints a row per kind of run; returns the columns of figures."""
+    names = [*ALWAYS]
+    names += [n for n in SOMETIMES[1:] if summary[n].nunique() > 1]
+    if (summary["optimizer"] != summary["learner"]).any():
+        names.insert(2, "optimizer")
+    between = " " if console.width >= WIDE else "\n"
+    rows = summary.to_dict("records")
+    figures = [figures_of(row, between) for row in rows]
+    shown = [name for name in figures[0] if any(one[name] for one in figures)]
+    heads = [about if name == "task" else name for name in names]
+    table = make_table(heads, shown)
+    for row, figure in zip(rows, figures, strict=True):
+        labels = [Path(str(row[n])).name if n == "prompt" else row[n] for n in names]
+        table.add_row(*(escape(str(n)) for n in labels), *(figure[n] for n in shown))
+    console.print(table)
+    return shown
+
+
+def _verified(row: dict[Any, Any], between: str) -> str:
     done, halted = row["verified"], int(row["censored"])
-    cost = row["cost_per_verified"] if row["tokens_per_verified"] > 0 else math.nan
     verified = f"[{'green' if done else 'red'}]{done}[/]/{row['R']}"
     if halted:
         verified += f"{between}[yellow]{halted} halted[/]"
+    return verified
+
+
+def _set_figures(row: dict[Any, Any], between: str) -> dict[str, str]:
     return {
-        "verified": verified,
+        "verified": _verified(row, between),
+        "rate": _rate(row, "rate", between),
+        "time score": _rate(row, "time_score", between),
+        "episodes": _number(row["episodes_mean"], ",.0f"),
+        **_spent(row),
+    }
+
+
+def _figures(row: dict[Any, Any], between: str) -> dict[str, str]:
+    """The cells of a kind of run by column; empty where there is no value."""
+    return {
+        "verified": _verified(row, between),
         "SR": _rate(row, "sr", between),
         "CS(K)": _rate(row, "cs_K", between),
         "first pass": _rate(row, "first_pass", between),
         "τ": _number(row["tau_mean"], ".1f"),
+        **_spent(row),
+    }
+
+
+def _spent(row: dict[Any, Any]) -> dict[str, str]:
+    cost = row["cost_per_verified"] if row["tokens_per_verified"] > 0 else math.nan
+    return {
         "tokens": _number(row["tokens_per_verified"], ",.0f"),
         "USD": _number(cost, ".3f"),
     }

@@ -26,9 +26,9 @@ from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.resume import check_own, existing_run
 from tdac_agent.runs.run_record import Run
+from tdac_agent.runs.selection_record import CandidateFigures, Selection
 from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT
 from tdac_agent.set_synthesis.resume import resume_set_arguments
-from tdac_agent.set_synthesis.selection import CandidateFigures, Selection
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_envs.core.intake import RECORD_BYTES, read_file

@@ -23,8 +23,9 @@ from tdac_agent.cli.set_flags import SetFlags
 from tdac_agent.cli.verify import check_folder, controller_file
 from tdac_agent.evaluation.entrants import BUILTIN
 from tdac_agent.evaluation.kept_sets import REPORT_FILE, TRAJECTORIES
-from tdac_agent.evaluation.set_report import HiddenCount, Scores, SetReport
+from tdac_agent.evaluation.set_report import HiddenCount, SetReport
 from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
+from tdac_agent.runs.selection_record import Scores
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.ladder.task_sets import load_set

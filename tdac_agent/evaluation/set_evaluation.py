@@ -10,8 +10,9 @@ from pydantic import ConfigDict, Field
 
 from tdac_agent.evaluation.evaluation_report import PairedComparison
 from tdac_agent.evaluation.robust_report import Interval
-from tdac_agent.evaluation.set_report import Scores, SetReport
+from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.metrics.exact import sign_test
+from tdac_agent.runs.selection_record import Scores
 from tdac_agent.storage.printable_record import PrintableRecord
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ from tdac_agent.evaluation.robust_report import (
 )
 from tdac_agent.metrics.exact import CONFIDENCE
 from tdac_agent.metrics.rates import rate_of_runs
+from tdac_agent.runs.selection_record import Scores
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.verification.judge.sequential import SequentialTest
@@ -78,15 +79,6 @@ class SetProvenance(_Record):
             limits={},
             versions=dict(versions()),
         )
-
-
-class Scores(_Record):
-    """Means over a fixed number of worlds, each in [0, 1]."""
-
-    success: float
-    time: float = Field(description="Success weighted by completion time, SCT.")
-    path: float = Field(description="Success weighted by path length, SPL.")
-    barn: float = Field(description="The metric of BARN, at most 0.5.")
 
 
 class HiddenCount(_Record):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +17,10 @@ from tdac_agent.metrics import (
     Rate,
     first_pass,
     frames_of,
+    set_frame_of,
     success_rate,
     summarise,
+    summarise_sets,
 )
 from tdac_agent.metrics.table import KIND
 from tdac_agent.plots import figure_bytes, plot_cumulative_success, plot_success_rates
@@ -32,21 +34,24 @@ class Overview:
     """Summary of all runs.
 
     Attributes:
-        kinds: A row per kind of run: its labels, and its metrics as text.
+        kinds: A row per kind of run on tasks: its labels, and its metrics as text.
+        set_kinds: Likewise for runs on task sets.
         assumptions: A line per kind of interval: what it assumes.
         figures: Title and data URL of each figure; none for a single run.
     """
 
     kinds: tuple[dict[str, Any], ...]
+    set_kinds: tuple[dict[str, Any], ...]
     assumptions: tuple[str, ...]
     figures: tuple[tuple[str, str], ...]
 
 
 def overview_of(told: Sequence[Told]) -> Overview:
     """Summarises runs of one or several kinds."""
-    frames = frames_of([one.run for one in told])
-    if not len(frames.runs):  # only runs on task sets
-        return Overview((), (), ())
+    frames = frames_of(one.run for one in told)
+    set_kinds = tuple(_set_kinds(told))
+    if not len(frames.runs):
+        return Overview((), set_kinds, (), ())
     table = summarise(frames).to_dict("records")
     groups = [frames.only(**{name: row[name] for name in KIND}) for row in table]
     working = {str(one.run.folder) for one in told if one.status == "running"}
@@ -54,7 +59,7 @@ def overview_of(told: Sequence[Told]) -> Overview:
         _kind(row, int(group.runs["run"].isin(working).sum()))
         for row, group in zip(table, groups, strict=True)
     )
-    return Overview(kinds, _assumptions(groups), _figures(frames))
+    return Overview(kinds, set_kinds, _assumptions(groups), _figures(frames))
 
 
 def _kind(row: dict[str, Any], working: int) -> dict[str, Any]:
@@ -65,6 +70,29 @@ def _kind(row: dict[str, Any], working: int) -> dict[str, Any]:
         "first_pass": _rate(row, "first_pass"),
         "cs_K": _rate(row, "cs_K"),
         "tau_mean": _number(row["tau_mean"], ".1f"),
+        **_means(row),
+    }
+
+
+def _set_kinds(told: Sequence[Told]) -> Iterator[dict[str, Any]]:
+    """Yields the rows of the runs on task sets."""
+    frame = set_frame_of(one.run for one in told)
+    working = {str(one.run.folder) for one in told if one.status == "running"}
+    for row in summarise_sets(frame).to_dict("records") if len(frame) else ():
+        same = (frame[list(KIND)] == [row[name] for name in KIND]).all(axis=1)
+        running = int(frame[same]["run"].isin(working).sum())
+        yield row | {
+            "running": running,
+            "cut_short": row["censored"] - running,
+            "rate": _rate(row, "rate"),
+            "time_score": _rate(row, "time_score"),
+            "episodes_mean": _number(row["episodes_mean"], ",.0f"),
+            **_means(row),
+        }
+
+
+def _means(row: dict[str, Any]) -> dict[str, str]:
+    return {
         "tokens_per_verified": _number(row["tokens_per_verified"], ",.0f"),
         "cost_per_verified": _number(row["cost_per_verified"], ".3f"),
         "seconds_mean": _number(row["seconds_mean"], ",.0f"),

@@ -39,12 +39,18 @@ if TYPE_CHECKING:
         unbiased_success_rate,
     )
     from tdac_agent.metrics.reported import load_reported
+    from tdac_agent.metrics.set_runs import (
+        SET_RUN_COLUMNS,
+        set_frame_of,
+        summarise_sets,
+    )
     from tdac_agent.metrics.table import summarise
 
 __all__ = [
     "ASSUMPTIONS",
     "CANDIDATE_COLUMNS",
     "RUN_COLUMNS",
+    "SET_RUN_COLUMNS",
     "Comparison",
     "Frames",
     "Rate",
@@ -63,8 +69,10 @@ __all__ = [
     "load_reported",
     "pass_at_n",
     "rate_of_runs",
+    "set_frame_of",
     "success_rate",
     "summarise",
+    "summarise_sets",
     "unbiased_success_rate",
 ]
 
@@ -75,6 +83,7 @@ _HOME = {
     "Frames": "frames",
     "RUN_COLUMNS": "frames",
     "Rate": "rates",
+    "SET_RUN_COLUMNS": "set_runs",
     "best_of_n": "compare",
     "candidate_rate": "rates",
     "compare_paired": "compare",
@@ -90,8 +99,10 @@ _HOME = {
     "load_reported": "reported",
     "pass_at_n": "compare",
     "rate_of_runs": "rates",
+    "set_frame_of": "set_runs",
     "success_rate": "rates",
     "summarise": "table",
+    "summarise_sets": "set_runs",
     "unbiased_success_rate": "rates",
 }
 

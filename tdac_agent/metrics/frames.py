@@ -83,7 +83,10 @@ def load_frames(*folders: Path) -> Frames:
 
 
 def frames_of(runs: Iterable[Run]) -> Frames:
-    """Builds frames from run records; those of runs on task sets are left out."""
+    """Builds frames from run records; those of runs on task sets are left out.
+
+    `set_frame_of` has these.
+    """
     rows: list[Row] = []
     candidates: list[Row] = []
     for run in runs:

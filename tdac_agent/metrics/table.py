@@ -70,8 +70,8 @@ def _metrics(frames: Frames) -> dict[str, object]:
         "cs_K_high": high,
         "candidate_rate": candidate_rate(frames).value,
         "tau_mean": float(runs["tau"].mean()) if verified else float("nan"),
-        "tokens_per_verified": _per_verified(runs["tokens"], verified),
-        "cost_per_verified": _per_verified(runs["cost"], verified),
+        "tokens_per_verified": per_verified(runs["tokens"], verified),
+        "cost_per_verified": per_verified(runs["cost"], verified),
         "seconds_mean": float(runs["seconds"].mean()),
     }
 
@@ -80,7 +80,7 @@ def _with_interval(name: str, rate: Rate) -> dict[str, float]:
     return {name: rate.value, f"{name}_low": rate.low, f"{name}_high": rate.high}
 
 
-def _per_verified(spent: pd.Series, verified: int) -> float:
+def per_verified(spent: pd.Series, verified: int) -> float:
     """Total spent per verified run; NaN if none is verified or some is unknown."""
     if not verified or spent.isna().any():
         return float("nan")

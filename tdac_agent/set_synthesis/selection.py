@@ -5,55 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from pydantic import ConfigDict, Field
-
-from tdac_agent.evaluation.set_report import Scores, scores_of
+from tdac_agent.evaluation.set_report import scores_of
+from tdac_agent.runs.selection_record import Scores
 from tdac_agent.set_synthesis.trials import Candidate
-from tdac_agent.storage.printable_record import PrintableRecord
-
-
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class CandidateFigures(_Record):
-    """How a candidate drove, in numbers of worlds of `dev`."""
-
-    k: int
-    j: int
-    controller_sha256: str
-    feedback_worlds: int
-    feedback_reached: int
-    validation_worlds: int
-    validation_reached: int
-    validation_time: float | None = Field(
-        description="Mean time score; None without validation worlds."
-    )
-
-
-class Selection(_Record):
-    """`report.json` of a run on a task set: what was selected, and from what.
-
-    The figures of the selected candidate are optimistic: it was chosen by them.
-    """
-
-    schema_version: int = 1
-    set: str
-    set_sha256: str
-    split: str = "dev"
-    first_feedback: int = Field(description="Number of the first feedback world.")
-    first_validation: int = Field(description="Number of the first validation world.")
-    episodes: int = Field(description="Limit of simulated episodes.")
-    feedback_used: int
-    validation_used: int
-    candidates: tuple[CandidateFigures, ...]
-    k: int = Field(description="Iteration of the selected candidate.")
-    j: int = Field(description="Its edit.")
-    controller_sha256: str
-    optimistic: Scores | None = Field(
-        description="Its scores on validation worlds; None without any."
-    )
-    stopped: str = Field("", description="What ended the writing early.")
 
 
 def scores_of_selected(candidate: Candidate) -> Scores | None:

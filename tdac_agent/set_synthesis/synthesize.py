@@ -18,14 +18,14 @@ from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
-from tdac_agent.set_synthesis.hidden import verify_hidden
-from tdac_agent.set_synthesis.search import search
-from tdac_agent.set_synthesis.selection import (
+from tdac_agent.runs.selection_record import (
+    SELECTION_FILE,
     CandidateFigures,
     Selection,
-    scores_of_selected,
-    select,
 )
+from tdac_agent.set_synthesis.hidden import verify_hidden
+from tdac_agent.set_synthesis.search import search
+from tdac_agent.set_synthesis.selection import scores_of_selected, select
 from tdac_agent.set_synthesis.trials import BLOCKS, MOST_EPISODES, Candidate, Trials
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
@@ -267,7 +267,9 @@ def _deliver(
         stopped=stopped,
     )
     write_atomic(run.controller, chosen.source)
-    write_atomic(run.folder / "report.json", selection.model_dump_json(indent=2) + "\n")
+    write_atomic(
+        run.folder / SELECTION_FILE, selection.model_dump_json(indent=2) + "\n"
+    )
     values = selection.model_dump(mode="json", exclude={"candidates", "stopped"})
     trials.recorder.event("select.end", **values)
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from pydantic import ConfigDict, Field
 
 from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
@@ -11,11 +9,9 @@ from tdac_agent.models.prices import PriceList
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.models.tariff import MAX_COST, UNKNOWN_COST, UNPRICED_TOKENS, Tariff
 from tdac_agent.models.tokens import estimate_tokens, most_tokens
-from tdac_agent.prompting.prompt import FULL, PromptTemplate, generate_prompt
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.synthesis.dialogue import MAX_ASKS
 from tdac_agent.synthesis.workload import tokens_asked, whole
-from tdac_agent.tasks.task import Task
 
 
 class CostForecast(PrintableRecord):
@@ -55,32 +51,6 @@ class CostForecast(PrintableRecord):
     prices_dated: str
 
 
-def predict_cost(
-    task: Task,
-    learner: str,
-    optimizer: str,
-    prices: PriceList,
-    *,
-    template: PromptTemplate = FULL,
-    **limits: Any,
-) -> CostForecast:
-    """Predicts the first prompt and the cost bounds of a run, without a model or key.
-
-    Args:
-        task: What the controller must do.
-        learner: Name of LLM1.
-        optimizer: Name of LLM2.
-        prices: Prices of the models.
-        template: Template of the question for a new controller.
-        **limits: Further arguments of `cost_of`.
-
-    Raises:
-        PromptError: The template cannot be used.
-    """
-    question = generate_prompt(task, (), template)
-    return cost_of(task.name, question, learner, optimizer, prices, **limits)
-
-
 def cost_of(
     name: str,
     prompt: str,
@@ -96,7 +66,7 @@ def cost_of(
     max_cost: float | None = None,
     max_tokens: int | None = None,
 ) -> CostForecast:
-    """Predicts the cost bounds of a run from its first question.
+    """Predicts the cost bounds of a run from its first question; asks no model.
 
     Args:
         name: Name of the task or task set.

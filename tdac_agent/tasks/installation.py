@@ -68,7 +68,12 @@ def seed_of(source: bytes, task: Task) -> int:
     It depends on the controller's bytes, the task and the secret: on one machine the
     same file gets the same verdict, and no author can predict the starts.
     """
-    about = f"starts|{hashlib.sha256(source).hexdigest()}|{task.sha256()}"
+    return seed_from(source, task.sha256())
+
+
+def seed_from(source: bytes, task_sha256: str) -> int:
+    """Like `seed_of`, for the hash of a task or task set."""
+    about = f"starts|{hashlib.sha256(source).hexdigest()}|{task_sha256}"
     return int.from_bytes(keyed(about.encode())[: SEED_BITS // 8], "big")
 
 

@@ -43,7 +43,14 @@ def has_ended(process, seconds):
 
 
 def check_same_in_the_end(
-    folder, runs, kills, seconds, workers_of=children, flags=(), seed=0
+    folder,
+    runs,
+    kills,
+    seconds,
+    workers_of=children,
+    flags=(),
+    seed=0,
+    small_of=Small,
 ):
     """Kills again and again; then the campaign ends as one that nobody disturbed.
 
@@ -55,9 +62,10 @@ def check_same_in_the_end(
         workers_of: Gives the workers of a driver.
         flags: Of the command.
         seed: Of the moments.
+        small_of: Makes the campaign of a folder.
     """
-    small = Small(folder)
-    small.write(runs=runs)
+    small = small_of(folder)
+    small.write(runs=runs, seed=11)
     assert small.run(out="undisturbed")[0] == 0
     chance = random.Random(seed)
     for number in range(kills):

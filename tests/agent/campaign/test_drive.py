@@ -16,7 +16,7 @@ def plan_of(*learners, runs=3):
     """A plan of which nothing but the names matters."""
     common = ("dual tier", "full", 20, 1, True, None, 100)
     cells = [Cell(name, "maze", "maze", name, name, *common) for name in learners]
-    return Plan(tuple(cells), {}, runs, 0)
+    return Plan(tuple(cells), {}, {}, runs, 0)
 
 
 def carried_out(plan, come_of):

@@ -11,7 +11,7 @@ from tdac_agent.errors import Fault, RunError
 from tdac_agent.models.provider import PermanentFault
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.set_synthesis.selection import Selection
+from tdac_agent.runs.selection_record import Selection
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError

@@ -15,7 +15,7 @@ from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Request
 from tdac_agent.models.tariff import Tariff
 from tdac_agent.models.tokens import estimate_tokens
 from tdac_agent.prompting.prompt import generate_prompt
-from tdac_agent.synthesis.cost_forecast import predict_cost
+from tdac_agent.synthesis.cost_forecast import cost_of
 from tdac_agent.tasks.task import load_task
 
 PRICES = PriceList(
@@ -39,10 +39,10 @@ def own_settings(tmp_path, monkeypatch):
 
 def test_the_worst_case(small_task):
     """Every question of every iteration at list price, and three times as often."""
-    told = predict_cost(
-        small_task, "openai:dear", "openai:cheap", PRICES, iterations=3, patience=2
-    )
-    assert told.prompt == generate_prompt(small_task, ())
+    question = generate_prompt(small_task, ())
+    models = ("openai:dear", "openai:cheap")
+    told = cost_of("small", question, *models, PRICES, iterations=3, patience=2)
+    assert told.prompt == question
     assert told.questions == 3 * (1 + 2 + 1)
     tokens = estimate_tokens(told.prompt)
     assert told.prompt_tokens == tokens
@@ -57,15 +57,15 @@ def test_the_worst_case(small_task):
 
 def test_unknown_prices_are_said(small_task):
     """No price is never a price of nothing; another server has its own."""
-    told = predict_cost(small_task, "openai:none", "openai:cheap", PRICES)
+    question = generate_prompt(small_task, ())
+    told = cost_of("small", question, "openai:none", "openai:cheap", PRICES)
     assert told.unknown_prices == ("openai:none",)
     assert (told.first_cost, told.cost_once, told.cost_most) == (None, None, None)
     there = "http://localhost:1/v1"
-    told = predict_cost(
-        small_task, "openai:dear", "openai:dear", PRICES, base_url=there
-    )
+    models = ("openai:dear", "openai:dear")
+    told = cost_of("small", question, *models, PRICES, base_url=there)
     assert told.unknown_prices == ("openai:dear",)
-    told = predict_cost(small_task, "builtin", "builtin", PRICES)
+    told = cost_of("small", question, "builtin", "builtin", PRICES)
     assert (told.unknown_prices, told.cost_most) == ((), 0.0)
 
 

@@ -1,0 +1,74 @@
+"""`report.json` of a run on a task set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import ConfigDict, Field, ValidationError
+
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+
+SELECTION_FILE = "report.json"
+
+
+class _Record(PrintableRecord):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Scores(_Record):
+    """Means over a fixed number of worlds, each in [0, 1]."""
+
+    success: float
+    time: float = Field(description="Success weighted by completion time, SCT.")
+    path: float = Field(description="Success weighted by path length, SPL.")
+    barn: float = Field(description="The metric of BARN, at most 0.5.")
+
+
+class CandidateFigures(_Record):
+    """How a candidate drove, in numbers of worlds of `dev`."""
+
+    k: int
+    j: int
+    controller_sha256: str
+    feedback_worlds: int
+    feedback_reached: int
+    validation_worlds: int
+    validation_reached: int
+    validation_time: float | None = Field(
+        description="Mean time score; None without validation worlds."
+    )
+
+
+class Selection(_Record):
+    """`report.json` of a run on a task set: what was selected, and from what.
+
+    The figures of the selected candidate are optimistic: it was chosen by them.
+    """
+
+    schema_version: int = 1
+    set: str
+    set_sha256: str
+    split: str = "dev"
+    first_feedback: int = Field(description="Number of the first feedback world.")
+    first_validation: int = Field(description="Number of the first validation world.")
+    episodes: int = Field(description="Limit of simulated episodes.")
+    feedback_used: int
+    validation_used: int
+    candidates: tuple[CandidateFigures, ...]
+    k: int = Field(description="Iteration of the selected candidate.")
+    j: int = Field(description="Its edit.")
+    controller_sha256: str
+    optimistic: Scores | None = Field(
+        description="Its scores on validation worlds; None without any."
+    )
+    stopped: str = Field("", description="What ended the writing early.")
+
+
+def read_selection(folder: Path) -> Selection | None:
+    """What a run selected; None if there is no readable record."""
+    try:
+        content = parse_json(read_file(folder / SELECTION_FILE, RECORD_BYTES))
+        return Selection.model_validate(content)
+    except (OSError, ValueError, ValidationError):
+        return None
