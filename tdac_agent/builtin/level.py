@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tdac_agent.builtin.variation import varied
 from tdac_agent.models.provider import PermanentFault, Reply, Request
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import set_names
@@ -15,6 +16,8 @@ LEVELS = Path(__file__).with_name("levels")
 
 class LevelController:
     """A provider that answers with the controller of a level; see `Provider`.
+
+    Asked to improve a controller, it answers with other constants.
 
     Args:
         tasks: The task set.
@@ -43,6 +46,9 @@ class LevelController:
             raise PermanentFault(self.missing[0])
         if request.kind == "summarise":
             return Reply("```json\n[]\n```\n")
+        if request.kind == "improve":
+            source, notes = varied(request.controller or "", request.sample)
+            return Reply(f"```python\n{source}```\n", notes=notes)
         source = self._file.read_text(encoding="utf-8")
         note = f"the built-in controller of the level {self._file.stem}"
         return Reply(f"```python\n{source}```\n", notes=(note,))

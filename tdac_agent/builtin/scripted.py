@@ -110,23 +110,28 @@ class Scripted:
         if request.kind == "summarise":
             return Reply("```json\n[]\n```\n")
         number = self._number(request)
-        source = self._sources[request.kind][number]
+        source = self._sources[_kind_of(request)][number]
         return Reply(f"```python\n{source}```\n", notes=(f"script: no. {number + 1}",))
 
     def _number(self, request: Request) -> int:
         """Returns the index of the controller that answers a request."""
         run, k, j = request.sample
         script = self._script
-        choices = script.edit if request.kind == "edit" else script.generate
+        choices = script.generate if request.kind == "generate" else script.edit
         if not script.drawn:
             return min(k, len(choices)) - 1
-        kind = _KINDS.index(request.kind)
+        kind = _KINDS.index(_kind_of(request))
         # Each task has its own draws.
         task = zlib.crc32(request.prompt[: request.stable].encode())
         seed = [script.seed, task, run, k, j, kind, request.turn]
         random = np.random.default_rng(seed)
         weights = np.array([choice.weight for choice in choices])
         return int(random.choice(len(choices), p=weights / weights.sum()))
+
+
+def _kind_of(request: Request) -> Kind:
+    """The kind whose choices answer a request: those of `edit` also improve."""
+    return "generate" if request.kind == "generate" else "edit"
 
 
 def _source(choice: Choice, script: Path, setting: Setting | TaskSet) -> str:

@@ -170,7 +170,7 @@ def _activity(record: dict[str, Any]) -> str:
     at = f"k={record.get('k')} j={record.get('j')}"
     match record.get("event"):
         case "call.intent":
-            verb = {"generate": "writing", "edit": "editing"}
+            verb = {"generate": "writing", "edit": "editing", "improve": "improving"}
             return f"{at} {verb.get(str(record.get('kind')), 'writing rules')}"
         case "call.fault":
             return f"{at} waiting after a {record.get('fault')} fault"

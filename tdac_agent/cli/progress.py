@@ -17,7 +17,14 @@ _ANSWERS = (
     ("generate", "controller", "controllers"),
     ("edit", "edit", "edits"),
     ("summarise", "rule update", "rule updates"),
+    ("improve", "improvement", "improvements"),
 )
+VERBS = {
+    "generate": "writing",
+    "edit": "editing",
+    "summarise": "writing rules from the failures of",
+    "improve": "improving",
+}
 
 
 class Progress:
@@ -60,9 +67,7 @@ class Progress:
         elif kind == "prove.step":
             self._spinner.update(text=f"checking the suite: {record['doing']} …")
         elif kind == "call.intent":
-            verb = {"generate": "writing", "edit": "editing"}.get(
-                record["kind"], "writing rules from the failures of"
-            )
+            verb = VERBS[record["kind"]]
             self._spinner.update(
                 text=f"{at}  {verb} controller.py: {escape(record['model'])}"
             )

@@ -138,6 +138,15 @@ def synth(
             rich_help_panel=SETS,
         ),
     ] = None,
+    improve: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            min=32,
+            help="Further simulated episodes: vary the candidates that work, and "
+            "select the best of all.",
+            rich_help_panel=SETS,
+        ),
+    ] = None,
     then_verify: Annotated[
         bool,
         typer.Option(
@@ -173,7 +182,7 @@ def synth(
         "max_output": MAX_OUTPUT_TOKENS if max_output is None else max_output,
     }
     loop = {"iterations": k, "patience": j, "refine": refine}
-    on_set = SynthSetFlags(set_name, episodes, feedback_episodes, then_verify)
+    on_set = SynthSetFlags(set_name, episodes, feedback_episodes, improve, then_verify)
     if on_set != SynthSetFlags():
         from tdac_agent.cli import synth_set
 

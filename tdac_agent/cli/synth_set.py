@@ -26,7 +26,7 @@ from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.resume import check_own, existing_run
 from tdac_agent.runs.run_record import Run
-from tdac_agent.runs.selection_record import CandidateFigures, Selection
+from tdac_agent.runs.selection_record import CandidateFigures, Improvement, Selection
 from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT
 from tdac_agent.set_synthesis.resume import resume_set_arguments
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
@@ -34,6 +34,8 @@ from tdac_agent.tasks.task_file import SET_FILE
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
+FINAL = frozenset({"validation", "comparison"})
+"""Purposes of worlds whose results are printed."""
 _EXIT = {"verified": 0, "selected": 0, "budget": 4}
 
 
@@ -48,9 +50,10 @@ class SetProgress(Progress):
             case "drive.step":
                 so_far = f"{record['reached']} of {record['done']} worlds reached"
                 self.doing(f"{_driven(record)}: {so_far}")
-            case "drive.end" if record["what"] == "validation":
+            case "drive.end" if record["what"] in FINAL:
                 result = f"{record['reached']} of {record['driven']} reached"
-                self.say(f"  {_at(record)}", f"validation worlds: {result}", "dim")
+                worlds = f"{record['what']} worlds"
+                self.say(f"  {_at(record)}", f"{worlds}: {result}", "dim")
             case "hidden.start":
                 self.doing("driving on hidden worlds")
             case _:
@@ -58,7 +61,9 @@ class SetProgress(Progress):
 
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         said = escape("; ".join(record["notes"][-1:]))
-        if not record["valid"]:
+        if record["parent"] is not None:
+            self.say(f"~ {at}", said, "" if record["valid"] else "yellow")
+        elif not record["valid"]:
             self.say(f"– {at}", said, "yellow")
         elif record["unchanged"]:
             self.say(f"= {at}", said, "yellow")
@@ -141,7 +146,8 @@ def dry_run(
         check_name(name)
     tasks = load_set(flags.name)
     question = set_prompt(tasks, (), load_template(models["prompt"]))
-    return dry.show(tasks.name, tasks, question, models, loop, as_json)
+    terms = {**loop, "improve": flags.improve or 0}
+    return dry.show(tasks.name, tasks, question, models, terms, as_json)
 
 
 def _write(wanted: dict[str, Any], console: Console) -> int:
@@ -204,9 +210,9 @@ def _show_selected(run: Run, console: Console) -> None:
     content = read_file(run.folder / "report.json", RECORD_BYTES)
     selection = Selection.model_validate_json(content)
     console.print(_candidates(selection))
-    used = selection.feedback_used + selection.validation_used
+    most = selection.episodes + selection.improve
     console.print(
-        f"  goals reached, of worlds of dev; {used} of at most {selection.episodes} "
+        f"  goals reached, of worlds of dev; {selection.used} of at most {most} "
         "episodes were driven",
         highlight=False,
     )
@@ -224,6 +230,8 @@ def _show_selected(run: Run, console: Console) -> None:
             f"{scores.time:.3f}",
             highlight=False,
         )
+    if selection.improvement is not None:
+        console.print(f"  {_improvement(selection.improvement)}", highlight=False)
     hidden = run.folder / HIDDEN_REPORT
     if run.status != "selected" and hidden.is_file():
         text = read_file(hidden, RECORD_BYTES)
@@ -237,23 +245,53 @@ def _show_selected(run: Run, console: Console) -> None:
     )
 
 
+def _improvement(found: Improvement) -> str:
+    """What the search for improvements brought, in one line."""
+    about = f"{found.variations} variation{'' if found.variations == 1 else 's'}"
+    base = f"k={found.k} j={found.j}"
+    if not found.worlds:
+        return f"improving: {about}; none was selected instead of {base}"
+    assert found.before is not None
+    assert found.after is not None
+    assert found.low is not None
+    assert found.high is not None
+    told = "" if found.low > 0.0 else ", which may be chance"
+    return (
+        f"improving: {about}; time score {found.before:.3f} ({base}) -> "
+        f"{found.after:.3f} on {found.worlds} other worlds: "
+        f"{found.after - found.before:+.3f} ({found.low:+.3f} to {found.high:+.3f})"
+        f"{told}"
+    )
+
+
 def _candidates(selection: Selection) -> Table:
-    table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
-    for name in ("k", "j", "feedback", "validation", "time score"):
+    """The candidates of the loop, and the variations that went on to the selection."""
+    table, searched = Table(box=SIMPLE, padding=(0, 1, 0, 0)), selection.improve > 0
+    search = ("improving",) if searched else ()
+    for name in ("k", "j", "feedback", *search, "validation", "time score"):
         table.add_column(name, justify="right")
     for each in selection.candidates:
-        chosen = (each.k, each.j) == (selection.k, selection.j)
-        table.add_row(*_cells(each), style="bold" if chosen else None)
+        if each.feedback_worlds or each.validation_worlds:
+            chosen = (each.k, each.j) == (selection.k, selection.j)
+            cells = _cells(each, searched=searched)
+            table.add_row(*cells, style="bold" if chosen else None)
     return table
 
 
-def _cells(each: CandidateFigures) -> tuple[str, ...]:
-    time = "" if each.validation_time is None else f"{each.validation_time:.3f}"
-    driven = f"{each.validation_reached}/{each.validation_worlds}"
+def _cells(each: CandidateFigures, *, searched: bool) -> tuple[str, ...]:
     return (
         str(each.k),
         str(each.j),
-        f"{each.feedback_reached}/{each.feedback_worlds}",
-        driven if each.validation_worlds else "",
-        time,
+        _part(each.feedback_reached, each.feedback_worlds),
+        *([_score(each.improve_time)] if searched else []),
+        _part(each.validation_reached, each.validation_worlds),
+        _score(each.validation_time),
     )
+
+
+def _part(reached: int, worlds: int) -> str:
+    return f"{reached}/{worlds}" if worlds else ""
+
+
+def _score(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"

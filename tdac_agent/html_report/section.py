@@ -167,6 +167,7 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     if run.on_set:
         limits += ["--episodes", str(run.episodes)]
         limits += ["--feedback-episodes", str(run.feedback_episodes)]
+        limits += ["--improve", str(run.improve)] if run.improve else []
     words = ["tdac", "synth", *about, *limits, "--learner", run.learner]
     if run.optimizer != run.learner:
         words += ["--optimizer", run.optimizer]

@@ -120,7 +120,7 @@ def _row(run: Run, selected: Selection | None) -> Row:
         "censored": not run.finished,
         "k": run.tau,
         "candidates": codes,
-        "episodes": selected and selected.feedback_used + selected.validation_used,
+        "episodes": selected and selected.used,
         "success": best and best.success,
         "time_score": best and best.time,
         "tokens": run.tokens or None,

@@ -7,7 +7,7 @@ from typing import Literal, Protocol
 
 from tdac_agent.verification.diagnosis.report import Report
 
-Kind = Literal["generate", "edit", "summarise"]
+Kind = Literal["generate", "edit", "summarise", "improve"]
 Role = Literal["learner", "optimizer"]
 
 MAX_OUTPUT_TOKENS = 16_000
@@ -20,9 +20,10 @@ class Request:
     """One question to a model.
 
     Attributes:
-        kind: `generate` a controller, `edit` one, or `summarise` failures as rules.
+        kind: `generate` a controller, `edit` a failed one, `summarise` failures as
+            rules, or `improve` a controller that works.
         prompt: The whole question; a language model sees nothing else.
-        controller: Source that failed, for `edit` and `summarise`.
+        controller: Source that failed, for `edit` and `summarise`; source to `improve`.
         report: Report on the failure, for `edit` and `summarise`.
         rules: Text of each repair rule in force.
         sample: Indices of run, iteration k and repair j; they make repeated questions

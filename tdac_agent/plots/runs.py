@@ -31,7 +31,12 @@ CELL, NARROW = 0.36, 0.21
 """Width of a candidate's column, inches: with few and with many candidates."""
 MOST_LEVEL = 20
 """With more candidates, the labels are vertical."""
-STEPS = {"generate": "writing", "edit": "editing", "summarise": "rules"}
+STEPS = {
+    "generate": "writing",
+    "edit": "editing",
+    "summarise": "rules",
+    "improve": "improving",
+}
 
 
 def plot_failures(run: Run) -> Figure:

@@ -205,10 +205,10 @@ def repair_question(
     """Like `repair_prompt`, from the text of the feedback.
 
     Args:
-        kind: `edit` or `summarise`.
+        kind: `edit`, `summarise` or `improve`.
         prompt: The prompt for a new controller, with the current rules.
-        controller: Source of the failed controller.
-        feedback: How it failed.
+        controller: Source of the failed controller, or of the one to improve.
+        feedback: How it failed, or how it drives.
         earlier: Earlier attempts, one line each.
         rules: The rules in force, with their effects.
         unchanged: Whether the last edit returned the same code.

@@ -234,11 +234,20 @@ class Recorder:
         if reply.model is not None and reply.model not in run.models:
             run.models = (*run.models, reply.model)
 
-    def candidate(self, k: int, j: int, source: str) -> Path:
-        """Writes a candidate's source and its diff; returns the folder."""
-        folder = self._folder(k, j)
+    def candidate(
+        self, k: int, j: int, source: str, *, before: str | None = None
+    ) -> Path:
+        """Writes a candidate's source and its diff; returns the folder.
+
+        Args:
+            k: Its iteration.
+            j: Its edit.
+            source: Its source.
+            before: Source to compare with; the previous candidate's by default.
+        """
+        folder, old = self._folder(k, j), self._previous if before is None else before
         write_if_changed(folder / "controller.py", source)
-        write_if_changed(folder / "controller.diff", difference(self._previous, source))
+        write_if_changed(folder / "controller.diff", difference(old, source))
         self._previous = source
         return folder
 

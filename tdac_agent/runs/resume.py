@@ -40,6 +40,7 @@ CONFIGURATION = {
     "prompt_sha256": "first question",
     "episodes": "number of episodes",
     "feedback_episodes": "feedback episodes",
+    "improve": "number of improving episodes",
 }
 
 

@@ -47,6 +47,9 @@ class Attempt(PrintableRecord):
     unchanged: bool = Field(
         False, description="Same code as the previous attempt, whose report is reused."
     )
+    parent: tuple[int, int] | None = Field(
+        None, description="(k, j) of the candidate that it improves; k is then above K."
+    )
 
 
 class Run(PrintableRecord):
@@ -103,6 +106,9 @@ class Run(PrintableRecord):
     )
     feedback_episodes: int | None = Field(
         None, description="Most episodes of a test of a candidate on a task set."
+    )
+    improve: int = Field(
+        0, description="Further simulated episodes, to improve what works; on sets."
     )
     then_verify: bool = Field(
         False, description="Whether the selected controller drives on hidden worlds."

@@ -38,6 +38,26 @@ class CandidateFigures(_Record):
     validation_time: float | None = Field(
         description="Mean time score; None without validation worlds."
     )
+    improve_time: float | None = Field(
+        None, description="Mean time score on the worlds for variations, if it drove."
+    )
+
+
+class Improvement(_Record):
+    """The selected controller beside what it improves, on worlds that decided nothing.
+
+    Both drove on the same worlds. The interval is that of a paired bootstrap over
+    worlds, with 95 % confidence.
+    """
+
+    variations: int = Field(description="Number of variations that drove.")
+    k: int = Field(description="Iteration of the best candidate before the search.")
+    j: int = Field(description="Its edit.")
+    worlds: int = Field(description="0 if this candidate was selected.")
+    before: float | None = Field(None, description="Its mean time score.")
+    after: float | None = Field(None, description="That of the selected one.")
+    low: float | None = Field(None, description="Lower end of the difference.")
+    high: float | None = Field(None, description="Upper end of the difference.")
 
 
 class Selection(_Record):
@@ -52,9 +72,11 @@ class Selection(_Record):
     split: str = "dev"
     first_feedback: int = Field(description="Number of the first feedback world.")
     first_validation: int = Field(description="Number of the first validation world.")
-    episodes: int = Field(description="Limit of simulated episodes.")
+    episodes: int = Field(description="Limit of simulated episodes of the loop.")
     feedback_used: int
     validation_used: int
+    improve: int = Field(0, description="Limit of further episodes.")
+    improve_used: int = Field(0, description="By variations and by the comparison.")
     candidates: tuple[CandidateFigures, ...]
     k: int = Field(description="Iteration of the selected candidate.")
     j: int = Field(description="Its edit.")
@@ -62,7 +84,15 @@ class Selection(_Record):
     optimistic: Scores | None = Field(
         description="Its scores on validation worlds; None without any."
     )
+    improvement: Improvement | None = Field(
+        None, description="None without a search for improvements."
+    )
     stopped: str = Field("", description="What ended the writing early.")
+
+    @property
+    def used(self) -> int:
+        """Number of simulated episodes on `dev`."""
+        return self.feedback_used + self.validation_used + self.improve_used
 
 
 def read_selection(folder: Path) -> Selection | None:

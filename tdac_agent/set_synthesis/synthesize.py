@@ -9,6 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tdac_agent.metrics.paired import bootstrap
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider, recorded_seed
@@ -21,9 +24,12 @@ from tdac_agent.runs.run_record import Run
 from tdac_agent.runs.selection_record import (
     SELECTION_FILE,
     CandidateFigures,
+    Improvement,
     Selection,
 )
+from tdac_agent.set_synthesis.archive import Archive
 from tdac_agent.set_synthesis.hidden import verify_hidden
+from tdac_agent.set_synthesis.improve import ImprovingSearch, base_of, finalists
 from tdac_agent.set_synthesis.search import search
 from tdac_agent.set_synthesis.selection import scores_of_selected, select
 from tdac_agent.set_synthesis.trials import BLOCKS, MOST_EPISODES, Candidate, Trials
@@ -31,6 +37,7 @@ from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
 from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.setup import account_of, hold_folder, new_run, open_record
+from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_agent.tasks.installation import drawn_seed
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task_file import SET_FILE
@@ -53,6 +60,7 @@ def synthesize_on_set(
     out: Path,
     episodes: int = EPISODES,
     feedback_episodes: int = FEEDBACK_EPISODES,
+    improve: int = 0,
     then_verify: bool = False,
     iterations: int = 20,
     patience: int = 1,
@@ -82,6 +90,8 @@ def synthesize_on_set(
         episodes: Most simulated episodes of all candidates: half of them for tests,
             half for the selection.
         feedback_episodes: Most episodes of a test of a candidate.
+        improve: Further simulated episodes, for variations of the candidates that work
+            (`tdac_agent.synthesis.workload.shares`); 0 for none.
         then_verify: Whether the selected controller drives on hidden worlds at the end,
             for a verdict; also of a run that has selected one before.
         iterations: K, the maximum number of iterations.
@@ -116,6 +126,8 @@ def synthesize_on_set(
     """
     episodes = whole_number("episodes", episodes, 2, MOST_EPISODES)
     block = whole_number("feedback_episodes", feedback_episodes, 1, MOST_EPISODES)
+    if improve:
+        whole_number("improve", improve, LEAST_IMPROVE, MOST_EPISODES)
     template = load_template(prompt)
     models = choose_models(
         learner, optimizer, tasks, base_url, key_over_http=key_over_http
@@ -140,6 +152,7 @@ def synthesize_on_set(
         seed=_seed(seed, models[0], before),
         episodes=episodes,
         feedback_episodes=block,
+        improve=improve,
         then_verify=then_verify or (before is not None and before.then_verify),
     )
     account = account_of(models, before, max_cost, max_tokens, budget)
@@ -164,8 +177,8 @@ def synthesize_on_set(
         dialogue = Dialogue(question, *models, Calls(recorder, *terms), about=ABOUT)
         with ExitStack() as stack:
             warm = judge or stack.enter_context(WarmJudge())
-            half = episodes // 2
-            trials = Trials(tasks, recorder, warm, tier, block, half, episodes - half)
+            parts = shares(episodes, improve)
+            trials = Trials(tasks, recorder, warm, tier, block, parts)
             return _run(_Writing(dialogue, trials, start_from))
 
 
@@ -222,13 +235,19 @@ def _finish(writing: _Writing) -> None:
             raise
         stopped = str(error)
     able = [each for each in written if each.drives]
+    archive = None
+    if recorder.run.improve and any(each.feedback_score for each in able):
+        archive, ended = _improved(writing, written)
+        stopped = ended or stopped
+        able = finalists(archive)
     chosen = None
     if able:
         chosen = select(able, trials.validation_left, trials.validate)
     if chosen is None or not chosen.score:
         recorder.finish("not verified", reason=_why_none(able))
         return
-    _deliver(trials, written, chosen, stopped)
+    improvement = None if archive is None else _compared(trials, archive, chosen)
+    _deliver(trials, written, chosen, stopped, improvement)
     recorder.run.tau = chosen.k
     status, facts = "selected", {"k": chosen.k, "j": chosen.j, "reason": stopped}
     if recorder.run.then_verify:
@@ -239,6 +258,41 @@ def _finish(writing: _Writing) -> None:
     recorder.finish(status, **facts)  # type: ignore[arg-type]
 
 
+def _improved(writing: _Writing, written: list[Candidate]) -> tuple[Archive, str]:
+    """Searches for improvements; also returns what ended this early, if anything did.
+
+    Without money for further questions, the run goes on with what there is.
+    """
+    search = ImprovingSearch(writing.dialogue, writing.trials, written)
+    try:
+        search.run()
+    except OutOfBudget as error:
+        return search.archive, str(error)
+    return search.archive, ""
+
+
+def _compared(trials: Trials, archive: Archive, chosen: Candidate) -> Improvement:
+    """Compares the selected candidate with what the search began with."""
+    base = base_of(archive)
+    about = {"variations": archive.variations, "k": base.k, "j": base.j}
+    if chosen is base:
+        return Improvement(worlds=0, **about)
+    times = {
+        name: np.array([[e.time_score for e in trials.compare(each).episodes]])
+        for name, each in (("before", base), ("after", chosen))
+    }
+    found = bootstrap(times)
+    change = found["after"].minus(found["before"]).estimate()
+    return Improvement(
+        worlds=found["before"].worlds,
+        before=found["before"].mean,
+        after=found["after"].mean,
+        low=change.low,
+        high=change.high,
+        **about,
+    )
+
+
 def _why_none(able: list[Candidate]) -> str:
     if not able:
         return "no candidate passed the static and contract tests"
@@ -246,7 +300,11 @@ def _why_none(able: list[Candidate]) -> str:
 
 
 def _deliver(
-    trials: Trials, written: list[Candidate], chosen: Candidate, stopped: str
+    trials: Trials,
+    written: list[Candidate],
+    chosen: Candidate,
+    stopped: str,
+    improvement: Improvement | None,
 ) -> None:
     """Writes the selected controller and the report to the top of the run folder."""
     run, first = trials.recorder.run, trials.first
@@ -259,11 +317,14 @@ def _deliver(
         episodes=run.episodes,
         feedback_used=trials.feedback_used,
         validation_used=trials.validation_used,
+        improve=run.improve,
+        improve_used=trials.explore_used + trials.comparison_used,
         candidates=tuple(map(_figures, written)),
         k=chosen.k,
         j=chosen.j,
         controller_sha256=_sha256(chosen),
         optimistic=scores_of_selected(chosen),
+        improvement=improvement,
         stopped=stopped,
     )
     write_atomic(run.controller, chosen.source)
@@ -285,6 +346,7 @@ def _figures(candidate: Candidate) -> CandidateFigures:
         validation_worlds=len(candidate.validation),
         validation_reached=sum(each.success for each in candidate.validation),
         validation_time=candidate.score if candidate.validation else None,
+        improve_time=candidate.explored_score,
     )
 
 

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.runs.recorder import Recorder
+from tdac_agent.synthesis.workload import Shares
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.verification.judge.set_job import WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -19,7 +20,9 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet
 
 BLOCKS = 2**30
-"""Feedback worlds have smaller numbers than this, validation worlds larger ones."""
+"""Feedback worlds have smaller numbers than this; each other purpose has as many."""
+PURPOSES = ("feedback", "validation", "improve", "comparison")
+"""What worlds are used for, in the order of their numbers."""
 MOST_EPISODES = 100_000
 SET_REPORT = "set.json"
 
@@ -35,6 +38,7 @@ class Candidate:
         folder: Its folder.
         feedback: Reports of its tests, in order.
         validation: Its episodes on validation worlds.
+        explored: Its episodes on the worlds for variations.
     """
 
     k: int
@@ -43,11 +47,17 @@ class Candidate:
     folder: Path
     feedback: list[SetReport] = field(default_factory=list)
     validation: list[WorldEpisode] = field(default_factory=list)
+    explored: list[WorldEpisode] = field(default_factory=list)
 
     @property
     def drives(self) -> bool:
         """Whether it passed the static and contract tests, so that it drove."""
         return any(report.worlds for report in self.feedback)
+
+    @property
+    def explored_score(self) -> float | None:
+        """Mean time score on the worlds for variations; None if it did not drive."""
+        return _mean(self.explored) if self.explored else None
 
     @property
     def feedback_score(self) -> float:
@@ -80,8 +90,10 @@ class Trials:
         judge: A warm judge.
         tier: Sandbox tier.
         block: Most episodes of a test.
+        shares: How the episodes are divided.
         feedback_left: Episodes that are left for tests.
         validation_left: Episodes that are left for the selection.
+        explore_left: Episodes that are left for variations.
     """
 
     tasks: TaskSet
@@ -89,10 +101,24 @@ class Trials:
     judge: WarmJudge
     tier: str
     block: int
-    feedback_left: int
-    validation_left: int
+    shares: Shares
+    feedback_left: int = field(init=False)
+    validation_left: int = field(init=False)
+    explore_left: int = field(init=False)
     feedback_used: int = 0
     validation_used: int = 0
+    explore_used: int = 0
+    comparison_used: int = 0
+
+    def __post_init__(self) -> None:
+        self.feedback_left = self.shares.feedback
+        self.validation_left = self.shares.validation
+        self.explore_left = self.shares.explore
+
+    @property
+    def can_explore(self) -> bool:
+        """Whether there are episodes for another variation."""
+        return self.explore_left >= self.shares.block
 
     @property
     def first(self) -> int:
@@ -121,12 +147,33 @@ class Trials:
     def validate(self, candidate: Candidate, count: int) -> None:
         """Drives on the next `count` validation worlds of this candidate."""
         done = len(candidate.validation)
-        first = BLOCKS + self.first + done
+        first = self._first_for("validation") + done
         out = candidate.folder / f"validation-{done + 1}"
         report = self._drive(candidate, first, count, out)
         candidate.validation.extend(report.episodes)
         self.validation_used += report.worlds
         self.validation_left -= report.worlds
+
+    def explore(self, candidate: Candidate) -> SetReport:
+        """Drives on the worlds for variations, the same ones for each candidate."""
+        first, count = self._first_for("improve"), self.shares.block
+        report = self._drive(candidate, first, count, candidate.folder / "improve-1")
+        candidate.explored.extend(report.episodes)
+        self.explore_used += report.worlds
+        self.explore_left -= report.worlds
+        return report
+
+    def compare(self, candidate: Candidate) -> SetReport:
+        """Drives on the worlds of the comparison at the end, which decide nothing."""
+        first, count = self._first_for("comparison"), self.shares.comparison
+        out = candidate.folder / "comparison-1"
+        report = self._drive(candidate, first, count, out)
+        self.comparison_used += report.worlds
+        return report
+
+    def _first_for(self, purpose: str) -> int:
+        """Number of the first world for a purpose."""
+        return PURPOSES.index(purpose) * BLOCKS + self.first
 
     def _drive(
         self, candidate: Candidate, first: int, count: int, out: Path

@@ -61,6 +61,7 @@ def cost_of(
     iterations: int = 20,
     patience: int = 1,
     refine: bool = True,
+    improve: int = 0,
     base_url: str | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
@@ -77,13 +78,14 @@ def cost_of(
         iterations: K.
         patience: J.
         refine: Whether failures become rules.
+        improve: Simulated episodes to improve what works, on a task set.
         base_url: URL of the models' server; by default the vendor's.
         max_output: Token limit of an answer.
         max_cost: Limit in USD; by default 2.
         max_tokens: Limit of tokens; by default as in `bounds_of`.
     """
     tokens = estimate_tokens(prompt)
-    work = whole(iterations, patience, refine=refine)
+    work = whole(iterations, patience, refine=refine, improve=improve)
     sizes = tokens_asked(tokens, max_output)
     prices_of = [prices.price_of(m, base_url) for m in (learner, optimizer)]
     first, second = prices_of

@@ -71,6 +71,26 @@ class Dialogue:
         request = self._repair("edit", source, failure, self._at(k, j))
         return self._code(self.optimizer, request)
 
+    def improve(self, k: int, source: str, text: str) -> ModelAnswer:
+        """Asks for a better controller, candidate (k, 0).
+
+        Args:
+            k: Number of the candidate.
+            source: Source of the controller.
+            text: How it drives, and what was tried with it.
+        """
+        question = repair_question("improve", self._question(), source, text)
+        request = Request(
+            "improve",
+            question,
+            source,
+            rules=self._texts(),
+            sample=self._at(k, 0),
+            stable=_stable(question),
+            max_tokens=self.calls.max_output,
+        )
+        return self._code(self.optimizer, request)
+
     def summarise(self, k: int, j: int, source: str, failure: Feedback) -> None:
         """Asks for changes of the rules after a failure, and applies them.
 

@@ -16,6 +16,50 @@ FEEDBACK_TOKENS = 12_000
 """Allowance for the failures, the earlier attempts and the text around them."""
 
 
+MOST_BLOCK = 32
+LEAST_IMPROVE = 32
+"""Least number of episodes for improving: some variations on some worlds each."""
+
+
+class Shares(NamedTuple):
+    """How the simulated episodes of a run on a task set are divided.
+
+    Attributes:
+        feedback: For tests of candidates.
+        validation: For the selection.
+        explore: For variations of candidates.
+        block: Worlds that each of these drives on.
+        comparison: Worlds on which the improved controller and what it improves drive
+            at the end.
+    """
+
+    feedback: int
+    validation: int
+    explore: int
+    block: int
+    comparison: int
+
+    @property
+    def variations(self) -> int:
+        """Most variations, beside one candidate that is varied."""
+        return max(0, self.explore // self.block - 1)
+
+
+def shares(episodes: int, improve: int = 0) -> Shares:
+    """Divides the episodes of a run.
+
+    Args:
+        episodes: Limit of the loop: half for tests, half for the selection.
+        improve: Further episodes: five eighths for variations, one for the selection,
+            two for the comparison at the end.
+    """
+    part = improve // 8
+    explore = improve - 3 * part
+    block = min(MOST_BLOCK, max(4, explore // 8))
+    half = episodes // 2
+    return Shares(half, episodes - half + part, explore, block, part)
+
+
 class Workload(NamedTuple):
     """Number of questions to the Learner and to the Optimizer."""
 
@@ -35,17 +79,34 @@ class Rest(NamedTuple):
     most: Amount
 
 
-def whole(iterations: int, patience: int, *, refine: bool = True) -> Workload:
-    """The questions of a run in which no candidate passes."""
-    return Workload(iterations, iterations * (patience + refine))
+def whole(
+    iterations: int, patience: int, *, refine: bool = True, improve: int = 0
+) -> Workload:
+    """The questions of a run in which no candidate passes.
+
+    Args:
+        iterations: K.
+        patience: J.
+        refine: Whether failures become rules.
+        improve: Episodes to improve what works.
+    """
+    varied = shares(0, improve).variations
+    return Workload(iterations, iterations * (patience + refine) + varied)
 
 
 def from_here(
-    request: Request, iterations: int, patience: int, *, refine: bool = True
+    request: Request,
+    iterations: int,
+    patience: int,
+    *,
+    refine: bool = True,
+    improve: int = 0,
 ) -> Workload:
     """A question and all that follow it if no candidate passes."""
     _, k, j = request.sample
-    later = whole(iterations - k, patience, refine=refine)
+    if request.kind == "improve":
+        return Workload(0, max(1, shares(0, improve).variations + 1 - k + iterations))
+    later = whole(iterations - k, patience, refine=refine, improve=improve)
     left = {"generate": patience, "edit": patience - j + 1, "summarise": 0}
     return Workload(
         later.learner + (request.kind == "generate"),
@@ -81,7 +142,9 @@ def rest_of(
         worst: Its maximum cost.
         max_output: Token limit of an answer.
     """
-    left = from_here(request, run.iterations, run.patience, refine=run.refine)
+    left = from_here(
+        request, run.iterations, run.patience, refine=run.refine, improve=run.improve
+    )
     tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
     this = Workload(1, 0) if request.role == "learner" else Workload(0, 1)
     most = worst

@@ -15,6 +15,7 @@ from tdac_envs.core.errors import TdacError
 KINDS = {
     "generate": "a controller: one whole file in a ```python block",
     "edit": "a repaired controller, in the form that the prompt asks for",
+    "improve": "an improved controller, in the form that the prompt asks for",
     "summarise": "rules for later candidates: a list in a ```json block",
 }
 """What questions ask for."""

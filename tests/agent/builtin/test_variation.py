@@ -1,0 +1,55 @@
+"""Variations of a controller without a model."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+import tdac_agent
+from tdac_agent.builtin.variation import varied
+
+LEVELS = sorted((Path(tdac_agent.__file__).parent / "builtin" / "levels").glob("*.py"))
+SOURCE = """A, B = 3, 0.5  # two ä
+C = 2.0
+d = 7
+E = True
+F = "text"
+G = -1.0
+"""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_one_or_two_constants_change_and_nothing_else(seed):
+    changed, notes = varied(SOURCE, (seed,))
+    assert 1 <= len(notes) <= 2
+    lines = list(zip(SOURCE.splitlines(), changed.splitlines(), strict=True))
+    assert all(old == new for old, new in lines[2:])
+    for note in notes:
+        name, before, after = re.fullmatch(r"(\w) (\S+) -> (\S+)", note).groups()
+        assert name in "ABC"
+        assert before != after
+        assert type(ast.literal_eval(after)) is (int if name == "A" else float)
+        assert ast.literal_eval(after) > 0
+    assert "# two ä" in changed
+
+
+def test_the_same_seed_gives_the_same_variation():
+    assert varied(SOURCE, (1, 2, 0)) == varied(SOURCE, (1, 2, 0))
+    assert len({varied(SOURCE, (0, k, 0)) for k in range(10)}) == 10
+
+
+def test_a_controller_without_constants_stays_as_it_is():
+    assert varied("def policy(obs):\n    return 0.0, 0.0\n", (0,)) == (
+        "def policy(obs):\n    return 0.0, 0.0\n",
+        (),
+    )
+
+
+@pytest.mark.parametrize("path", LEVELS, ids=lambda path: path.stem)
+def test_each_level_can_be_varied(path):
+    source = path.read_text()
+    changed, notes = varied(source, (0, 1, 0))
+    assert notes
+    assert changed != source
+    compile(changed, path.name, "exec")

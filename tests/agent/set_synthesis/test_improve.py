@@ -1,0 +1,177 @@
+"""Search beyond the first success: the archive, what is asked, what comes of it."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from few_worlds import write_set
+from hypothesis import given
+from hypothesis import strategies as st
+from script import STILL, Script, code
+
+from tdac_agent.errors import RunError
+from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.runs.history import gather_run
+from tdac_agent.runs.run_record import load_run
+from tdac_agent.runs.selection_record import read_selection
+from tdac_agent.set_synthesis.archive import Archive, Figures, Member
+from tdac_agent.set_synthesis.improve import base_of, finalists
+from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_agent.set_synthesis.trials import Candidate
+from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
+from tdac_envs.core.errors import TaskError
+
+AT_ONCE = RetryPolicy(first_wait=0.0)
+scores = st.floats(0.0, 1.0)
+figures = st.builds(Figures, scores, scores, scores, scores)
+
+
+@st.composite
+def archives(draw):
+    """An archive of up to eight members; the first one is a founder."""
+    archive = Archive()
+    for k, each in enumerate(draw(st.lists(figures, min_size=1, max_size=8))):
+        parent = archive.members[0] if k else None
+        candidate = Candidate(k, 0, f"A = {k}", Path())
+        archive.members.append(Member(candidate, None, each, parent))
+    return archive
+
+
+@given(archives())
+def test_the_front_is_what_nobody_beats(archive):
+    front = archive.front()
+    assert front
+    for each in archive.members:
+        beaten = any(other.figures.beats(each.figures) for other in archive.members)
+        assert beaten == (not any(each is one for one in front))
+    assert archive.best().figures.time == max(m.figures.time for m in archive.members)
+
+
+@given(archives())
+def test_the_best_founder_is_a_finalist(archive):
+    chosen = finalists(archive)
+    assert any(base_of(archive) is each for each in chosen)
+    assert len(chosen) <= 5
+    assert [each.k for each in chosen] == sorted({each.k for each in chosen})
+
+
+@given(st.integers(2, 10_000), st.integers(LEAST_IMPROVE, 10_000))
+def test_the_shares_are_all_episodes(episodes, improve):
+    """And there are at least some variations."""
+    parts = shares(episodes, improve)
+    used = parts.feedback + parts.validation + parts.explore + 2 * parts.comparison
+    assert used == episodes + improve
+    assert parts.variations >= 3
+    assert (parts.variations + 1) * parts.block <= parts.explore
+
+
+@pytest.fixture
+def write(few, tmp_path, warm):
+    """Runs with few episodes."""
+
+    def run(model, **values):
+        given = {"episodes": 4, "feedback_episodes": 2, "seed": 3, "judge": warm}
+        given |= {"out": tmp_path / "run", "retry": AT_ONCE, "improve": 32, **values}
+        return synthesize_on_set(few, model, **given)
+
+    return run
+
+
+def test_a_better_variation_is_asked_for_and_selected(write, solver, tmp_path):
+    """The model sees the parent, its figures, and what was tried with it."""
+    slow = solver.replace("def policy(", "def fast(") + (
+        "\n\ndef policy(obs):\n    left, right = fast(obs)\n"
+        "    return 0.6 * left, 0.6 * right\n"
+    )
+    quick = slow.replace("0.6", "0.95")
+    refused = f"import subprocess\n{slow}"
+    model = Script(*map(code, (slow, STILL, slow, refused, quick, slow, slow, slow)))
+    run = write(model)
+    asked = [kind for kind, *_ in model.asked()]
+    assert asked == ["generate", *["improve"] * (len(asked) - 1)]
+    first, second = (request.prompt for request in model.requests[1:3])
+    assert "The controller to improve" in first
+    assert "return 0.6 * left" in first
+    assert "What was tried" not in first
+    assert re.search(r"Mean time score -0\.\d{3}:\n```diff\n", second)
+    best = read_selection(tmp_path / "run")
+    assert run.status == "selected"
+    assert (run.folder / "controller.py").read_text() == quick
+    found = best.improvement
+    assert (found.k, found.j, found.worlds) == (1, 0, 4)
+    assert found.after > found.before
+    assert 0.0 < found.low < found.after - found.before < found.high
+    assert best.used <= 4 + 32
+    parents = [attempt.parent for attempt in run.attempts]
+    assert parents[0] is None
+    assert parents[1:5] == [(1, 0)] * 4
+    assert set(parents[5:]) <= {(1, 0), (24, 0)}
+    notes = [attempt.notes[-1] for attempt in run.attempts[1:]]
+    assert notes[1] == "same code as k=1 j=0"
+    assert "+0." in notes[3]
+    told = gather_run(run.folder)
+    assert [one.k for one in told.tried] == [1, *range(21, 28)]
+    diff = (run.folder / "iterations/k24/j0/controller.diff").read_text()
+    assert "-    return 0.6 * left" in diff  # from its parent
+
+
+@pytest.mark.slow
+def test_the_built_in_learner_searches_the_same_way_twice(few, tmp_path, warm):
+    """With one seed, both folders agree but for times; a killed run ends the same."""
+    given = {"episodes": 4, "feedback_episodes": 2, "seed": 5, "improve": 32}
+
+    class Stop(Exception):
+        pass
+
+    def stop(record):
+        if record["event"] == "drive.end" and record.get("k") == 22:
+            raise Stop
+
+    one = synthesize_on_set(few, out=tmp_path / "a", judge=warm, **given)
+    with pytest.raises(Stop):
+        synthesize_on_set(few, out=tmp_path / "b", judge=warm, on_event=stop, **given)
+    other = synthesize_on_set(few, out=tmp_path / "b", judge=warm, **given)
+    assert one.status == other.status == "selected"
+    for name in ("controller.py", "report.json"):
+        assert (tmp_path / "a" / name).read_bytes() == (
+            tmp_path / "b" / name
+        ).read_bytes()
+    sources = [
+        {
+            str(path.relative_to(tmp_path / name)): path.read_bytes()
+            for path in (tmp_path / name).rglob("controller.py")
+        }
+        for name in "ab"
+    ]
+    assert sources[0] == sources[1]
+    assert len(sources[0]) > 3
+    assert one.attempts == other.attempts
+    assert load_run(tmp_path / "b").improve == 32
+    with pytest.raises(RunError, match="number of improving episodes 32 instead of 40"):
+        synthesize_on_set(
+            few, out=tmp_path / "b", judge=warm, **given | {"improve": 40}
+        )
+
+
+def test_too_few_episodes_are_refused(write):
+    with pytest.raises(TaskError, match="improve"):
+        write(Script(), improve=31)
+
+
+@pytest.mark.slow
+def test_the_command_says_what_improving_brought(tdac, tmp_path):
+    few = write_set(tmp_path / "few.yaml")
+    words = ("synth", "--set", few, "--episodes", 4, "--feedback-episodes", 2)
+    words += ("--improve", 32, "--seed", 1)
+    code, out, err = tdac(*words, "--dry-run", "--json")
+    assert (code, err) == (0, "")
+    varied = shares(4, 32).variations
+    assert json.loads(out)["questions"] == 20 * 3 + varied
+    code, out, err = tdac(*words, "--out", "run")
+    assert (code, err) == (0, "")
+    assert re.search(r"improving: \d variations?; ", out)
+    assert "~ k=21 j=0" in out
+    code, _, err = tdac("synth", "--improve", 32)
+    assert code == 2
+    assert "--improve needs --set NAME" in err
