@@ -23,9 +23,7 @@ def run(
     flags: TaskFlags,
     profile: Profile | None,
     models: dict[str, Any],
-    k: int,
-    j: int,
-    refine: bool,
+    loop: dict[str, Any],
     as_json: bool,
 ) -> int:
     """Prints the prompt alone to stdout, the rest to stderr; returns 0.
@@ -35,9 +33,7 @@ def run(
         profile: What a controller must define; by default as the task says.
         models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
             `max_output`, `max_cost` and `max_tokens`, as for `synthesize`.
-        k: Iterations.
-        j: Edits per iteration.
-        refine: Whether failures become rules.
+        loop: `iterations`, `patience`, `candidates` and `refine`.
         as_json: Whether to print the forecast as JSON.
     """
     for name in _names(models):
@@ -45,7 +41,6 @@ def run(
     template = load_template(models["prompt"])
     task = flags.load().with_profile(profile)
     question = generate_prompt(task, (), template)
-    loop = {"iterations": k, "patience": j, "refine": refine}
     return show(task.name, task.setting, question, models, loop, as_json)
 
 
@@ -69,7 +64,7 @@ def show(
         setting: Setting of the task, or the task set.
         question: The question.
         models: As for `run`.
-        loop: `iterations`, `patience` and `refine`.
+        loop: `iterations`, `patience`, `candidates` and `refine`; on a set `improve`.
         as_json: Whether to print the forecast as JSON.
     """
     names = _names(models)

@@ -65,6 +65,16 @@ def synth(
     j: Annotated[
         int, number_flag("-J", "--patience", min=0, help="Maximum edits per iteration.")
     ] = 1,
+    candidates: Annotated[
+        int,
+        number_flag(
+            "-N",
+            "--candidates",
+            min=1,
+            help="New controllers that are asked for side by side; the best one is "
+            "repaired. Each counts as an iteration.",
+        ),
+    ] = 1,
     suite: Suite = None,
     learner: Learner = "builtin",
     optimizer: Optimizer = None,
@@ -181,7 +191,12 @@ def synth(
         "prompt": prompt,
         "max_output": MAX_OUTPUT_TOKENS if max_output is None else max_output,
     }
-    loop = {"iterations": k, "patience": j, "refine": refine}
+    loop = {
+        "iterations": k,
+        "patience": j,
+        "candidates": candidates,
+        "refine": refine,
+    }
     on_set = SynthSetFlags(set_name, episodes, feedback_episodes, improve, then_verify)
     if on_set != SynthSetFlags():
         from tdac_agent.cli import synth_set
@@ -196,9 +211,8 @@ def synth(
     if dry_run:
         from tdac_agent.cli import dry_run as dry
 
-        raise typer.Exit(
-            dry.run(named_task(), profile, {**models, **limits}, k, j, refine, as_json)
-        )
+        terms = {**models, **limits}
+        raise typer.Exit(dry.run(named_task(), profile, terms, loop, as_json))
     wanted = {**models, **limits, **loop, "seed": seed, "tier": tier}
     raise typer.Exit(
         command.run(named_task(), profile, wanted, out, from_, suite, trust, as_json)

@@ -137,7 +137,8 @@ def _origin(told: Told) -> Iterator[tuple[str, str]]:
     for model, address in run.served_at.items():
         yield f"served at ({model})", address
     yield "prompt", f"{run.prompt} {run.prompt_sha256}".strip()
-    yield "loop", f"K = {run.iterations}, J = {run.patience}"
+    several = f", {run.candidates} side by side" if run.candidates > 1 else ""
+    yield "loop", f"K = {run.iterations}, J = {run.patience}{several}"
     yield "tokens and cost", spent(told)
     if told.report is not None:
         yield from _verified_with(told.report)
@@ -179,6 +180,7 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     if run.given_sha256 is not None:
         words += ["--from", f"{name}/{GIVEN_FILE}"]
     words += ["-K", str(run.iterations), "-J", str(run.patience)]
+    words += ["--candidates", str(run.candidates)] if run.candidates > 1 else []
     words += [] if run.seed is None else ["--seed", str(run.seed)]
     yield shlex.join(words), "repeat the run with new answers"
     replay = ["tdac", "synth", *about, *limits, "--learner", f"replay:{name}"]

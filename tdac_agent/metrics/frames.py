@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -123,12 +124,6 @@ def _candidate(run: Run, attempt: Attempt) -> Row:
 
 
 def _row(run: Run) -> Row:
-    last: dict[int, tuple[int, bool, bool]] = {
-        a.k: (a.j, a.valid, a.passed) for a in run.attempts
-    }
-    done = sum(
-        passed or not valid or j == run.patience for j, valid, passed in last.values()
-    )
     tokens = run.tokens_in + run.tokens_out
     return {
         "run": str(run.folder),
@@ -142,12 +137,31 @@ def _row(run: Run) -> Row:
         "seed": run.index if run.seed is None else run.seed,
         "status": run.status,
         "tau": run.tau,
-        "done": done,
+        "done": _done(run),
         "censored": not run.finished,
         "tokens": tokens or None,
         "cost": run.cost,
         "seconds": run.seconds,
     }
+
+
+def _done(run: Run) -> int:
+    """Number of completed iterations; those that began side by side end together."""
+    done = 0
+    for _, group in itertools.groupby(
+        sorted({a.k for a in run.attempts}), lambda k: (k - 1) // run.candidates
+    ):
+        ks = set(group)
+        tried = [a for a in run.attempts if a.k in ks]
+        first = min(ks)
+        size = min(run.candidates, run.iterations - first + 1)
+        complete = len(ks) == size and all(not a.valid for a in tried if a.j == 0)
+        if run.patience == 0:
+            complete |= len(ks) == size
+        edited = any(a.j == run.patience or not a.valid for a in tried if a.j > 0)
+        if complete or edited or any(a.passed for a in tried):
+            done += len(ks)
+    return done
 
 
 def frames_from_tau(

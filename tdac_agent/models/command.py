@@ -44,6 +44,7 @@ class Command:
     """
 
     paid = True
+    concurrent = True
 
     def __init__(self, argv: list[str]) -> None:
         self.name = f"command:{without_secrets(shlex.join(argv))}"

@@ -97,8 +97,9 @@ class Provider(Protocol):
 
     A provider may also have `served_at`, the URL of its server without secrets (None
     for the vendor's own); `missing`, a line for each thing that it still needs;
-    `recorded_seed`, the seed with which its recorded answers were judged; and `fixed`,
-    whether it gives the same controller whatever it is asked.
+    `recorded_seed`, the seed with which its recorded answers were judged; `fixed`,
+    whether it gives the same controller whatever it is asked; and `concurrent`, whether
+    threads may ask it at the same time.
     """
 
     name: str
@@ -133,6 +134,12 @@ def is_fixed(model: Provider) -> bool:
     """Returns whether a model gives the same controller whatever it is asked."""
     fixed: bool = getattr(model, "fixed", False)
     return fixed
+
+
+def is_concurrent(model: Provider) -> bool:
+    """Returns whether threads may ask a model at the same time."""
+    concurrent: bool = getattr(model, "concurrent", False)
+    return concurrent
 
 
 def missing_for(model: Provider) -> tuple[str, ...]:

@@ -56,6 +56,7 @@ class VendorModel(ABC, Generic[C]):
 
     vendor: ClassVar[Vendor]
     paid = True
+    concurrent = True
 
     def __init__(
         self,

@@ -109,7 +109,7 @@ class JournalState:
 
 def read_past(records: Iterable[JournalRecord]) -> JournalState:
     """Reads a journal; ignores damaged records."""
-    past, asked = JournalState(), ""
+    past = JournalState()
     for record in records:
         event = record.get("event")
         past.seconds = max(past.seconds, _number(record.get("seconds")))
@@ -118,16 +118,16 @@ def read_past(records: Iterable[JournalRecord]) -> JournalState:
         if event == "run.start":
             past.started = True
         elif event == "call.intent":
-            asked = past.next_call(key)
-            past.taken[asked] = _amount(record.get("reserved"))
-            past.open.add(asked)
-        elif event == "call.fault" and call == asked:
+            call = past.next_call(key)
+            past.taken[call] = _amount(record.get("reserved"))
+            past.open.add(call)
+        elif event == "call.fault" and call in past.open:
             past.open.discard(call)
             if record.get("billed"):
                 past.lost.add(call)
             else:
                 past.taken[call] = Amount()
-        elif event == "call.reply" and call == asked:
+        elif event == "call.reply" and call in past.open:
             past.open.discard(call)
             past.taken[call] = _amount(record.get("spent"))
             past.replies[key] = record

@@ -65,6 +65,9 @@ class Run(PrintableRecord):
     optimizer: str
     iterations: int = Field(description="K")
     patience: int = Field(description="J")
+    candidates: int = Field(
+        1, description="N: new controllers that are asked for side by side."
+    )
     seed: int | None = Field(
         description="Seed of the jittered starts; None: each candidate has its own."
     )

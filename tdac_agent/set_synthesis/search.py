@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from tdac_agent.models.provider import is_fixed
@@ -36,13 +38,39 @@ def search(
         OutOfBudget: The budget of money or tokens is used up.
         Fault: A model does not answer, or gives no code again and again.
     """
-    first = None if given is None else ModelAnswer(given)
-    loop = _Search(dialogue, trials, candidates, first)
-    for k in range(1, trials.recorder.run.iterations + 1):
-        ending = loop.iteration(k, (k == 1 and first) or dialogue.generate(k))
+    run = trials.recorder.run
+    loop = _Search(dialogue, trials, candidates)
+    for first in range(1, run.iterations + 1, run.candidates):
+        ks = range(first, min(first + run.candidates, run.iterations + 1))
+        begun = [ModelAnswer(given)] if first == 1 and given is not None else []
+        answers = [*begun, *dialogue.generate_all(ks[len(begun) :])]
+        ending = loop.iteration(ks, answers, given=bool(begun))
         if ending:
             return ending
     return ""
+
+
+@dataclass(slots=True)
+class _Begun:
+    """A candidate at the beginning of its repair.
+
+    Attributes:
+        k: Its iteration.
+        source: Its source as answered.
+        candidate: The candidate, which may be an earlier one with the same code.
+        failure: How it failed; None if it did not.
+        new: Whether its code is new.
+    """
+
+    k: int
+    source: str
+    candidate: Candidate
+    failure: Feedback | None
+    new: bool
+
+
+Notes = tuple[str, ...]
+_Made = tuple[Candidate, Notes]
 
 
 class _Search:
@@ -52,48 +80,97 @@ class _Search:
         dialogue: The models.
         trials: Tests candidates.
         candidates: Receives the candidates.
-        given: The initial controller, if there is one.
     """
 
     def __init__(
-        self,
-        dialogue: Dialogue,
-        trials: Trials,
-        candidates: list[Candidate],
-        given: ModelAnswer | None,
+        self, dialogue: Dialogue, trials: Trials, candidates: list[Candidate]
     ) -> None:
         self._dialogue, self._trials = dialogue, trials
         self._recorder = trials.recorder
-        self._candidates, self._given = candidates, given
+        self._candidates = candidates
         self._empty = 0
 
-    def iteration(self, k: int, answer: ModelAnswer) -> str:
-        """Iteration k; returns why the writing ends, or nothing."""
-        dialogue, run, new = self._dialogue, self._recorder.run, False
-        parent: Candidate | None = None
+    def iteration(
+        self, ks: Sequence[int], answers: Sequence[ModelAnswer], *, given: bool
+    ) -> str:
+        """Tests new candidates and repairs the best one.
+
+        Args:
+            ks: Their iterations.
+            answers: Their sources.
+            given: Whether the first one is the initial controller.
+
+        Returns:
+            Why the writing ends, or nothing.
+        """
+        dialogue, run = self._dialogue, self._recorder.run
+        begun = self._begin(ks, answers)
+        if begun is None:
+            return ""
+        k, new = begun.k, begun.new
+        source, parent, failure = begun.source, begun.candidate, begun.failure
         for j in range(run.patience + 1):
-            source, notes = answer
+            if j > 0:
+                assert failure is not None
+                edited, notes = dialogue.edit(k, j, source, failure)
+                if edited is None:
+                    self._no_code(k, j, notes)
+                    return ""
+                source, self._empty = edited, 0
+                candidate = self._known(source)
+                if candidate is None:
+                    new, candidate = True, self._made(k, j, source)
+                    failure = self._tested(candidate, notes)
+                else:
+                    same = candidate is parent
+                    failure = self._again(k, j, candidate, notes, same)
+                parent = candidate
+            if failure is None or not self._trials.feedback_left:
+                return NO_EPISODES
+            if self._fixed() and not (given and j == 0):
+                return f"{dialogue.learner.name} has one controller"
+        if run.refine and failure is not None:
+            dialogue.summarise(k, run.patience, source, failure)
+        return "" if new else f"iteration {k} brought no new code"
+
+    def _begin(
+        self, ks: Sequence[int], answers: Sequence[ModelAnswer]
+    ) -> _Begun | None:
+        """Tests new candidates; returns the best one, or None if there is no code."""
+        made: list[_Made] = []
+        known: list[tuple[int, str, Candidate, Notes]] = []
+        for k, (source, notes) in zip(ks, answers, strict=True):
             if source is None:
-                self._no_code(k, j, notes)
-                return ""
+                self._no_code(k, 0, notes)
+                continue
             self._empty = 0
             candidate = self._known(source)
             if candidate is None:
-                new = True
-                candidate = self._made(k, j, source)
-                failure = self._tested(candidate, notes)
+                made.append((self._made(k, 0, source), notes))
             else:
-                failure = self._again(k, j, candidate, notes, candidate is parent)
-            parent = candidate
-            if failure is None or not self._trials.feedback_left:
-                return NO_EPISODES
-            if answer is not self._given and self._fixed():
-                return f"{dialogue.learner.name} has one controller"
-            if j < run.patience:
-                answer = dialogue.edit(k, j + 1, source, failure)
-            elif run.refine:
-                dialogue.summarise(k, j, source, failure)
-        return "" if new else f"iteration {k} brought no new code"
+                known.append((k, source, candidate, notes))
+        best = self._best(made)
+        for candidate, notes in made:
+            if best is None or candidate is not best[0]:
+                self._tested(candidate, notes, goes_on=False)
+        again = None
+        for k, source, candidate, notes in known:
+            failure = self._again(k, 0, candidate, notes, unedited=False)
+            again = again or _Begun(k, source, candidate, failure, new=False)
+        if best is None:
+            return again
+        # Seen last, because the next question is about it.
+        chosen, notes = best
+        failure = self._tested(chosen, notes)
+        return _Begun(chosen.k, chosen.source, chosen, failure, new=True)
+
+    def _best(self, made: list[_Made]) -> _Made | None:
+        """Compares new candidates on the same worlds; of equals, the first one."""
+        if len(made) > 1:
+            self._trials.test_alike([candidate for candidate, _ in made])
+        if not made:
+            return None
+        return max(made, key=lambda each: (each[0].feedback_score, each[0].drives))
 
     def _fixed(self) -> bool:
         """Whether the models have nothing else to answer."""
@@ -110,14 +187,26 @@ class _Search:
         self._candidates.append(candidate)
         return candidate
 
-    def _tested(self, candidate: Candidate, notes: tuple[str, ...]) -> Feedback | None:
-        """Tests a candidate; returns how it failed, if it did."""
+    def _tested(
+        self, candidate: Candidate, notes: tuple[str, ...], *, goes_on: bool = True
+    ) -> Feedback | None:
+        """Tests a candidate and records the result; returns how it failed, if it did.
+
+        Args:
+            candidate: The candidate.
+            notes: Notes on the answer.
+            goes_on: Whether it drives on further worlds if it has not failed so far.
+        """
         k, j = candidate.k, candidate.j
-        report = self._trials.test(candidate)
+        report = candidate.first_failure
+        if report is None and goes_on:
+            report = self._trials.test(candidate)
         drives = [each for each in candidate.feedback if each.worlds]
         worlds = sum(each.worlds for each in drives)
         reached = sum(each.successes for each in drives)
         said = f"the goal reached in {reached} of {worlds} worlds"
+        if not candidate.feedback:
+            said = "not tested: no feedback episodes are left"
         if report is not None:
             before = f"{worlds - report.worlds} worlds without a failure, then "
             said = summary_of(report)
@@ -128,7 +217,7 @@ class _Search:
                 k=k,
                 j=j,
                 valid=True,
-                passed=failure is None,
+                passed=failure is None and worlds > 0,
                 failed_tests=() if failure is None else failure.failed,
                 notes=(*notes, said),
             )
@@ -144,8 +233,10 @@ class _Search:
         candidate: Candidate,
         notes: tuple[str, ...],
         unedited: bool,
-    ) -> Feedback:
-        """Records an answer with the code of a candidate, which is not tested again.
+    ) -> Feedback | None:
+        """Records an answer with the code of a candidate; returns how this failed.
+
+        Only a candidate that has not failed so far is tested further.
 
         Args:
             k: Its iteration.
@@ -154,8 +245,8 @@ class _Search:
             notes: Notes on the answer.
             unedited: Whether the answer should have edited this candidate.
         """
-        # A candidate without a failure ends the loop, so this one has failed.
-        failure = set_feedback(candidate.feedback[-1])
+        report = self._trials.test(candidate)
+        failure = None if report is None else set_feedback(report)
         said = f"same code as k={candidate.k} j={candidate.j}"
         self._recorder.candidate(k, j, candidate.source)
         self._recorder.attempted(
@@ -163,8 +254,8 @@ class _Search:
                 k=k,
                 j=j,
                 valid=True,
-                passed=False,
-                failed_tests=failure.failed,
+                passed=failure is None,
+                failed_tests=() if failure is None else failure.failed,
                 notes=(*notes, said),
                 unchanged=True,
             )

@@ -64,6 +64,7 @@ def synthesize_on_set(
     then_verify: bool = False,
     iterations: int = 20,
     patience: int = 1,
+    candidates: int = 1,
     seed: int | None = None,
     start_from: str | None = None,
     base_url: str | None = None,
@@ -96,6 +97,8 @@ def synthesize_on_set(
             for a verdict; also of a run that has selected one before.
         iterations: K, the maximum number of iterations.
         patience: J, edits per iteration.
+        candidates: N, new controllers that are asked for side by side, each of them an
+            iteration. They drive on the same worlds, and the best one is repaired.
         seed: Determines the worlds of `dev`; drawn by default.
         start_from: Source of an initial controller instead of a generated one.
         base_url: See `synthesize`.
@@ -148,6 +151,7 @@ def synthesize_on_set(
         index=index,
         iterations=iterations,
         patience=patience,
+        candidates=whole_number("candidates", candidates, 1),
         refine=refine,
         seed=_seed(seed, models[0], before),
         episodes=episodes,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
@@ -58,6 +59,12 @@ class Candidate:
     def explored_score(self) -> float | None:
         """Mean time score on the worlds for variations; None if it did not drive."""
         return _mean(self.explored) if self.explored else None
+
+    @property
+    def first_failure(self) -> SetReport | None:
+        """The report that ended its tests; None if it has not failed so far."""
+        failed = (r for r in self.feedback if not r.worlds or r.successes < r.worlds)
+        return next(failed, None)
 
     @property
     def feedback_score(self) -> float:
@@ -132,17 +139,28 @@ class Trials:
 
         A candidate that reaches all goals goes on with the next worlds.
         """
-        while self.feedback_left:
+        while self.feedback_left and candidate.first_failure is None:
             count = min(self.block, self.feedback_left)
-            first = self.first + self.feedback_used
-            out = candidate.folder / f"feedback-{len(candidate.feedback) + 1}"
-            report = self._drive(candidate, first, count, out)
-            candidate.feedback.append(report)
-            self.feedback_used += report.worlds
-            self.feedback_left -= report.worlds
-            if report.worlds == 0 or report.successes < report.worlds:
-                return report
-        return None
+            self._give_feedback(candidate, self.first + self.feedback_used, count)
+        return candidate.first_failure
+
+    def test_alike(self, candidates: Sequence[Candidate]) -> None:
+        """Drives candidates on the same next worlds, once each.
+
+        If the episodes do not suffice for all, the first ones drive on one world.
+        """
+        count = min(self.block, max(1, self.feedback_left // len(candidates)))
+        first = self.first + self.feedback_used
+        for candidate in candidates:
+            if self.feedback_left >= count:
+                self._give_feedback(candidate, first, count)
+
+    def _give_feedback(self, candidate: Candidate, first: int, count: int) -> None:
+        out = candidate.folder / f"feedback-{len(candidate.feedback) + 1}"
+        report = self._drive(candidate, first, count, out)
+        candidate.feedback.append(report)
+        self.feedback_used += report.worlds
+        self.feedback_left -= report.worlds
 
     def validate(self, candidate: Candidate, count: int) -> None:
         """Drives on the next `count` validation worlds of this candidate."""

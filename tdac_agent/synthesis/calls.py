@@ -7,8 +7,10 @@ reserved, the question is recorded and asked, and the actual cost is settled.
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from tdac_agent.errors import Fault
 from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
@@ -61,7 +63,7 @@ class OutOfBudget(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Calls:
-    """The questions of one run.
+    """The questions of one run; threads may ask at the same time.
 
     Attributes:
         recorder: Records every question and answer.
@@ -76,6 +78,12 @@ class Calls:
     tariffs: Mapping[str, Tariff]
     retry: RetryPolicy
     max_output: int = MAX_OUTPUT_TOKENS
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def unused(self, request: Request, **facts: Any) -> None:
+        """Records why an answer could not be used; see `Recorder.unused`."""
+        with self._lock:
+            self.recorder.unused(request, **facts)
 
     def ask(self, model: Provider, request: Request) -> Reply:
         """The answer to a question, from the record or from the model.
@@ -87,13 +95,14 @@ class Calls:
             OutOfBudget: The maximum cost exceeds the remaining budget.
             Fault: The model did not answer; the run ends, and no iteration is used up.
         """
-        request = self.recorder.numbered(request)
-        limits = sorted({request.max_tokens, self.max_output}, reverse=True)
-        variants = [replace(request, max_tokens=limit) for limit in limits]
-        for variant in variants:
-            reply = self.recorder.recall(variant, call_key(model, variant))
-            if reply is not None:
-                return reply
+        with self._lock:
+            request = self.recorder.numbered(request)
+            limits = sorted({request.max_tokens, self.max_output}, reverse=True)
+            variants = [replace(request, max_tokens=limit) for limit in limits]
+            for variant in variants:
+                reply = self.recorder.recall(variant, call_key(model, variant))
+                if reply is not None:
+                    return reply
         missed: list[FailedCall] = []
         try:
             for variant in variants[:-1]:
@@ -115,7 +124,8 @@ class Calls:
         def note(miss: FailedCall) -> None:
             missed.append(miss)
             worst = self.tariffs[model.name].worst(request)
-            self.recorder.missed(request, call_key(model, request), miss, worst)
+            with self._lock:
+                self.recorder.missed(request, call_key(model, request), miss, worst)
 
         return answer(lambda again: self._call(model, again), request, self.retry, note)
 
@@ -124,12 +134,13 @@ class Calls:
         self._check_disk()
         recorder, tariff = self.recorder, self.tariffs[model.name]
         key, worst = call_key(model, request), tariff.worst(request)
-        name = f"{recorder.run.id}/{recorder.past.next_call(key)}"
-        try:
-            self.budget.reserve(name, worst)
-        except BudgetExhausted as error:
-            raise OutOfBudget(error, worst, self._rest(request, worst)) from error
-        recorder.asked(request, model.name, key, worst)
+        with self._lock:
+            name = f"{recorder.run.id}/{recorder.past.next_call(key)}"
+            try:
+                self.budget.reserve(name, worst)
+            except BudgetExhausted as error:
+                raise OutOfBudget(error, worst, self._rest(request, worst)) from error
+            recorder.asked(request, model.name, key, worst)
         try:
             reply = model.complete(request)
         except ProviderFault as fault:
@@ -137,7 +148,8 @@ class Calls:
                 self.budget.settle(name, NOTHING)
             raise
         spent = tariff.spent(request, reply)
-        recorder.answered(request, reply, key, spent, tariff.cost(spent))
+        with self._lock:
+            recorder.answered(request, reply, key, spent, tariff.cost(spent))
         self.budget.settle(name, spent)
         return reply
 

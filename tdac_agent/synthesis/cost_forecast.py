@@ -61,6 +61,7 @@ def cost_of(
     iterations: int = 20,
     patience: int = 1,
     refine: bool = True,
+    candidates: int = 1,
     improve: int = 0,
     base_url: str | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
@@ -78,6 +79,7 @@ def cost_of(
         iterations: K.
         patience: J.
         refine: Whether failures become rules.
+        candidates: N, asked for side by side.
         improve: Simulated episodes to improve what works, on a task set.
         base_url: URL of the models' server; by default the vendor's.
         max_output: Token limit of an answer.
@@ -85,7 +87,8 @@ def cost_of(
         max_tokens: Limit of tokens; by default as in `bounds_of`.
     """
     tokens = estimate_tokens(prompt)
-    work = whole(iterations, patience, refine=refine, improve=improve)
+    terms = {"candidates": candidates, "improve": improve}
+    work = whole(iterations, patience, refine=refine, **terms)
     sizes = tokens_asked(tokens, max_output)
     prices_of = [prices.price_of(m, base_url) for m in (learner, optimizer)]
     first, second = prices_of

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import NamedTuple
 
-from tdac_agent.models.provider import Kind, Provider, Reply, Request
+from tdac_agent.models.provider import (
+    Kind,
+    Provider,
+    Reply,
+    Request,
+    is_concurrent,
+)
 from tdac_agent.prompting.extract import Answer, read_answer
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.prompt import ONE_TASK, repair_question
@@ -14,6 +21,7 @@ from tdac_agent.prompting.rule_answer import RuleAnswerError, apply, parse_opera
 from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
 from tdac_agent.storage.secrets import one_line
 from tdac_agent.synthesis.calls import Calls
+from tdac_agent.synthesis.side_by_side import side_by_side
 
 MAX_ASKS = 3
 MAX_EARLIER = 12
@@ -53,6 +61,12 @@ class Dialogue:
     earlier: tuple[str, ...] = ()
     _failed: int = 0
     _unchanged: bool = False
+
+    def generate_all(self, ks: Sequence[int]) -> list[ModelAnswer]:
+        """Asks for new controllers (k, 0), at the same time if the model permits it."""
+        if not is_concurrent(self.learner):
+            return [self.generate(k) for k in ks]
+        return side_by_side([partial(self.generate, k) for k in ks])
 
     def generate(self, k: int) -> ModelAnswer:
         """Asks for a new controller under the rules in force."""
@@ -187,7 +201,7 @@ class Dialogue:
         # The answer may be long, and begin with white space.
         says = one_line(reply.text[:2000], EXCERPT_CHARS)
         facts = {"problem": problem, "says": says, "asked": asked, "most": MAX_ASKS}
-        self.calls.recorder.unused(request, **facts)
+        self.calls.unused(request, **facts)
         first = request.prompt.partition(_AGAIN)[0]
         prompt = f"{first}{_AGAIN}{problem}. Give the whole answer again.\n"
         limit = request.max_tokens

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from queue import SimpleQueue
 
 from tdac_agent.errors import Fault
 from tdac_agent.models.budget import Budget
@@ -34,6 +38,7 @@ from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
+from tdac_envs.core.arguments import whole_number
 
 MOST_SPENT = 3
 """Iterations in a row without code, after which a paid model is given up."""
@@ -47,6 +52,7 @@ def synthesize(
     out: Path,
     iterations: int = 20,
     patience: int = 1,
+    candidates: int = 1,
     seed: int | None = None,
     start_from: str | None = None,
     base_url: str | None = None,
@@ -76,6 +82,8 @@ def synthesize(
         out: New or empty folder for the run, or one with the same run.
         iterations: K, the maximum number of iterations.
         patience: J, edits per iteration.
+        candidates: N, new controllers that are asked for side by side, each of them an
+            iteration. They are judged in parallel, and the best one is repaired.
         seed: Seed of the jittered starts of all candidates. By default each candidate
             has its own, as for `verify`; a replay uses the seed of its recorded run.
         start_from: Source of an initial controller instead of a generated one.
@@ -122,6 +130,7 @@ def synthesize(
         start_from=start_from,
         iterations=iterations,
         patience=patience,
+        candidates=whole_number("candidates", candidates, 1),
         refine=refine,
         seed=settled_seed(seed, models[0], out),
     )
@@ -182,42 +191,119 @@ def _run(dialogue: Dialogue, given: str | None, tests: _Tests, *, paid: bool) ->
 
 def _search(dialogue: Dialogue, given: str | None, tests: _Tests) -> None:
     """Algorithm 2, until a candidate has passed or K iterations are over."""
-    recorder = dialogue.calls.recorder
-    run = recorder.run
-    first = None if given is None else ModelAnswer(given)
-    # Recorded answers do not count, so that a resumed run asks as often again.
-    empty = 0
-    for k in range(1, run.iterations + 1):
-        candidate = (k == 1 and first) or dialogue.generate(k)
-        parent, report, failure = "", None, None
-        for j in range(run.patience + 1):
-            source, notes = candidate
-            if source is None:
-                new = recorder.judged(k, j, None, notes)
-                empty += new and j == 0
-                if dialogue.learner.paid and empty >= MOST_SPENT and k < run.iterations:
-                    raise given_up(dialogue.learner, empty, notes)
-                break
-            empty = 0
-            folder = recorder.candidate(k, j, source)
-            if report is not None and same_code(source, parent):
-                recorder.judged(k, j, report, notes, unchanged=True)
-                dialogue.saw_no_change(k, j)
-            else:
-                report = _verify(recorder, k, j, source, folder, tests)
-                recorder.judged(k, j, report, notes)
-                failure = feedback_of(report)
-                dialogue.saw(k, j, failure)
+    run = dialogue.calls.recorder.run
+    loop = _Loop(dialogue, tests)
+    for first in range(1, run.iterations + 1, run.candidates):
+        ks = range(first, min(first + run.candidates, run.iterations + 1))
+        begun = [ModelAnswer(given)] if first == 1 and given is not None else []
+        answers = [*begun, *dialogue.generate_all(ks[len(begun) :])]
+        if loop.iteration(ks, answers):
+            return
+    dialogue.calls.recorder.finish("not verified")
+
+
+@dataclass(frozen=True, slots=True)
+class _Tested:
+    """A candidate and its report."""
+
+    k: int
+    source: str
+    report: Report
+    folder: Path
+
+
+class _Loop:
+    """The state of the loop.
+
+    Args:
+        dialogue: The models.
+        tests: Where candidates are tested.
+    """
+
+    def __init__(self, dialogue: Dialogue, tests: _Tests) -> None:
+        self._dialogue, self._tests = dialogue, tests
+        self._recorder = dialogue.calls.recorder
+        # Recorded answers do not count, so that a resumed run asks as often again.
+        self._empty = 0
+
+    def iteration(self, ks: Sequence[int], answers: Sequence[ModelAnswer]) -> bool:
+        """Tests new candidates, and repairs the best; returns whether one passed.
+
+        Args:
+            ks: Their iterations.
+            answers: Their sources.
+        """
+        best = self._begin(ks, answers)
+        if best is None:
+            return False
+        dialogue, run = self._dialogue, self._recorder.run
+        k, source, report = best.k, best.source, best.report
+        failure = feedback_of(report)
+        for j in range(1, run.patience + 1):
             if report.passed:
-                _deliver(recorder, tests.task, k, source, report, folder)
-                return
-            parent = source
-            assert failure is not None
-            if j < run.patience:
-                candidate = dialogue.edit(k, j + 1, source, failure)
-            elif run.refine:
-                dialogue.summarise(k, j, source, failure)
-    recorder.finish("not verified")
+                break
+            parent, (edited, notes) = source, dialogue.edit(k, j, source, failure)
+            if edited is None:
+                self._no_code(k, j, notes)
+                return False
+            source, self._empty = edited, 0
+            folder = self._recorder.candidate(k, j, source)
+            if same_code(source, parent):
+                self._recorder.judged(k, j, report, notes, unchanged=True)
+                dialogue.saw_no_change(k, j)
+                continue
+            report = _verify(self._recorder, k, j, source, folder, self._tests)
+            self._recorder.judged(k, j, report, notes)
+            failure = feedback_of(report)
+            dialogue.saw(k, j, failure)
+            best = _Tested(k, source, report, folder)
+        if report.passed:
+            self._deliver(best)
+            return True
+        if run.refine:
+            dialogue.summarise(k, run.patience, source, failure)
+        return False
+
+    def _begin(
+        self, ks: Sequence[int], answers: Sequence[ModelAnswer]
+    ) -> _Tested | None:
+        """Tests new candidates; returns the best one, or None if there is no code."""
+        begun = []
+        for k, (source, notes) in zip(ks, answers, strict=True):
+            if source is None:
+                self._no_code(k, 0, notes)
+                continue
+            self._empty = 0
+            begun.append((k, source, notes, self._recorder.candidate(k, 0, source)))
+        jobs = [(k, 0, source, folder) for k, source, _, folder in begun]
+        tested = []
+        reports = _verify_all(self._recorder, jobs, self._tests)
+        for (k, source, notes, folder), report in zip(begun, reports, strict=True):
+            self._recorder.judged(k, 0, report, notes)
+            tested.append(_Tested(k, source, report, folder))
+        if not tested:
+            return None
+        best = min(tested, key=lambda each: (len(each.report.failures), each.k))
+        # The next question is about the last one that was seen.
+        for each in [*(one for one in tested if one is not best), best]:
+            self._dialogue.saw(each.k, 0, feedback_of(each.report))
+        return best
+
+    def _no_code(self, k: int, j: int, notes: tuple[str, ...]) -> None:
+        """Records an answer without code.
+
+        Raises:
+            Fault: A paid model has given none in some iterations in a row.
+        """
+        new = self._recorder.judged(k, j, None, notes)
+        self._empty += new and j == 0
+        learner, most = self._dialogue.learner, self._recorder.run.iterations
+        if learner.paid and self._empty >= MOST_SPENT and k < most:
+            raise given_up(learner, self._empty, notes)
+
+    def _deliver(self, best: _Tested) -> None:
+        task, at = self._tests.task, (best.k, best.source, best.report, best.folder)
+        _deliver(self._recorder, task, *at)
 
 
 def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
@@ -250,18 +336,50 @@ def _prove(recorder: Recorder, tests: _Tests) -> None:
     recorder.event("prove.end", **facts)
 
 
+_Job = tuple[int, int, str, Path]
+"""k, j, source and folder of a candidate."""
+
+
+def _verify_all(
+    recorder: Recorder, jobs: Sequence[_Job], tests: _Tests
+) -> list[Report]:
+    """The reports on candidates; at a time as many as there are cores."""
+    if len(jobs) < 2:
+        return [_verify(recorder, *job, tests) for job in jobs]
+    for k, j, *_ in jobs:
+        recorder.event("verify.start", k=k, j=j)
+    cores = min(len(jobs), len(os.sched_getaffinity(0)))
+    with ExitStack() as stack:
+        others = [
+            stack.enter_context(WarmJudge(task=tests.task)) for _ in range(cores - 1)
+        ]
+        judges: SimpleQueue[WarmJudge] = SimpleQueue()
+        for judge in (tests.judge, *others):
+            judges.put(judge)
+
+        def report(job: _Job) -> Report:
+            judge = judges.get()
+            try:
+                return _report(recorder.run, *job[2:], replace(tests, judge=judge))
+            finally:
+                judges.put(judge)
+
+        with ThreadPoolExecutor(cores) as pool:
+            return list(pool.map(report, jobs))
+
+
 def _verify(
-    recorder: Recorder,
-    k: int,
-    j: int,
-    source: str,
-    folder: Path,
-    tests: _Tests,
+    recorder: Recorder, k: int, j: int, source: str, folder: Path, tests: _Tests
 ) -> Report:
-    """The report on a candidate; a recorded one is reused."""
-    task, seed = tests.task, recorder.run.seed
+    """The report on a candidate."""
     recorder.event("verify.start", k=k, j=j)
-    kept = kept_report(folder, task, source, seed) if recorder.run.mark else None
+    return _report(recorder.run, source, folder, tests)
+
+
+def _report(run: Run, source: str, folder: Path, tests: _Tests) -> Report:
+    """The report on a candidate; a recorded one is reused."""
+    task, seed = tests.task, run.seed
+    kept = kept_report(folder, task, source, seed) if run.mark else None
     return kept or verify(
         folder / "controller.py",
         task,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -80,7 +81,12 @@ class Rest(NamedTuple):
 
 
 def whole(
-    iterations: int, patience: int, *, refine: bool = True, improve: int = 0
+    iterations: int,
+    patience: int,
+    *,
+    refine: bool = True,
+    candidates: int = 1,
+    improve: int = 0,
 ) -> Workload:
     """The questions of a run in which no candidate passes.
 
@@ -88,10 +94,12 @@ def whole(
         iterations: K.
         patience: J.
         refine: Whether failures become rules.
+        candidates: N, of which one is repaired.
         improve: Episodes to improve what works.
     """
     varied = shares(0, improve).variations
-    return Workload(iterations, iterations * (patience + refine) + varied)
+    repaired = math.ceil(iterations / candidates)
+    return Workload(iterations, repaired * (patience + refine) + varied)
 
 
 def from_here(
@@ -100,16 +108,21 @@ def from_here(
     patience: int,
     *,
     refine: bool = True,
+    candidates: int = 1,
     improve: int = 0,
 ) -> Workload:
     """A question and all that follow it if no candidate passes."""
     _, k, j = request.sample
     if request.kind == "improve":
         return Workload(0, max(1, shares(0, improve).variations + 1 - k + iterations))
-    later = whole(iterations - k, patience, refine=refine, improve=improve)
+    # Those that were asked side by side have the last k of their group.
+    last = min(iterations, k + (-k) % candidates)
+    terms = {"candidates": candidates, "improve": improve}
+    later = whole(iterations - last, patience, refine=refine, **terms)
     left = {"generate": patience, "edit": patience - j + 1, "summarise": 0}
+    mine = last - k + 1 if request.kind == "generate" else 0
     return Workload(
-        later.learner + (request.kind == "generate"),
+        later.learner + mine,
         later.optimizer + left[request.kind] + refine,
     )
 
@@ -143,7 +156,12 @@ def rest_of(
         max_output: Token limit of an answer.
     """
     left = from_here(
-        request, run.iterations, run.patience, refine=run.refine, improve=run.improve
+        request,
+        run.iterations,
+        run.patience,
+        refine=run.refine,
+        candidates=run.candidates,
+        improve=run.improve,
     )
     tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
     this = Workload(1, 0) if request.role == "learner" else Workload(0, 1)

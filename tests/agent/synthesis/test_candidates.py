@@ -1,0 +1,191 @@
+"""`--candidates N`: new controllers side by side, of which the best is repaired."""
+
+import json
+import threading
+
+import pytest
+from few_worlds import KNOWN, write_set
+from script import NO_RULES, STILL, code
+from small import write_small_task
+
+from tdac_agent.errors import RunError
+from tdac_agent.metrics import frames_of
+from tdac_agent.models.provider import PermanentFault
+from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.runs.run_record import load_run
+from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.side_by_side import side_by_side
+from tdac_agent.synthesis.workload import whole
+from tdac_agent.tasks.task import load_task
+from tdac_envs import load_set
+
+AT_ONCE = RetryPolicy(first_wait=0.0)
+BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
+RAISES = "def policy(obs):\n    raise ValueError\n"
+
+
+class Table:
+    """A provider with an answer for each place; threads may ask at the same time.
+
+    The first N questions are answered only when all of them have been asked.
+    """
+
+    name = "table"
+    paid = False
+    concurrent = True
+
+    def __init__(self, answers, together):
+        self.answers = answers
+        self.asked = []
+        self.prompts = {}
+        self._together = together
+        self._meeting = threading.Barrier(together)
+
+    def complete(self, request):
+        place = (request.kind, *request.sample[1:])
+        self.asked.append(place)
+        self.prompts[place] = request.prompt
+        if request.kind == "generate" and request.sample[1] <= self._together:
+            self._meeting.wait(60)
+        answer = self.answers[place]
+        if isinstance(answer, BaseException):
+            raise answer
+        return answer
+
+
+@pytest.fixture
+def task(tmp_path):
+    return load_task(write_small_task(tmp_path / "task", profile="policy"))
+
+
+@pytest.fixture
+def write(task, tmp_path, warm):
+    def run(model, **values):
+        given = {"out": tmp_path / "run", "judge": warm, "retry": AT_ONCE, **values}
+        return synthesize(task, model, candidates=3, iterations=6, **given)
+
+    return run
+
+
+def test_the_best_of_three_is_repaired(write, good_source, tmp_path):
+    """All are asked at the same time, and each is an iteration."""
+    answers = {
+        ("generate", 1, 0): code(RAISES),
+        ("generate", 2, 0): code(BUMP),
+        ("generate", 3, 0): code(STILL),
+        ("edit", 2, 1): code(good_source),
+        ("edit", 3, 1): code(good_source),
+    }
+    model = Table(answers, together=3)
+    run = write(model)
+    assert run.verified
+    assert sorted(model.asked[:3]) == [("generate", k, 0) for k in (1, 2, 3)]
+    (edit,) = model.asked[3:]
+    first = [len(a.failed_tests) for a in run.attempts[:3]]
+    best = min(range(3), key=lambda n: (first[n], n)) + 1
+    assert edit == ("edit", best, 1)
+    assert run.tau == best
+    prompt = model.prompts[edit]
+    others = {1, 2, 3} - {best}
+    assert all(f"- k={k} j=0: " in prompt for k in others)
+    assert f"- k={best} j=0" not in prompt
+    frames = frames_of([run])
+    assert frames.runs["done"].tolist() == [3]
+    with pytest.raises(RunError, match="number of candidates 3 instead of 1"):
+        synthesize(load_task(tmp_path / "task"), model, out=run.folder, iterations=6)
+
+
+def test_one_of_three_passes_at_once(write, good_source):
+    answers = {("generate", k, 0): code(STILL) for k in (1, 3)}
+    answers[("generate", 2, 0)] = code(good_source)
+    run = write(Table(answers, together=3))
+    assert run.verified
+    assert run.tau == 2
+    assert [(a.k, a.passed) for a in run.attempts] == [
+        *[(1, False), (2, True), (3, False)]
+    ]
+    assert (run.folder / "controller.py").read_text() == good_source
+
+
+def test_a_fault_loses_no_answer_of_the_others(write, good_source):
+    """The resumed run asks only what has no answer."""
+    answers = {("generate", k, 0): code(STILL) for k in (1, 3)}
+    answers[("generate", 2, 0)] = PermanentFault("no access")
+    model = Table(answers, together=3)
+    with pytest.raises(Exception, match="no access"):
+        write(model)
+    again = Table({("generate", 2, 0): code(good_source)}, together=1)
+    again.name = model.name
+    run = write(again)
+    assert run.verified
+    assert again.asked == [("generate", 2, 0)]
+
+
+def test_without_a_success_there_are_all_iterations(write):
+    """K = 6 in two groups; one edit and one summary each."""
+    answers = {("generate", k, 0): code(f"{STILL}\nA = {k}\n") for k in range(1, 7)}
+    answers |= {("edit", k, 1): code(BUMP) for k in (1, 4)}
+    answers |= {("summarise", k, 1): NO_RULES for k in (1, 4)}
+    model = Table(answers, together=3)
+    run = write(model)
+    assert run.status == "not verified"
+    assert len(model.asked) == 10 == whole(6, 1, candidates=3).questions
+    assert frames_of([run]).runs["done"].tolist() == [6]
+
+
+def test_on_a_set_all_drive_on_the_same_worlds(tmp_path, warm):
+    few = load_set(write_set(tmp_path / "few.yaml"))
+    answers = {
+        ("generate", 1, 0): code(STILL),
+        ("generate", 2, 0): code(KNOWN.read_text()),
+        ("generate", 3, 0): code(STILL),
+    }
+    model = Table(answers, together=3)
+    run = synthesize_on_set(
+        few,
+        model,
+        out=tmp_path / "run",
+        episodes=16,
+        feedback_episodes=2,
+        candidates=3,
+        seed=3,
+        judge=warm,
+    )
+    assert run.status == "selected"
+    assert run.tau == 2
+    worlds = {}
+    for path in (tmp_path / "run").glob("iterations/*/j0/feedback-1/set.json"):
+        episodes = json.loads(path.read_text())["episodes"]
+        worlds[path.parts[-4]] = [episode["index"] for episode in episodes]
+    assert worlds["k01"] == worlds["k02"]
+    notes = {attempt.k: attempt.notes[-1] for attempt in run.attempts}
+    assert notes[2] == "the goal reached in 6 of 6 worlds"
+    assert notes[3] == "same code as k=1 j=0"
+    assert len(model.asked) == 3
+
+
+def test_functions_run_at_the_same_time_and_the_first_error_is_raised():
+    meeting = threading.Barrier(3)
+
+    def wait(number):
+        meeting.wait(60)
+        if number:
+            raise ValueError(number)
+        return number
+
+    with pytest.raises(ValueError, match="1"):
+        side_by_side([lambda n=n: wait(n) for n in range(3)])
+    assert side_by_side([lambda n=n: n for n in range(9)]) == list(range(9))
+    assert side_by_side([]) == []
+
+
+def test_the_command_takes_candidates(tdac, tmp_path):
+    folder = write_small_task(tmp_path / "task", profile="policy")
+    words = ("synth", "--task", folder, "--candidates", 3, "-K", 6)
+    code_, out, err = tdac(*words, "--dry-run", "--json")
+    assert (code_, err) == (0, "")
+    assert json.loads(out)["questions"] == 6 + 2 * 2
+    code_, _, err = tdac(*words, "--out", tmp_path / "run")
+    assert (code_, err) == (0, "")
+    assert load_run(tmp_path / "run").candidates == 3
