@@ -13,6 +13,7 @@ from tdac_agent.models.choice import Options, check_name, missing_for_name
 from tdac_agent.models.prices import SHIPPED, load_prices, price_file
 from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
 from tdac_agent.prompting.prompt import generate_prompt, load_template
+from tdac_agent.prompting.rules import RepairRule, RuleBook
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.task_file import Profile
@@ -32,7 +33,7 @@ def run(
         flags: Flags that name the task.
         profile: What a controller must define; by default as the task says.
         models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
-            `max_output`, `max_cost` and `max_tokens`, as for `synthesize`.
+            `max_output`, `rules`, `max_cost` and `max_tokens`, as for `synthesize`.
         loop: `iterations`, `patience`, `candidates` and `refine`.
         as_json: Whether to print the forecast as JSON.
     """
@@ -40,8 +41,14 @@ def run(
         check_name(name)
     template = load_template(models["prompt"])
     task = flags.load().with_profile(profile)
-    question = generate_prompt(task, (), template)
+    question = generate_prompt(task, rules_of(models), template)
     return show(task.name, task.setting, question, models, loop, as_json)
+
+
+def rules_of(models: dict[str, Any]) -> tuple[RepairRule, ...]:
+    """The rules that the run is given."""
+    book: RuleBook | None = models["rules"]
+    return () if book is None else book.in_force
 
 
 def _names(models: dict[str, Any]) -> tuple[str, str]:

@@ -10,8 +10,11 @@ from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.run_view import list_tests
+from tdac_agent.errors import RunError
+from tdac_agent.prompting.given_rules import GIVEN, shared_rules, written
 from tdac_agent.prompting.rules import RepairRule, RuleBook
 from tdac_agent.runs.run_record import Run, load_rules, load_run
+from tdac_agent.storage.files import write_atomic
 
 _COLOURS = {"in force": "green", "dropped": "red", "made room": "yellow"}
 
@@ -32,6 +35,37 @@ def run(folder: Path, as_json: bool) -> int:
     return 0
 
 
+def export(folders: list[Path], out: Path) -> int:
+    """Writes rules for other runs to a file; returns the exit code.
+
+    Raises:
+        RunError: A folder has no run, there is no rule to write, or the file cannot be
+            written.
+    """
+    runs = [load_run(folder) for folder in folders]
+    books = [load_rules(folder) for folder in folders]
+    rules = shared_rules(books)
+    number = sum(len(book.in_force) for book in books)
+    if not rules:
+        raise RunError(
+            f"no rule to export: of {number} in force, none is about the environment "
+            "or the code without having done harm; the others are about one task"
+        )
+    tasks = ", ".join(dict.fromkeys(run.task for run in runs))
+    authors = ", ".join(dict.fromkeys(run.optimizer for run in runs))
+    heading = f"Learnt on {tasks} by {authors}."
+    try:
+        write_atomic(out, written(rules, heading))
+    except OSError as error:
+        raise RunError(f"cannot write {out}: {error.strerror}") from error
+    Console().print(
+        f"{escape(str(out))}: {len(rules)} of {number} rules in force; to use them: "
+        f"tdac synth --rules {escape(str(out))}",
+        soft_wrap=True,
+    )
+    return 0
+
+
 def _histories(book: RuleBook) -> Table:
     """A paragraph per rule: its text, then its status and effect."""
     grid = Table.grid(padding=(0, 2, 0, 0))
@@ -42,8 +76,8 @@ def _histories(book: RuleBook) -> Table:
         lines = [
             f"[bold]{escape(rule.text)}[/]",
             *(f"[dim]{escape(edit)}[/]" for edit in rule.edits),
-            f"{state} · {rule.scope} · since k={rule.born}",
-            f"failed before: {escape(list_tests(rule.evidence, 4))}",
+            f"{state} · {rule.scope} · {_origin(rule)}",
+            f"failed before: {escape(list_tests(rule.evidence, 4) or '–')}",
             f"effect: {escape(_effect(rule))}",
             "",
         ]
@@ -77,6 +111,10 @@ def _effect(rule: RepairRule) -> str:
     if sometimes:
         effect += f"; cured sometimes: {list_tests(sometimes, 4)}"
     return effect
+
+
+def _origin(rule: RepairRule) -> str:
+    return f"since k={rule.born}" if rule.born != GIVEN else "given at the beginning"
 
 
 def _state(rule: RepairRule) -> str:

@@ -25,14 +25,36 @@ def demo(
     raise typer.Exit(command.run(out, as_json))
 
 
-@app.command("rules", epilog="Example: `tdac rules runs/office-1`")
-def rules_command(
+rules_app = typer.Typer(
+    no_args_is_help=True,
+    help="Show the repair rules of a run, or write rules for other runs.",
+)
+app.add_typer(rules_app, name="rules")
+
+
+@rules_app.command("run", epilog="Example: `tdac rules runs/office-1`")
+def show_rules(
     run: Annotated[Path, typer.Argument(help="Run folder.")], as_json: Json = False
 ) -> None:
-    """Show the repair rules of a run, with their origin and effect."""
+    """Show the rules of a run, with their origin and effect; `run` may be left out."""
     from tdac_agent.cli import rules
 
     raise typer.Exit(rules.run(run, as_json))
+
+
+@rules_app.command(
+    "export",
+    epilog="Example: `tdac rules export runs/maze-1 runs/office-1 --out rules.md`, "
+    "then `tdac synth --rules rules.md`",
+)
+def export_rules(
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
+    out: Annotated[Path, file_flag("--out", help="Output file.")] = Path("rules.md"),
+) -> None:
+    """Write the rules of runs that can help on other tasks, the most useful first."""
+    from tdac_agent.cli import rules
+
+    raise typer.Exit(rules.export(runs, out))
 
 
 @app.command(

@@ -96,6 +96,14 @@ def synth(
             help="Turn failures into rules in the prompt, or keep the prompt as it is.",
         ),
     ] = True,
+    rules: Annotated[
+        Optional[Path],  # noqa: UP045
+        file_flag(
+            "--rules",
+            help="Rules for the prompt: of earlier runs (`tdac rules export`), or your "
+            "own.",
+        ),
+    ] = None,
     dry_run: Annotated[
         bool,
         typer.Option(
@@ -183,6 +191,8 @@ def synth(
         settings = {**limits, "tier": tier}
         code = command.resume(resume, given, settings, trust, as_json, then_verify)
         raise typer.Exit(code)
+    from tdac_agent.prompting.given_rules import read_given
+
     models = {
         "learner": learner,
         "optimizer": optimizer,
@@ -190,6 +200,7 @@ def synth(
         "key_over_http": key_over_http,
         "prompt": prompt,
         "max_output": MAX_OUTPUT_TOKENS if max_output is None else max_output,
+        "rules": None if rules is None else read_given(rules),
     }
     loop = {
         "iterations": k,

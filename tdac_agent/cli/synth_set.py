@@ -145,7 +145,8 @@ def dry_run(
     for name in (models["learner"], models["optimizer"] or models["learner"]):
         check_name(name)
     tasks = load_set(flags.name)
-    question = set_prompt(tasks, (), load_template(models["prompt"]))
+    template = load_template(models["prompt"])
+    question = set_prompt(tasks, dry.rules_of(models), template)
     terms = {**loop, "improve": flags.improve or 0}
     return dry.show(tasks.name, tasks, question, models, terms, as_json)
 

@@ -15,7 +15,7 @@ from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.models.budget import format_usd
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import CandidateHistory, Told, learner_named
-from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE
+from tdac_agent.runs.run_record import GIVEN_FILE, GIVEN_RULES_FILE, PROMPT_FILE
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
@@ -139,6 +139,8 @@ def _origin(told: Told) -> Iterator[tuple[str, str]]:
     yield "prompt", f"{run.prompt} {run.prompt_sha256}".strip()
     several = f", {run.candidates} side by side" if run.candidates > 1 else ""
     yield "loop", f"K = {run.iterations}, J = {run.patience}{several}"
+    for rule in run.given_rules:
+        yield "given rule", rule
     yield "tokens and cost", spent(told)
     if told.report is not None:
         yield from _verified_with(told.report)
@@ -169,6 +171,9 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
         limits += ["--episodes", str(run.episodes)]
         limits += ["--feedback-episodes", str(run.feedback_episodes)]
         limits += ["--improve", str(run.improve)] if run.improve else []
+    if run.given_rules:
+        limits += ["--rules", f"{name}/{GIVEN_RULES_FILE}"]
+    limits += ["--candidates", str(run.candidates)] if run.candidates > 1 else []
     words = ["tdac", "synth", *about, *limits, "--learner", run.learner]
     if run.optimizer != run.learner:
         words += ["--optimizer", run.optimizer]
@@ -180,7 +185,6 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     if run.given_sha256 is not None:
         words += ["--from", f"{name}/{GIVEN_FILE}"]
     words += ["-K", str(run.iterations), "-J", str(run.patience)]
-    words += ["--candidates", str(run.candidates)] if run.candidates > 1 else []
     words += [] if run.seed is None else ["--seed", str(run.seed)]
     yield shlex.join(words), "repeat the run with new answers"
     replay = ["tdac", "synth", *about, *limits, "--learner", f"replay:{name}"]

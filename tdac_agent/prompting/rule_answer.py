@@ -29,7 +29,12 @@ MAX_OPERATIONS = 3
 _FOREIGN = re.compile(r"```|~~~|https?://")
 
 
-def _checked(text: str) -> str:
+def checked_rule(text: str) -> str:
+    """The text of a rule in one line.
+
+    Raises:
+        ValueError: It is empty or too long, or has a code block or a URL.
+    """
     tidy = clean(text)
     if not re.search(r"\w", tidy):
         raise ValueError("a rule needs words")
@@ -40,7 +45,7 @@ def _checked(text: str) -> str:
     return tidy
 
 
-Text = Annotated[str, AfterValidator(_checked)]
+Text = Annotated[str, AfterValidator(checked_rule)]
 
 
 class _Strict(BaseModel):

@@ -40,8 +40,10 @@ class RepairRule(_Record):
     )
     text: str = Field(max_length=MAX_RULE_CHARS)
     scope: Scope = Field("task", description="Where the rule applies.")
-    born: int = Field(description="Iteration k that added it.")
-    evidence: tuple[str, ...] = Field(description="Failed tests it was made for.")
+    born: int = Field(description="Iteration k that added it; 0 if it was given.")
+    evidence: tuple[str, ...] = Field(
+        description="Failed tests it was made for; none if it was given."
+    )
     edits: tuple[str, ...] = Field((), description="`k=3: was ...`, oldest first.")
     tried: int = Field(0, description="First candidates written under it.")
     cured: int = Field(0, description="Of these, how many passed all its evidence.")
@@ -58,6 +60,9 @@ class RepairRule(_Record):
         """The effect of the rule in words, for people and models."""
         if not self.tried:
             return "not tried yet"
+        if not self.evidence:
+            tries = f"{self.tried} {'try' if self.tried == 1 else 'tries'}"
+            return f"given; more tests failed than before in {self.worse} of {tries}"
         passes = self.passes_each
         always = sum(count == self.tried for count in passes)
         sometimes = sum(0 < count < self.tried for count in passes)

@@ -21,6 +21,7 @@ from tdac_agent.runs.journal_state import REPEATED, JournalState, reply_of
 from tdac_agent.runs.ownership import OWN_SUITE, sign
 from tdac_agent.runs.run_record import (
     GIVEN_FILE,
+    GIVEN_RULES_FILE,
     JOURNAL,
     PROMPT_FILE,
     RULES_FILE,
@@ -297,6 +298,10 @@ class Recorder:
             self.run.folder / RULES_FILE, book.model_dump_json(indent=2) + "\n"
         )
         self.event("rules", k=k, rules=rules, notes=list(notes))
+
+    def given_rules(self, text: str) -> None:
+        """Keeps the rules that the run was given, as a rules file."""
+        write_if_changed(self.run.folder / GIVEN_RULES_FILE, text)
 
     def finish(self, status: Status, **facts: Any) -> None:
         """Records the end of the run."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.errors import RunError
+from tdac_agent.prompting.given_rules import given_book
 from tdac_agent.prompting.prompt import VARIANTS
 from tdac_agent.runs.ownership import is_own, is_own_folder, wishes_of
 from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
@@ -38,6 +39,7 @@ CONFIGURATION = {
     "index": "index",
     "max_output": "max output",
     "given_sha256": "initial controller",
+    "given_rules": "given rules",
     "prompt_sha256": "first question",
     "episodes": "number of episodes",
     "feedback_episodes": "feedback episodes",
@@ -147,9 +149,13 @@ def settings_of(run: Run) -> dict[str, Any]:
     """The settings of a run: arguments of `synthesize`, but for what it is about.
 
     Raises:
-        RunError: Its initial controller cannot be read.
+        RunError: Its initial controller cannot be read, or a rule is not allowed.
     """
     folder = run.folder
+    try:
+        book = given_book(run.given_rules)
+    except ValueError as error:
+        raise RunError(f"the given rules of {folder}: {error}") from error
     initial, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
     return {
         "learner": run.learner,
@@ -162,6 +168,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "start_from": _text(initial) if initial.is_file() else None,
         "base_url": run.base_url,
         "refine": run.refine,
+        "rules": book,
         "prompt": run.prompt if run.prompt in VARIANTS else str(prompt),
         "max_output": run.max_output,
         "out": folder,

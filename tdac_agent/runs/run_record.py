@@ -29,6 +29,7 @@ RUN_FILE = "run.json"
 JOURNAL = "journal.jsonl"
 RULES_FILE = "rules.json"
 GIVEN_FILE = "given.py"
+GIVEN_RULES_FILE = "given_rules.md"
 PROMPT_FILE = "prompt.j2"
 
 
@@ -89,6 +90,9 @@ class Run(PrintableRecord):
     index: int = Field(0, description="Index among otherwise equal runs.")
     version: str = Field("", description="Version of tdac.")
     suite_sha256: str = ""
+    given_rules: tuple[str, ...] = Field(
+        (), description="Rules that the run began with, each with its scope."
+    )
     prompt_sha256: str = Field("", description="Hash of the first question.")
     given_sha256: str | None = Field(
         None, description="Hash of the controller to start from."

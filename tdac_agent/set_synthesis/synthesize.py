@@ -16,7 +16,9 @@ from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider, recorded_seed
 from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.prompting.given_rules import given_lines
 from tdac_agent.prompting.prompt import load_template
+from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import check_own, check_same, existing_run
@@ -71,6 +73,7 @@ def synthesize_on_set(
     key_over_http: bool = False,
     prompt: str = "full",
     refine: bool = True,
+    rules: RuleBook | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
     max_tokens: int | None = None,
@@ -105,6 +108,7 @@ def synthesize_on_set(
         key_over_http: See there.
         prompt: `full`, or a template file.
         refine: See there.
+        rules: See there.
         max_output: See there.
         max_cost: See there.
         max_tokens: See there.
@@ -131,7 +135,7 @@ def synthesize_on_set(
     block = whole_number("feedback_episodes", feedback_episodes, 1, MOST_EPISODES)
     if improve:
         whole_number("improve", improve, LEAST_IMPROVE, MOST_EPISODES)
-    template = load_template(prompt)
+    template, book = load_template(prompt), rules or RuleBook()
     models = choose_models(
         learner, optimizer, tasks, base_url, key_over_http=key_over_http
     )
@@ -153,6 +157,7 @@ def synthesize_on_set(
         patience=patience,
         candidates=whole_number("candidates", candidates, 1),
         refine=refine,
+        given_rules=given_lines(book),
         seed=_seed(seed, models[0], before),
         episodes=episodes,
         feedback_episodes=block,
@@ -178,7 +183,9 @@ def synthesize_on_set(
         )
         recorder = open_record(start, run, before, account, on_event)
         terms = (account.budget, account.tariffs, retry or RetryPolicy(), max_output)
-        dialogue = Dialogue(question, *models, Calls(recorder, *terms), about=ABOUT)
+        calls = Calls(recorder, *terms)
+        dialogue = Dialogue(question, *models, calls, book, about=ABOUT)
+        dialogue.begin()
         with ExitStack() as stack:
             warm = judge or stack.enter_context(WarmJudge())
             parts = shares(episodes, improve)

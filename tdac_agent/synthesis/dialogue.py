@@ -16,6 +16,7 @@ from tdac_agent.models.provider import (
 )
 from tdac_agent.prompting.extract import Answer, read_answer
 from tdac_agent.prompting.feedback import Feedback
+from tdac_agent.prompting.given_rules import GIVEN, RUN_HEADING, written
 from tdac_agent.prompting.prompt import ONE_TASK, repair_question
 from tdac_agent.prompting.rule_answer import RuleAnswerError, apply, parse_operations
 from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
@@ -61,6 +62,13 @@ class Dialogue:
     earlier: tuple[str, ...] = ()
     _failed: int = 0
     _unchanged: bool = False
+
+    def begin(self) -> None:
+        """Records the rules that the run was given, if there are any."""
+        if self.book.rules:
+            notes = tuple(f"given {r.id}: {r.text}" for r in self.book.rules)
+            self.calls.recorder.given_rules(written(self.book.rules, RUN_HEADING))
+            self.calls.recorder.rules(GIVEN, self.book, notes)
 
     def generate_all(self, ks: Sequence[int]) -> list[ModelAnswer]:
         """Asks for new controllers (k, 0), at the same time if the model permits it."""

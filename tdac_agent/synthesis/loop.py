@@ -18,7 +18,9 @@ from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.feedback import feedback_of
+from tdac_agent.prompting.given_rules import given_lines
 from tdac_agent.prompting.prompt import generate_prompt, load_template
+from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
@@ -59,6 +61,7 @@ def synthesize(
     key_over_http: bool = False,
     prompt: str = "full",
     refine: bool = True,
+    rules: RuleBook | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
     max_tokens: int | None = None,
@@ -93,6 +96,7 @@ def synthesize(
         prompt: Template of the question for a new controller: `full`,
             `underspecified`, or a file (docs/prompts.md).
         refine: Whether failures become rules of the prompt for new controllers.
+        rules: Rules to begin with (`read_given`); none by default.
         max_output: Token limit of an answer; twice that after a truncated answer.
         max_cost: Limit in USD; by default the one the run was begun with, or 2.
         max_tokens: Limit of input plus output; by default the earlier one, or none.
@@ -115,7 +119,7 @@ def synthesize(
         PromptError: The template cannot be used.
         Fault: The sandbox, suite or provider is broken; the fault is also recorded.
     """
-    template = load_template(prompt)
+    template, book = load_template(prompt), rules or RuleBook()
     models = choose_models(
         learner, optimizer, task.setting, base_url, key_over_http=key_over_http
     )
@@ -132,6 +136,7 @@ def synthesize(
         patience=patience,
         candidates=whole_number("candidates", candidates, 1),
         refine=refine,
+        given_rules=given_lines(book),
         seed=settled_seed(seed, models[0], out),
     )
     account = account_of(models, existing_run(out), max_cost, max_tokens, budget)
@@ -152,7 +157,8 @@ def synthesize(
             max_output,
         )
         question = partial(generate_prompt, task, template=template)
-        dialogue = Dialogue(question, *models, calls)
+        dialogue = Dialogue(question, *models, calls, book)
+        dialogue.begin()
         paid = any(model.paid for model in models)
         with ExitStack() as stack:
             warm = judge or stack.enter_context(WarmJudge(task=task))
