@@ -85,6 +85,8 @@ PREPARED = {
     "theirs": "tdac bench other.py --set unknown -n 2 --out theirs",
     "show arena": "tdac bench go-to-goal --set unknown -n 2 --out arena",
     "campaigns/my": "tdac campaign my.yaml",
+    r"demo-1|--rules": "tdac demo",
+    "--rules": "tdac rules export runs/demo-1 --out rules.md",
     r"\.zip|ppo-maze-1": "tdac train --task maze --steps 4096",
 }
 """Commands that must have run before others, by what these name."""

@@ -52,7 +52,8 @@ def export(folders: list[Path], out: Path) -> int:
             "or the code without having done harm; the others are about one task"
         )
     tasks = ", ".join(dict.fromkeys(run.task for run in runs))
-    authors = ", ".join(dict.fromkeys(run.optimizer for run in runs))
+    names = [name for run in runs for name in run.models or (run.optimizer,)]
+    authors = ", ".join(dict.fromkeys(names))
     heading = f"Learnt on {tasks} by {authors}."
     try:
         write_atomic(out, written(rules, heading))
