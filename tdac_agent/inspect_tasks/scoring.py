@@ -1,0 +1,91 @@
+"""The scorers of the Inspect tasks: tdac's judge."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from anyio import from_thread, to_thread
+from inspect_ai.scorer import Score, Scorer, Target, accuracy, mean, scorer, stderr
+from inspect_ai.solver import TaskState
+from inspect_ai.util import concurrency
+
+from tdac_agent.inspect_tasks.names import registered
+from tdac_agent.inspect_tasks.problems import (
+    Judged,
+    Poll,
+    Problem,
+    problem_of,
+    unusable,
+)
+from tdac_agent.prompting.extract import Answer, read_answer
+
+JUDGES = 1
+"""Judges at a time: one may use all cores."""
+NO_CODE = "invalid_response_format"
+"""Inspect's word for an answer that cannot be used."""
+
+
+@scorer(metrics=[accuracy(), stderr()], name=registered("verified"))
+def verified() -> Scorer:
+    """1 if the controller in the answer is verified on its task, otherwise 0."""
+
+    async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
+        scores, rest = await _judged(state)
+        return Score(value=scores.get("verified", 0.0), **rest)
+
+    return score
+
+
+@scorer(
+    metrics={"success": [mean(), stderr()], "time": [mean(), stderr()]},
+    name=registered("driven"),
+)
+def driven() -> Scorer:
+    """The share of worlds that the controller reached, and its mean time score."""
+
+    async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
+        scores, rest = await _judged(state)
+        return Score(value={"success": 0.0, "time": 0.0} | scores, **rest)
+
+    return score
+
+
+def answer_of(state: TaskState) -> Answer:
+    """The controller in the last answer, or what is wrong with the answer."""
+    return read_answer(state.output.completion, must_define="policy")
+
+
+async def in_thread(state: TaskState, work: Callable[[Problem, Poll], Judged]) -> Judged:
+    """Does the judge's work on a sample in a thread, while others wait for theirs.
+
+    A sample that is cancelled ends it.
+
+    Args:
+        state: State of the sample.
+        work: Called with the sample's problem, and with a function to call repeatedly.
+
+    Raises:
+        Fault: The judge or its sandbox is broken. For Inspect this is an error of the
+            sample, neither a pass nor a failure.
+    """
+
+    def judge() -> Judged:
+        return work(problem_of(state.metadata), from_thread.check_cancelled)
+
+    async with concurrency("tdac judge", JUDGES):
+        return await to_thread.run_sync(judge)
+
+
+async def _judged(state: TaskState) -> tuple[dict[str, float], dict[str, Any]]:
+    """The scores of the last answer, none if it has no code; the rest of its score."""
+    source, problem = answer_of(state)
+    if source is None:
+        return {}, {"explanation": unusable(problem), "reason": NO_CODE}
+    judged = await in_thread(state, lambda own, poll: own.judge(source, poll))
+    rest = {
+        "answer": source,
+        "explanation": judged.feedback,
+        "metadata": judged.facts,
+    }
+    return judged.scores, rest
