@@ -7,6 +7,7 @@ level of this name.
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,9 @@ from inspect_ai.dataset import Sample
 from inspect_ai.scorer import Scorer
 
 from tdac_agent.inspect_tasks.names import registered
-from tdac_agent.inspect_tasks.problems import LevelProblem, problem_of
 from tdac_agent.inspect_tasks.scoring import driven, verified
 from tdac_agent.inspect_tasks.solvers import builtin, repair
+from tdac_agent.problems.problem import LevelProblem, problem_of
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.registry import own_environments
 from tdac_envs.ladder.set_file import set_names
@@ -82,9 +83,15 @@ def _task(name: str, about: dict[str, Any], judge: Scorer) -> Task:
         target="a verified controller.py",
         id=name,
         metadata=about,
-        files=problem.files(),
+        files={name: _data_uri(raw) for name, raw in problem.files().items()},
     )
     return Task(dataset=[sample], scorer=judge, version=versions()["tdac"])
+
+
+def _data_uri(raw: bytes) -> str:
+    """The contents of a file, as Inspect copies them into an agent's sandbox."""
+    text = base64.b64encode(raw).decode("ascii")
+    return f"data:application/octet-stream;base64,{text}"
 
 
 for _inspect_name, _tdac_name in single_tasks().items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from anyio import from_thread, to_thread
 from inspect_ai.scorer import Score, Scorer, Target, accuracy, mean, scorer, stderr
@@ -11,15 +11,16 @@ from inspect_ai.solver import TaskState
 from inspect_ai.util import concurrency
 
 from tdac_agent.inspect_tasks.names import registered
-from tdac_agent.inspect_tasks.problems import (
-    Judged,
+from tdac_agent.problems.problem import (
     Poll,
     Problem,
     problem_of,
+    raw,
     unusable,
 )
 from tdac_agent.prompting.extract import Answer, read_answer
 
+T = TypeVar("T")
 JUDGES = 1
 """Judges at a time: one may use all cores."""
 NO_CODE = "invalid_response_format"
@@ -56,7 +57,7 @@ def answer_of(state: TaskState) -> Answer:
     return read_answer(state.output.completion, must_define="policy")
 
 
-async def in_thread(state: TaskState, work: Callable[[Problem, Poll], Judged]) -> Judged:
+async def in_thread(state: TaskState, work: Callable[[Problem, Poll], T]) -> T:
     """Does the judge's work on a sample in a thread, while others wait for theirs.
 
     A sample that is cancelled ends it.
@@ -70,11 +71,11 @@ async def in_thread(state: TaskState, work: Callable[[Problem, Poll], Judged]) -
             sample, neither a pass nor a failure.
     """
 
-    def judge() -> Judged:
+    def called() -> T:
         return work(problem_of(state.metadata), from_thread.check_cancelled)
 
     async with concurrency("tdac judge", JUDGES):
-        return await to_thread.run_sync(judge)
+        return await to_thread.run_sync(called)
 
 
 async def _judged(state: TaskState) -> tuple[dict[str, float], dict[str, Any]]:
@@ -82,7 +83,7 @@ async def _judged(state: TaskState) -> tuple[dict[str, float], dict[str, Any]]:
     source, problem = answer_of(state)
     if source is None:
         return {}, {"explanation": unusable(problem), "reason": NO_CODE}
-    judged = await in_thread(state, lambda own, poll: own.judge(source, poll))
+    judged = await in_thread(state, lambda own, poll: own.judge(raw(source), poll))
     rest = {
         "answer": source,
         "explanation": judged.feedback,

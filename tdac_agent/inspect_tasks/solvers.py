@@ -6,14 +6,14 @@ from inspect_ai.model import ChatMessageUser, ModelOutput
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from tdac_agent.inspect_tasks.names import registered
-from tdac_agent.inspect_tasks.problems import (
+from tdac_agent.inspect_tasks.scoring import answer_of, in_thread
+from tdac_agent.problems.problem import (
     Judged,
     Poll,
     Problem,
-    problem_of,
+    raw,
     unusable,
 )
-from tdac_agent.inspect_tasks.scoring import answer_of, in_thread
 from tdac_envs.core.arguments import whole_number
 
 MOST_ATTEMPTS = 100
@@ -55,7 +55,7 @@ async def _told(state: TaskState, turn: int) -> str | None:
         return unusable(problem)
 
     def rehearse(own: Problem, poll: Poll) -> Judged:
-        return own.rehearse(source, turn, poll)
+        return own.rehearse(raw(source), turn, poll)
 
     judged = await in_thread(state, rehearse)
     return None if judged.passed else REPAIR.format(feedback=judged.feedback)
@@ -66,7 +66,7 @@ def builtin() -> Solver:
     """Answers with tdac's own controller and asks no model, to try an installation."""
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001
-        source = problem_of(state.metadata).reference()
+        source = await in_thread(state, lambda problem, _: problem.reference())
         answer = f"```python\n{source}```\n"
         state.output = ModelOutput.from_content("tdac builtin", answer)
         state.messages.append(state.output.message)

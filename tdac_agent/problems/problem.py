@@ -1,26 +1,28 @@
-"""The problems of the Inspect tasks: their questions, and how answers are judged.
+"""The question of a task or a level, and how answers are judged.
 
-This module does not need Inspect.
+Other frameworks ask and record; nothing here depends on one of them.
 """
 
 from __future__ import annotations
 
-import base64
+import json
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from tdac_agent.builtin.level import controller_of
-from tdac_agent.builtin.provider import template_of
+from tdac_agent.errors import RunError
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import JUDGED, MOST_EPISODES, verify_on_set
 from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.prompt import FULL, generate_prompt
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
+from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import Task, load_task, write_workdir
+from tdac_agent.verification.judge.set_files import level_params
 from tdac_agent.verification.verify import verify
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.ladder.source import read_salt
@@ -51,21 +53,27 @@ class Judged:
 
 
 class Problem(Protocol):
-    """A question, and the judge of its answers."""
+    """A question, and the judge of its answers.
+
+    Attributes:
+        scores: Names of the scores, the main one first.
+    """
+
+    scores: ClassVar[tuple[str, ...]]
 
     def question(self) -> str:
         """The first question to a model."""
 
-    def files(self) -> dict[str, str]:
-        """Files of a controller's working folder, as data URIs, by name."""
+    def files(self) -> dict[str, bytes]:
+        """Files of a controller's working folder, by name."""
 
     def reference(self) -> str:
-        """The source of tdac's own controller, which is not privileged."""
+        """The source of tdac's own controller, which knows what a model knows."""
 
-    def judge(self, source: str, poll: Poll) -> Judged:
+    def judge(self, source: bytes, poll: Poll) -> Judged:
         """The verdict, or the scores."""
 
-    def rehearse(self, source: str, turn: int, poll: Poll) -> Judged:
+    def rehearse(self, source: bytes, turn: int, poll: Poll) -> Judged:
         """The feedback between two answers.
 
         Args:
@@ -77,29 +85,40 @@ class Problem(Protocol):
 
 @dataclass(frozen=True)
 class TaskProblem:
-    """A bundled task."""
+    """A single task."""
 
+    scores: ClassVar[tuple[str, ...]] = ("verified",)
     task: Task
 
     def question(self) -> str:
         """See `Problem`."""
         return generate_prompt(self.task, ())
 
-    def files(self) -> dict[str, str]:
+    def files(self) -> dict[str, bytes]:
         """See `Problem`."""
         with tempfile.TemporaryDirectory(prefix="tdac-files-") as name:
             folder = Path(name)
             write_workdir(folder, self.task)
-            return {file.name: _data_uri(file) for file in sorted(folder.iterdir())}
+            return {file.name: file.read_bytes() for file in sorted(folder.iterdir())}
 
     def reference(self) -> str:
-        """See `Problem`."""
-        template = template_of(self.task.setting)
-        return template.render(template.kind())
+        """See `Problem`. It is tuned until it is verified.
 
-    def judge(self, source: str, poll: Poll) -> Judged:
+        Raises:
+            RunError: Tuning did not help.
+        """
+        with tempfile.TemporaryDirectory(prefix="tdac-builtin-") as name:
+            run = synthesize(self.task, out=Path(name) / "run")
+            if not run.verified:
+                raise RunError(
+                    f"the learner `builtin` has no verified controller for the task "
+                    f"{self.task.name}"
+                )
+            return run.controller.read_text(encoding="utf-8")
+
+    def judge(self, source: bytes, poll: Poll) -> Judged:
         """See `Problem`."""
-        report = verify(_raw(source), self.task, meanwhile=poll)
+        report = verify(source, self.task, meanwhile=poll)
         about = report.provenance
         return Judged(
             passed=report.passed,
@@ -119,8 +138,9 @@ class TaskProblem:
             },
         )
 
-    def rehearse(self, source: str, turn: int, poll: Poll) -> Judged:  # noqa: ARG002
-        """See `Problem`. The same as the verdict: it tells little of held-out starts."""
+    def rehearse(self, source: bytes, turn: int, poll: Poll) -> Judged:
+        """See `Problem`. The verdict: it tells only pass or fail of held-out starts."""
+        del turn
         return self.judge(source, poll)
 
 
@@ -135,6 +155,7 @@ class LevelProblem:
         salt_file: File with the salt of the split `hidden`.
     """
 
+    scores: ClassVar[tuple[str, ...]] = ("success", "time")
     tasks: TaskSet
     worlds: int = 20
     split: str = "test"
@@ -151,18 +172,19 @@ class LevelProblem:
         """See `Problem`."""
         return set_prompt(self.tasks, (), FULL)
 
-    def files(self) -> dict[str, str]:
-        """See `Problem`. All that the worlds share is in the question."""
-        return {}
+    def files(self) -> dict[str, bytes]:
+        """See `Problem`. What differs between worlds is left out."""
+        params = json.dumps(level_params(self.tasks.file), indent=2) + "\n"
+        return {"params.json": params.encode()}
 
     def reference(self) -> str:
         """See `Problem`."""
         return controller_of(self.tasks, "ask a model").read_text(encoding="utf-8")
 
-    def judge(self, source: str, poll: Poll) -> Judged:
+    def judge(self, source: bytes, poll: Poll) -> Judged:
         """See `Problem`."""
         report = verify_on_set(
-            _raw(source),
+            source,
             self.tasks,
             self.split,
             self.worlds,
@@ -171,10 +193,10 @@ class LevelProblem:
         )
         return _driven(report)
 
-    def rehearse(self, source: str, turn: int, poll: Poll) -> Judged:
+    def rehearse(self, source: bytes, turn: int, poll: Poll) -> Judged:
         """See `Problem`. Drives on other worlds in each turn, never on those judged."""
         report = verify_on_set(
-            _raw(source),
+            source,
             self.tasks,
             "dev",
             FEEDBACK_WORLDS,
@@ -200,6 +222,11 @@ def problem_of(about: Mapping[str, Any]) -> Problem:
         about["split"],
         None if salt_file is None else Path(salt_file),
     )
+
+
+def raw(source: str) -> bytes:
+    """The bytes of a controller's source."""
+    return source.encode("utf-8", "surrogatepass")
 
 
 def unusable(problem: str) -> str:
@@ -233,13 +260,3 @@ def _driven(report: SetReport) -> Judged:
             "report": report.model_dump(mode="json"),
         },
     )
-
-
-def _raw(source: str) -> bytes:
-    return source.encode("utf-8", "surrogatepass")
-
-
-def _data_uri(file: Path) -> str:
-    """The contents of a file, as Inspect copies them into an agent's sandbox."""
-    text = base64.b64encode(file.read_bytes()).decode("ascii")
-    return f"data:application/octet-stream;base64,{text}"
