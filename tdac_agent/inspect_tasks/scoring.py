@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 from anyio import from_thread, to_thread
-from inspect_ai.scorer import Score, Scorer, Target, accuracy, mean, scorer, stderr
+from inspect_ai.scorer import (
+    Metric,
+    SampleScore,
+    Score,
+    Scorer,
+    Target,
+    accuracy,
+    mean,
+    metric,
+    scorer,
+)
 from inspect_ai.solver import TaskState
 from inspect_ai.util import concurrency
 
@@ -27,7 +38,27 @@ NO_CODE = "invalid_response_format"
 """Inspect's word for an answer that cannot be used."""
 
 
-@scorer(metrics=[accuracy(), stderr()], name=registered("verified"))
+@metric(name=registered("stderr_of_worlds"))
+def stderr_of_worlds() -> Metric:
+    """Standard error of the share of worlds reached.
+
+    Its unit is the world, not the sample as in Inspect's `stderr`: a level has one
+    sample, whose answers all drive on the same worlds.
+    """
+
+    def compute(scores: list[SampleScore]) -> float:
+        shares = [each.score.as_float() for each in scores]
+        worlds = [(each.sample_metadata or {})["worlds"] for each in scores]
+        spread = sum(
+            share * (1.0 - share) / count
+            for share, count in zip(shares, worlds, strict=True)
+        )
+        return math.sqrt(spread) / len(scores) if scores else 0.0
+
+    return compute
+
+
+@scorer(metrics=[accuracy()], name=registered("verified"))
 def verified() -> Scorer:
     """1 if the controller in the answer is verified on its task, otherwise 0."""
 
@@ -39,7 +70,7 @@ def verified() -> Scorer:
 
 
 @scorer(
-    metrics={"success": [mean(), stderr()], "time": [mean(), stderr()]},
+    metrics={"success": [mean(), stderr_of_worlds()], "time": [mean()]},
     name=registered("driven"),
 )
 def driven() -> Scorer:
