@@ -20,6 +20,7 @@ from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.prompt import FULL, generate_prompt
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
+from tdac_agent.set_synthesis.trials import BLOCKS
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import Task, load_task, write_workdir
 from tdac_agent.verification.judge.set_files import level_params
@@ -200,7 +201,7 @@ class LevelProblem:
             self.tasks,
             "dev",
             FEEDBACK_WORLDS,
-            first=turn * FEEDBACK_WORLDS,
+            first=BLOCKS + turn * FEEDBACK_WORLDS,  # not the judged ones of `dev`
             watch=lambda _done, _reached: poll(),
         )
         return _driven(report)

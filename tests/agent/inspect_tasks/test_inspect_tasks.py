@@ -5,7 +5,9 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
+import anyio
 import pytest
 from installed import installation
 
@@ -205,6 +207,24 @@ def test_names_in_inspect_begin_with_the_package():
 
     for made in (registry.verified, registry.driven, registry.repair, registry.builtin):
         assert registry_info(made).name == f"tdac_agent/{made.__name__}"
+
+
+def test_a_cancelled_sample_ends_the_judges_work():
+    """At once, not when the verification would have ended."""
+    from tdac_agent.inspect_tasks.scoring import in_thread
+
+    state, ended = SimpleNamespace(metadata={"task": "maze"}), []
+
+    def judge(problem, poll):
+        ended.append(problem.judge(NOTHING.encode(), poll))
+
+    async def cancelled():
+        with anyio.move_on_after(0.5) as scope:
+            await in_thread(state, judge)
+        return scope.cancelled_caught
+
+    assert anyio.run(cancelled)
+    assert not ended
 
 
 def test_agents_find_the_working_folder_in_their_sandbox(tmp_path):
