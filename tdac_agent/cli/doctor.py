@@ -27,6 +27,7 @@ EXTRAS = {
     "anthropic": "anthropic",
     "openai": "openai",
     "ray": "ray",
+    "inspect": "inspect_ai",
 }
 TRIALS = (
     ("compiled step", "compiled_step", True),

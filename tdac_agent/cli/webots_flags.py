@@ -8,6 +8,7 @@ from typing import Annotated, Optional
 import typer
 
 from tdac_agent.cli.options import (
+    TASK,
     VIDEO,
     WORLD_FILE,
     Ignore,
@@ -22,7 +23,10 @@ from tdac_agent.cli.options import (
 webots_app = typer.Typer(
     no_args_is_help=True, help="Run Webots controllers in Webots worlds."
 )
-export_app = typer.Typer(no_args_is_help=True, help="Export a controller to Webots.")
+export_app = typer.Typer(
+    no_args_is_help=True,
+    help="Export a controller to Webots, or a task to Harbor.",
+)
 app = typer.Typer()
 app.add_typer(webots_app, name="webots")
 app.add_typer(export_app, name="export")
@@ -122,3 +126,41 @@ def export_webots(
     from tdac_agent.cli import export
 
     raise typer.Exit(export.run(run, out, tier, as_json))
+
+
+@export_app.command(
+    "harbor", epilog="Example: `tdac export harbor --set unknown --out my_task`"
+)
+def export_harbor(
+    out: Annotated[Path, dir_flag("--out", help="Task folder, new or empty.")],
+    task: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option("--task", metavar="PATH", help=f"{TASK}."),
+    ] = None,
+    set_name: Annotated[
+        Optional[str],  # noqa: UP045
+        typer.Option(
+            "--set", metavar="NAME", help="Task set (`tdac sets`) or set.yaml."
+        ),
+    ] = None,
+    worlds: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            "-n",
+            min=1,
+            max=100_000,
+            help="Hidden worlds of the set on which a controller drives.  "
+            "[default: 20]",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write a task or a task set as a task folder of Harbor.
+
+    It has the instruction, the agent's environment, tests that judge with tdac in a
+    container of their own, and an oracle. The hidden worlds of a set follow from a salt
+    that is drawn now; only the tests have it.
+    """
+    from tdac_agent.cli import export_harbor
+
+    raise typer.Exit(export_harbor.run(task, set_name, worlds, out, as_json))

@@ -1,0 +1,1 @@
+"""Task folders for Harbor, and the judge that they contain."""

@@ -1,0 +1,123 @@
+"""The scorers of the Inspect tasks: tdac's judge."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from anyio import from_thread, to_thread
+from inspect_ai.scorer import (
+    Metric,
+    SampleScore,
+    Score,
+    Scorer,
+    Target,
+    accuracy,
+    mean,
+    metric,
+    scorer,
+)
+from inspect_ai.solver import TaskState
+from inspect_ai.util import concurrency
+
+from tdac_agent.inspect_tasks.names import registered
+from tdac_agent.problems.problem import (
+    Poll,
+    Problem,
+    problem_of,
+    raw,
+    unusable,
+)
+from tdac_agent.prompting.extract import Answer, read_answer
+
+T = TypeVar("T")
+JUDGES = 1
+"""Judges at a time: one may use all cores."""
+NO_CODE = "invalid_response_format"
+"""Inspect's word for an answer that cannot be used."""
+
+
+@metric(name=registered("stderr_of_worlds"))
+def stderr_of_worlds() -> Metric:
+    """Standard error of the share of worlds reached.
+
+    Its unit is the world, not the sample as in Inspect's `stderr`: a level has one
+    sample, whose answers all drive on the same worlds.
+    """
+
+    def compute(scores: list[SampleScore]) -> float:
+        shares = [each.score.as_float() for each in scores]
+        worlds = [(each.sample_metadata or {})["worlds"] for each in scores]
+        spread = sum(
+            share * (1.0 - share) / count
+            for share, count in zip(shares, worlds, strict=True)
+        )
+        return math.sqrt(spread) / len(scores) if scores else 0.0
+
+    return compute
+
+
+@scorer(metrics=[accuracy()], name=registered("verified"))
+def verified() -> Scorer:
+    """1 if the controller in the answer is verified on its task, otherwise 0."""
+
+    async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
+        scores, rest = await _judged(state)
+        return Score(value=scores.get("verified", 0.0), **rest)
+
+    return score
+
+
+@scorer(
+    metrics={"success": [mean(), stderr_of_worlds()], "time": [mean()]},
+    name=registered("driven"),
+)
+def driven() -> Scorer:
+    """The share of worlds that the controller reached, and its mean time score."""
+
+    async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
+        scores, rest = await _judged(state)
+        return Score(value={"success": 0.0, "time": 0.0} | scores, **rest)
+
+    return score
+
+
+def answer_of(state: TaskState) -> Answer:
+    """The controller in the last answer, or what is wrong with the answer."""
+    return read_answer(state.output.completion, must_define="policy")
+
+
+async def in_thread(state: TaskState, work: Callable[[Problem, Poll], T]) -> T:
+    """Does the judge's work on a sample in a thread, while others wait for theirs.
+
+    A sample that is cancelled ends it.
+
+    Args:
+        state: State of the sample.
+        work: Called with the sample's problem, and with a function to call repeatedly.
+
+    Raises:
+        Fault: The judge or its sandbox is broken. For Inspect this is an error of the
+            sample, neither a pass nor a failure.
+    """
+
+    def called() -> T:
+        return work(problem_of(state.metadata), from_thread.check_cancelled)
+
+    async with concurrency("tdac judge", JUDGES):
+        return await to_thread.run_sync(called)
+
+
+async def _judged(state: TaskState) -> tuple[dict[str, float], dict[str, Any]]:
+    """The scores of the last answer, none if it has no code; the rest of its score."""
+    source, problem = answer_of(state)
+    if source is None:
+        return {}, {"explanation": unusable(problem), "reason": NO_CODE}
+    judged = await in_thread(state, lambda own, poll: own.judge(raw(source), poll))
+    rest = {
+        "answer": source,
+        "explanation": judged.feedback,
+        "metadata": judged.facts,
+    }
+    return judged.scores, rest

@@ -1,0 +1,1 @@
+"""A task or a level as a question for a model, with the judge of its answers."""
