@@ -107,16 +107,21 @@ class Trials:
         A candidate that reaches all goals goes on with the next worlds.
         """
         while self.feedback_left:
-            count = min(self.block, self.feedback_left)
-            first = self.first + self.feedback_used
-            out = candidate.folder / f"feedback-{len(candidate.feedback) + 1}"
-            report = self._drive(candidate, first, count, out)
-            candidate.feedback.append(report)
-            self.feedback_used += report.worlds
-            self.feedback_left -= report.worlds
+            report = self.drive_next(candidate)
             if report.worlds == 0 or report.successes < report.worlds:
                 return report
         return None
+
+    def drive_next(self, candidate: Candidate) -> SetReport:
+        """Drives on the next block of feedback worlds; there must be some left."""
+        count = min(self.block, self.feedback_left)
+        first = self.first + self.feedback_used
+        out = candidate.folder / f"feedback-{len(candidate.feedback) + 1}"
+        report = self._drive(candidate, first, count, out)
+        candidate.feedback.append(report)
+        self.feedback_used += report.worlds
+        self.feedback_left -= report.worlds
+        return report
 
     def validate(self, candidate: Candidate, count: int) -> None:
         """Drives on the next `count` validation worlds of this candidate."""

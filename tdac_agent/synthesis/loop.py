@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -18,8 +17,8 @@ from tdac_agent.prompting.prompt import generate_prompt, load_template
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
-from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
+from tdac_agent.synthesis.candidates import Tests, deliver, verify_candidate
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
 from tdac_agent.synthesis.setup import (
     account_of,
@@ -29,11 +28,8 @@ from tdac_agent.synthesis.setup import (
     settled_seed,
 )
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.figures import draw_trajectories
-from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
-from tdac_agent.verification.verify import kept_report, load_trajectories, verify
 
 MOST_SPENT = 3
 """Iterations in a row without code, after which a paid model is given up."""
@@ -147,19 +143,10 @@ def synthesize(
         paid = any(model.paid for model in models)
         with ExitStack() as stack:
             warm = judge or stack.enter_context(WarmJudge(task=task))
-            return _run(dialogue, start_from, _Tests(task, warm, tier), paid=paid)
+            return _run(dialogue, start_from, Tests(task, warm, tier), paid=paid)
 
 
-@dataclass(frozen=True, slots=True)
-class _Tests:
-    """Where candidates are tested: on a task, by a judge, in a sandbox tier."""
-
-    task: Task
-    judge: WarmJudge
-    tier: str
-
-
-def _run(dialogue: Dialogue, given: str | None, tests: _Tests, *, paid: bool) -> Run:
+def _run(dialogue: Dialogue, given: str | None, tests: Tests, *, paid: bool) -> Run:
     """Runs the loop, and records how it ended."""
     recorder = dialogue.calls.recorder
     try:
@@ -180,7 +167,7 @@ def _run(dialogue: Dialogue, given: str | None, tests: _Tests, *, paid: bool) ->
     return recorder.run
 
 
-def _search(dialogue: Dialogue, given: str | None, tests: _Tests) -> None:
+def _search(dialogue: Dialogue, given: str | None, tests: Tests) -> None:
     """Algorithm 2, until a candidate has passed or K iterations are over."""
     recorder = dialogue.calls.recorder
     run = recorder.run
@@ -204,12 +191,12 @@ def _search(dialogue: Dialogue, given: str | None, tests: _Tests) -> None:
                 recorder.judged(k, j, report, notes, unchanged=True)
                 dialogue.saw_no_change(k, j)
             else:
-                report = _verify(recorder, k, j, source, folder, tests)
+                report = verify_candidate(recorder, k, j, source, folder, tests)
                 recorder.judged(k, j, report, notes)
                 failure = feedback_of(report)
                 dialogue.saw(k, j, failure)
             if report.passed:
-                _deliver(recorder, tests.task, k, source, report, folder)
+                deliver(recorder, tests.task, k, source, report, folder)
                 return
             parent = source
             assert failure is not None
@@ -228,7 +215,7 @@ def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
     )
 
 
-def _prove(recorder: Recorder, tests: _Tests) -> None:
+def _prove(recorder: Recorder, tests: Tests) -> None:
     """Checks the test suite before an answer is paid for, once per run.
 
     Raises:
@@ -248,42 +235,3 @@ def _prove(recorder: Recorder, tests: _Tests) -> None:
     )
     facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
     recorder.event("prove.end", **facts)
-
-
-def _verify(
-    recorder: Recorder,
-    k: int,
-    j: int,
-    source: str,
-    folder: Path,
-    tests: _Tests,
-) -> Report:
-    """The report on a candidate; a recorded one is reused."""
-    task, seed = tests.task, recorder.run.seed
-    recorder.event("verify.start", k=k, j=j)
-    kept = kept_report(folder, task, source, seed) if recorder.run.mark else None
-    return kept or verify(
-        folder / "controller.py",
-        task,
-        tier=tests.tier,
-        seed=seed,
-        out=folder,
-        judge=tests.judge,
-    )
-
-
-def _deliver(
-    recorder: Recorder, task: Task, k: int, source: str, report: Report, evidence: Path
-) -> None:
-    """Copies the verified controller and its evidence to the top of the run folder."""
-    folder = recorder.run.folder
-    write_atomic(folder / "controller.py", source)
-    write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")
-    (folder / "trajectories").mkdir(exist_ok=True)
-    for path in sorted((evidence / "trajectories").glob("*.npz")):
-        write_atomic(folder / "trajectories" / path.name, path.read_bytes())
-    outcomes = {episode.name: episode.outcome for episode in report.episodes}
-    trajectories = load_trajectories(folder / "trajectories")
-    draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")
-    recorder.run.tau = k
-    recorder.finish("verified", k=k)
