@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,14 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.prompt import VARIANTS
 from tdac_agent.runs.ownership import is_own, is_own_folder, wishes_of
-from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
+from tdac_agent.runs.run_record import (
+    AGENT,
+    GIVEN_FILE,
+    PROMPT_FILE,
+    RUN_FILE,
+    Run,
+    load_run,
+)
 from tdac_agent.storage.files import UNFINISHED
 from tdac_agent.storage.locks import LOCK_FILE
 from tdac_agent.tasks.task import Task, load_task
@@ -75,9 +83,16 @@ def check_same(before: Run, now: Run) -> None:
     if differences:
         raise RunError(
             f"{before.folder} contains another run ({'; '.join(differences)}): give a "
-            "new folder with --out, or resume that run: tdac synth --resume "
-            f"{before.folder}"
+            f"new folder with --out, or resume that run: {resume_words(before)}"
         )
+
+
+def resume_words(run: Run) -> str:
+    """The command that continues a run."""
+    folder = shlex.quote(str(run.folder))
+    if run.learner == AGENT:
+        return f"tdac mcp --out {folder}"
+    return f"tdac synth --resume {folder}"
 
 
 def check_own(before: Run) -> None:
@@ -132,7 +147,7 @@ def resume_arguments(
             f"command with --out {folder}"
         )
     flags = {name: value for name, value in (given or {}).items() if value is not None}
-    task = _task(folder)
+    task = recorded_task(folder)
     if not is_own(run, task.suite):
         permit(folder, wishes_of(run, task.suite, flags), trust=trust)
     suite = flags.pop("suite", None)
@@ -177,7 +192,7 @@ def _text(file: Path) -> str:
         raise RunError(f"cannot read {file}: {one_line_reason(error)}") from error
 
 
-def _task(folder: Path) -> Task:
+def recorded_task(folder: Path) -> Task:
     """Loads the task of a run with its original parameters.
 
     The folder has a copy of the map or world; `params.json` names the original file.
