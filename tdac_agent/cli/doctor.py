@@ -27,6 +27,7 @@ EXTRAS = {
     "anthropic": "anthropic",
     "openai": "openai",
     "ray": "ray",
+    "mcp": "mcp",
 }
 TRIALS = (
     ("compiled step", "compiled_step", True),

@@ -406,8 +406,10 @@ You are asked for a robot controller for {about}, one Python file.
 
 {judged}
 
-Left: {left}. Where the text below asks for an answer with a fenced block, call `submit`
-instead. The judge runs the file in a sandbox; only what it does in an episode counts.
+Left: {left}.
+
+Where the text below asks for an answer with a fenced block, call `submit` instead. The
+judge runs the file in a sandbox; only what it does in an episode counts.
 
 ---
 

@@ -173,9 +173,11 @@ def _picture(task: AnyTask, trajectory: Trajectory, figures: WorldEpisode) -> Im
     if figures.success:
         return _whole(task, trajectory, figures.outcome, name)
     text = (figures.text or figures.error or "").replace("°", " deg")
-    fact = text.partition(". ")[0].encode("ascii", "replace").decode()[:MAX_FACT]
+    title = f"{name}: {figures.cause or figures.outcome}"
+    fact = text.removeprefix(f"{title}: ").partition(". ")[0]
+    fact = fact.encode("ascii", "replace").decode()[:MAX_FACT]
     event = Event(
-        title=f"{name}: {figures.cause or figures.outcome}",
+        title=title,
         facts=(fact, f"ended in step {trajectory.steps}"),
         where=np.asarray(trajectory.poses[-1:, :2]),
         contact=contact_of(task, trajectory, figures.outcome),

@@ -118,6 +118,9 @@ def _submit(desk: Desk, arguments: Source, client: str) -> CallToolResult:
     return _said(f"{text}Left: {left}.", answer)
 
 
+_STATE = {True: "verified", False: "not verified"}
+
+
 def _failures(desk: Desk, arguments: Numbered, client: str) -> CallToolResult:
     del client
     return _said(desk.failures(arguments.submission))
@@ -139,7 +142,7 @@ def _submissions(desk: Desk, arguments: Nothing, client: str) -> CallToolResult:
     del arguments, client
     answer = desk.listed()
     lines = [
-        f"{each.submission}: {first_word(verified=each.verified)}, {each.summary}"
+        f"{each.submission}: {_STATE[each.verified]}: {each.summary}"
         for each in answer.submissions
     ]
     lines = lines or ["nothing has been submitted"]

@@ -81,18 +81,17 @@ def check_same(before: Run, now: Run) -> None:
         if getattr(before, name) != getattr(now, name)
     ]
     if differences:
+        command = resume_words(before, before.folder)
         raise RunError(
             f"{before.folder} contains another run ({'; '.join(differences)}): give a "
-            f"new folder with --out, or resume that run: {resume_words(before)}"
+            f"new folder with --out, or resume that run: {command}"
         )
 
 
-def resume_words(run: Run) -> str:
-    """The command that continues a run."""
-    folder = shlex.quote(str(run.folder))
-    if run.learner == AGENT:
-        return f"tdac mcp --out {folder}"
-    return f"tdac synth --resume {folder}"
+def resume_words(run: Run, folder: Path | str) -> str:
+    """The command that continues a run in a folder."""
+    command = "tdac mcp --out" if run.learner == AGENT else "tdac synth --resume"
+    return f"{command} {shlex.quote(str(folder))}"
 
 
 def check_own(before: Run) -> None:
