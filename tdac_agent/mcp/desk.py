@@ -197,11 +197,16 @@ class Desk:
             Fault: The sandbox is broken; the submission does not count.
         """
         source = _source_of(text)
+        self._check_open()
         if self.left.episodes is None:
             for each in self.submissions:
                 if each.source == source:  # the verdict would be the same
                     return self._answer(each)
-        self._check_open()
+        if self.left.spent:
+            raise Refused(
+                f"the budget is spent after {len(self.submissions)} submissions: call "
+                "choose with the best one"
+            )
         number = len(self.submissions) + 1
         raw = source.encode("utf-8", "surrogatepass")
         self.recorder.candidate(number, 0, source)
@@ -320,10 +325,10 @@ class Desk:
         )
 
     def _check_open(self) -> None:
-        """Refuses a submission that cannot be judged any more.
+        """Refuses submissions after the choice.
 
         Raises:
-            Refused: The run has ended, or the budget is spent.
+            Refused: The run has ended, or will end with this choice.
         """
         if self.run.finished:
             raise Refused(f"{self._ending()}; nothing can be submitted any more")
@@ -331,11 +336,6 @@ class Desk:
             raise Refused(
                 f"submission {self.chosen} was chosen, so nothing can be submitted; "
                 f"choose({self.chosen}) gives the verdict"
-            )
-        if self.left.spent:
-            raise Refused(
-                f"the budget is spent after {len(self.submissions)} submissions: call "
-                "choose with the best one"
             )
 
     def _answer(self, submission: Submission) -> SubmitAnswer:
