@@ -150,7 +150,7 @@ def test_flags_that_are_refused(tdac, arguments, told):
 @pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "end of stdin"])
 def test_the_end_of_a_server(tmp_path, how, no_traces, small_task):
     """At once, although a submission is being judged; stdout has the protocol only."""
-    out = tmp_path / "run"
+    out, by_signal = tmp_path / "run", how != "end of stdin"
     process = subprocess.Popen(
         words("--task", small_task.folder, "--out", out),
         stdin=subprocess.PIPE,
@@ -163,23 +163,24 @@ def test_the_end_of_a_server(tmp_path, how, no_traces, small_task):
         process.stdin.write(json.dumps({"jsonrpc": "2.0", **message}) + "\n")
         process.stdin.flush()
 
-    name = {"name": "raw\x1b[2J", "version": "1"}
-    about = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": name}
-    send(id=1, method="initialize", params=about)
-    assert json.loads(process.stdout.readline())["id"] == 1
-    send(method="notifications/initialized")
-    arguments = {"source": "def policy(obs):\n    while True:\n        pass\n"}
-    call = {"name": "submit", "arguments": arguments, "_meta": {"progressToken": 1}}
-    send(id=2, method="tools/call", params=call)
-    told = json.loads(process.stdout.readline())
-    assert told["method"] == "notifications/progress"
-    if how == "end of stdin":
-        process.stdin.close()
-    else:
-        process.send_signal(getattr(signal, how))
-    rest, error = process.stdout.read(), process.stderr.read()
-    assert process.wait(SECONDS) == (0 if how == "end of stdin" else 130)
-    assert error == ("" if how == "end of stdin" else "interrupted\n")
+    with process:
+        name = {"name": "raw\x1b[2J", "version": "1"}
+        about = {"protocolVersion": "2025-06-18", "capabilities": {}}
+        send(id=1, method="initialize", params={**about, "clientInfo": name})
+        assert json.loads(process.stdout.readline())["id"] == 1
+        send(method="notifications/initialized")
+        arguments = {"source": "def policy(obs):\n    while True:\n        pass\n"}
+        call = {"name": "submit", "arguments": arguments, "_meta": {"progressToken": 1}}
+        send(id=2, method="tools/call", params=call)
+        told = json.loads(process.stdout.readline())
+        assert told["method"] == "notifications/progress"
+        if by_signal:
+            process.send_signal(getattr(signal, how))
+        else:
+            process.stdin.close()
+        rest, error = process.stdout.read(), process.stderr.read()
+        assert process.wait(SECONDS) == (130 if by_signal else 0)
+    assert error == ("interrupted\n" if by_signal else "")
     for line in rest.splitlines():
         assert json.loads(line)["jsonrpc"] == "2.0"
     run = record(out)

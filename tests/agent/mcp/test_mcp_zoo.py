@@ -12,13 +12,14 @@ sys.path.append(str(Path(__file__).parents[1] / "zoo"))
 
 from cases import all_cases
 from enclosure import Canaries
-from grounds import zoo_task
+from grounds import write_map_task, zoo_task
 from mcp_agent import converse
 
 from tdac_agent.mcp.opening import open_desk
 from tdac_agent.mcp.server import Counter
 from tdac_agent.sandbox import MAX_SOURCE_BYTES
 from tdac_agent.tasks.installation import lasting_secret
+from tdac_agent.tasks.task import load_task
 
 ATTACKS = [case for case in all_cases() if not case.passes]
 FEW = {
@@ -51,12 +52,21 @@ def submit_all(cases, out):
                 for case in cases
                 if (case.kind, case.header["profile"]) == (kind, profile)
             ]
-            check(own, zoo_task(kind).with_profile(profile), out / f"{kind}-{profile}")
+            task = task_of(kind, out).with_profile(profile)
+            check(own, task, out / f"{kind}-{profile}")
+
+
+def task_of(kind, out):
+    """The zoo's task, with files of which a run folder can have copies."""
+    if kind != "map2d":
+        return zoo_task(kind)
+    folder = out / "task"
+    folder.mkdir(parents=True, exist_ok=True)
+    return load_task(write_map_task(folder))
 
 
 def check(cases, task, out):
     """No attack of these is verified, reads anything, or controls a terminal."""
-    out.parent.mkdir(exist_ok=True)
     episodes = 6 * (len(cases) + 1)
     with (
         tempfile.TemporaryDirectory(prefix="zoo-") as name,
