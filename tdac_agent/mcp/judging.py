@@ -28,15 +28,15 @@ class Submission:
 
 
 class Judging(Protocol):
-    """Judges submissions: `OnTask` or `OnSet`.
+    """Judges submissions: `OnTask` or `OnSet`."""
 
-    Attributes:
-        recorder: Records the run.
-        about: What the submissions are for, in a few words.
-    """
+    @property
+    def recorder(self) -> Recorder:
+        """Records the run."""
 
-    recorder: Recorder
-    about: str
+    @property
+    def about(self) -> str:
+        """What the submissions are for, in a few words."""
 
     def question(self) -> str:
         """What is to be written: the first question to a model."""

@@ -9,7 +9,7 @@ import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, TypeVar
 
 from mcp.server import Server, ServerRequestContext
 from mcp_types import (
@@ -27,6 +27,7 @@ from tdac_agent.mcp.tools import BY_NAME, TOOLS, ToolSpec, problem
 from tdac_envs.core.errors import TdacError, hint, one_line_reason
 
 Context = ServerRequestContext[dict[str, Any]]
+T = TypeVar("T")
 BETWEEN_STEPS = 1.0
 """Least time between two notifications of progress, s."""
 INSTRUCTIONS = (
@@ -49,7 +50,7 @@ class Counter:
         self._desk = desk
         self._thread = ThreadPoolExecutor(1, "tdac-mcp")
         # What an earlier server left unfinished comes first.
-        self._thread.submit(self._answered, desk.catch_up)
+        self._thread.submit(_answered, desk.catch_up)
 
     def server(self) -> Server[dict[str, Any]]:
         """The server, for any transport."""
@@ -90,9 +91,10 @@ class Counter:
         client, on_step = _client_of(context), _reporter(context)
 
         def work() -> CallToolResult:
-            return self._answered(lambda: self._work(tool, arguments, client, on_step))
+            return self._work(tool, arguments, client, on_step)
 
-        return await asyncio.wrap_future(self._thread.submit(work))
+        future = self._thread.submit(_answered, work)
+        return await asyncio.wrap_future(future)
 
     def _work(
         self,
@@ -109,12 +111,13 @@ class Counter:
         finally:
             self._desk.watch.begin(None)
 
-    def _answered(self, work: Callable[[], Any]) -> Any:
-        """The result of some work, or a line on why there is none."""
-        try:
-            return work()
-        except Exception as error:
-            return problem(_line(error))
+
+def _answered(work: Callable[[], T]) -> T | CallToolResult:
+    """The result of some work, or a line on why there is none."""
+    try:
+        return work()
+    except Exception as error:
+        return problem(_line(error))
 
 
 def _line(error: Exception) -> str:

@@ -4,6 +4,7 @@ import os
 import stat
 
 import pytest
+from few_worlds import KNOWN
 from mcp_agent import STILL, converse, journal, over_stdio, record
 
 from tdac_agent.environments.map2d.builtin import Parameters, render_controller
@@ -121,10 +122,7 @@ def test_from_nothing_to_verified_on_a_small_set(serve, easy, solver, out):
 @pytest.mark.slow
 def test_from_nothing_to_verified_on_the_ladder(tmp_path, tdac):
     """The level `unknown`, over stdio, with its built-in controller as the good one."""
-    from tdac_agent.builtin.level import LevelController
-    from tdac_envs import load_set
-
-    good = LevelController(load_set("unknown")).source
+    good = KNOWN.with_name("unknown.py").read_text()
 
     async def conversation(agent):
         assert "the task set unknown" in await agent.told("read_task")

@@ -19,26 +19,28 @@ SECONDS = 60
 SPIN = "def policy(obs):\n    return 0.3, -0.3\n"
 
 
-def wait_for(folder, event, count):
-    """Waits until the journal has so many records of an event."""
+def wait_until(true):
+    """Waits until a condition is true."""
     deadline = time.monotonic() + SECONDS
-    while time.monotonic() < deadline:
-        if (folder / "journal.jsonl").exists():
-            found = [each for each in journal(folder) if each["event"] == event]
-            if len(found) == count:
-                return
+    while not true():
+        assert time.monotonic() < deadline
         time.sleep(0.01)
-    raise AssertionError(f"no {event}")
 
 
-def kill_while(server, folder, event, count, request):
-    """Sends a request, and kills the server after an event."""
+def has(folder, event, count):
+    """Whether the journal has so many records of an event."""
+    found = [each for each in journal(folder) if each["event"] == event]
+    return len(found) == count
+
+
+def kill_when(server, true, request):
+    """Sends a request, and kills the server when a condition is true."""
 
     async def whole():
         async with anyio.create_task_group() as group:
 
             async def kill():
-                await anyio.to_thread.run_sync(wait_for, folder, event, count)
+                await anyio.to_thread.run_sync(wait_until, true)
                 server.end(signal.SIGKILL)
                 group.cancel_scope.cancel()
 
@@ -46,7 +48,7 @@ def kill_while(server, folder, event, count, request):
             transport = over_http(server.address)
             await anyio.to_thread.run_sync(converse, transport, request)
 
-    with pytest.raises(BaseException):  # noqa: B017, PT011 - however it breaks
+    with pytest.raises(Exception):  # noqa: B017, PT011 - however it breaks
         anyio.run(whole)
 
 
@@ -64,7 +66,7 @@ def test_killed_while_it_judges(running, tmp_path):
         return await agent.submit(SPIN)
 
     assert converse(over_http(server.address), first)["episodes_left"] == 32
-    kill_while(server, out, "drive.start", 2, second)
+    kill_when(server, lambda: has(out, "drive.start", 2), second)
     assert record(out)["status"] == "running"
 
     async def later(agent):
@@ -96,8 +98,9 @@ def test_killed_after_the_choice(running, tmp_path, solver):
         await agent.submit(solver)
         await agent.choose(1)
 
-    kill_while(server, out, "hidden.start", 1, first)
-    salt = (out / "sealed" / "salt").read_bytes()
+    file = out / "sealed" / "salt"
+    kill_when(server, file.exists, first)
+    salt = file.read_bytes()
 
     async def later(agent):
         told = await agent.error("submit", source=STILL)
@@ -106,7 +109,7 @@ def test_killed_after_the_choice(running, tmp_path, solver):
     told, verdict = converse(over_stdio(tmp_path, "--out", out), later)
     assert "was chosen" in told
     assert verdict["verified"]
-    assert (out / "sealed" / "salt").read_bytes() == salt
+    assert file.read_bytes() == salt
     assert record(out)["status"] == "verified"
 
 
