@@ -168,7 +168,7 @@ class Desk:
 
     def met(self, client: str) -> None:
         """Records the program of an agent, once."""
-        name = one_line(client)[:LONGEST_NAME]
+        name = _named(client)
         known = self.run.clients
         if name in known or len(known) == MOST_CLIENTS or self.run.finished:
             return
@@ -208,12 +208,12 @@ class Desk:
                 "choose with the best one"
             )
         number = len(self.submissions) + 1
-        raw = source.encode("utf-8", "surrogatepass")
-        self.recorder.candidate(number, 0, source)
-        self.recorder.event(
-            SUBMIT, k=number, sha256=sha256_of(raw), client=one_line(client)
-        )
-        submission = self._judge(number, source)
+        try:
+            submission = self._judge(number, source, client)
+        except (Fault, TdacError) as error:
+            # The next start shall not judge what the agent will submit again.
+            (self._folder(number) / "controller.py").unlink(missing_ok=True)
+            raise Fault(f"{error}; this submission does not count") from error
         answer = self._answer(submission)
         self._end_if_hopeless()
         return answer
@@ -302,14 +302,14 @@ class Desk:
             raise RunError(f"submission {number} cannot be read: {reason}") from error
         self.submissions.append(Submission(number, source, folder, judged))
 
-    def _judge(self, number: int, source: str) -> Submission:
+    def _judge(self, number: int, source: str, client: str | None = None) -> Submission:
+        """Judges a file, which is written before; a new one has a client."""
         folder = self.recorder.candidate(number, 0, source)
-        try:
-            judged = self.judging.judge(number, source, folder)
-        except (Fault, TdacError) as error:
-            raise Fault(
-                f"{error}; submission {number} was not judged and does not count"
-            ) from error
+        if client is not None:
+            sha256 = sha256_of(source.encode("utf-8", "surrogatepass"))
+            facts = {"sha256": sha256, "client": _named(client)}
+            self.recorder.event(SUBMIT, k=number, **facts)
+        judged = self.judging.judge(number, source, folder)
         submission = Submission(number, source, folder, judged)
         self.submissions.append(submission)
         return submission
@@ -364,6 +364,11 @@ class Desk:
             f"the run has ended: submission {self.chosen} was chosen and is "
             f"{self.run.status}"
         )
+
+
+def _named(client: str) -> str:
+    """The name of an agent's program, for records."""
+    return one_line(client)[:LONGEST_NAME]
 
 
 def _is_choice(record: dict[str, Any]) -> bool:

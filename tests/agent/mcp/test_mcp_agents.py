@@ -61,6 +61,8 @@ def test_from_nothing_to_verified_on_a_bundled_task(tmp_path, good_on_maze, tdac
     assert (run["agent"], run["clients"]) == ("unconfined", ["scripted 7"])
     assert (out / "controller.py").read_text().strip() == good_on_maze.strip()
     assert (out / "trajectory.png").is_file()
+    diff = (out / "iterations" / "k03" / "j0" / "controller.diff").read_text()
+    assert "-def not_main" in diff
     page = make_page(out).html.decode()
     assert "unconfined: scripted 7" in page
     assert "tdac asked no model" in page

@@ -1,8 +1,11 @@
 """What agents should not do: each is answered in one line, and harms nothing."""
 
+import contextlib
 import json
+import os
 import signal
 import subprocess
+from pathlib import Path
 
 import anyio
 import pytest
@@ -91,6 +94,35 @@ def test_a_refused_file_costs_no_episode(serve, few):
         await agent.error("picture", submission=1, episode=1)
 
     serve(few, conversation, episodes=10)
+
+
+def judges():
+    """Processes of judges that this process has started."""
+    found = set()
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+            command = (folder / "cmdline").read_bytes()
+            if int(fields[1]) == os.getpid() and b"judge.server" in command:
+                found.add(int(folder.name))
+    return found
+
+
+def test_a_broken_judge(serve, small_task, out):
+    """Neither verified nor failed: the submission does not count, nor is it kept."""
+    others = judges()
+
+    async def conversation(agent):
+        for process in judges() - others:
+            os.kill(process, signal.SIGKILL)
+        told = await agent.error("submit", source=STILL)
+        assert told.startswith("infrastructure fault, no verdict: the judge ended")
+        assert told.endswith("this submission does not count")
+        return (await agent.call("submissions")).structured_content
+
+    listed = serve(small_task, conversation)
+    assert (listed["submissions"], listed["submissions_left"]) == ([], 21)
+    assert list(out.glob("iterations/*/*/controller.py")) == []
 
 
 def test_two_at_once(running, tmp_path, small_task, good_source):
