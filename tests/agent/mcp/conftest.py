@@ -23,7 +23,7 @@ def few(tmp_path):
 @pytest.fixture
 def easy(tmp_path):
     """The same, with a low bar: few hidden worlds decide that it is met."""
-    return load_set(write_set(tmp_path / "easy.yaml", bar=0.2))
+    return load_set(write_set(tmp_path / "easy.yaml", bar=0.1))
 
 
 @pytest.fixture(scope="session")

@@ -110,7 +110,7 @@ def test_from_nothing_to_verified_on_a_small_set(serve, easy, solver, out):
 
     verdict = serve(easy, conversation)
     assert verdict["verified"]
-    assert verdict["worlds"] >= verdict["reached"] > 8
+    assert verdict["worlds"] >= verdict["reached"] > 4
     assert "hidden worlds; accepted at" in verdict["summary"]
     run = record(out)
     assert (run["status"], run["tau"], run["agent"]) == ("verified", 3, "unconfined")

@@ -44,16 +44,14 @@ async def attack(agent, case, source):
 
 
 def submit_all(cases, out):
-    """Submits attacks in one run on each kind of task, among canaries."""
-    for kind in {case.kind for case in cases}:
-        for profile in {case.header["profile"] for case in cases if case.kind == kind}:
-            own = [
-                case
-                for case in cases
-                if (case.kind, case.header["profile"]) == (kind, profile)
-            ]
-            task = task_of(kind, out).with_profile(profile)
-            check(own, task, out / f"{kind}-{profile}")
+    """Submits attacks among canaries: one run for each kind of task, profile, seed."""
+    groups = {}
+    for case in cases:
+        seed = None if case.header.get("seed") else 0
+        groups.setdefault((case.kind, case.header["profile"], seed), []).append(case)
+    for (kind, profile, seed), own in groups.items():
+        task = task_of(kind, out).with_profile(profile)
+        check(own, task, seed, out / f"{kind}-{profile}-{seed}")
 
 
 def task_of(kind, out):
@@ -65,7 +63,7 @@ def task_of(kind, out):
     return load_task(write_map_task(folder))
 
 
-def check(cases, task, out):
+def check(cases, task, seed, out):
     """No attack of these is verified, reads anything, or controls a terminal."""
     episodes = 6 * (len(cases) + 1)
     with (
@@ -74,6 +72,8 @@ def check(cases, task, out):
         open_desk(task, out, episodes, "unconfined") as desk,
         contextlib.closing(Counter(desk)) as counter,
     ):
+        # Weak controllers fail with the zoo's seed, not with each one.
+        desk.run.seed = seed
         secrets = (Path(name) / "secret.txt").read_text(), lasting_secret().hex()
 
         async def conversation(agent):
