@@ -33,7 +33,11 @@ LEFT_OUT = {
     "needs a person": re.compile("manual:"),
     "needs a display": re.compile(r"^tdac play (?!.*--video)|studio --open"),
 }
-NEEDS = {"stable_baselines3": re.compile(r"tdac train|\.zip"), "nicegui": "tdac studio"}
+NEEDS = {
+    "stable_baselines3": re.compile(r"tdac train|\.zip"),
+    "nicegui": "tdac studio",
+    "mcp.server": "tdac mcp",
+}
 """Extras, and the commands that need them."""
 
 GO_TO_GOAL = """

@@ -28,6 +28,7 @@ EXTRAS = {
     "openai": "openai",
     "ray": "ray",
     "inspect": "inspect_ai",
+    "mcp": "mcp",
 }
 TRIALS = (
     ("compiled step", "compiled_step", True),

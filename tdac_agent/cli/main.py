@@ -26,6 +26,7 @@ from tdac_agent.cli import (
     doctor_flags,
     evaluate_flags,
     map_flags,
+    mcp_flags,
     play_flags,
     runs_flags,
     sets_flags,
@@ -98,6 +99,7 @@ app = typer.Typer(
 PARTS = (
     map_flags.app,
     synth_flags.app,
+    mcp_flags.app,
     verify_flags.app,
     play_flags.app,
     evaluate_flags.app,

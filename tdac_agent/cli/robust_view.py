@@ -10,7 +10,13 @@ from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
-from tdac_agent.evaluation.robust_report import Interval, RobustReport, SequentialResult
+from tdac_agent.evaluation.robust_report import (
+    Interval,
+    RobustReport,
+    SequentialResult,
+    decision_text,
+    percent,
+)
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.judge.seeded import SeededEpisode
 
@@ -108,26 +114,17 @@ def _errors(report: RobustReport) -> list[str]:
 def rate_text(rate: float, interval: Interval) -> str:
     """A success rate with its interval."""
     return (
-        f"[bold]success rate {_percent(rate)}[/], "
-        f"{100 * interval.confidence:.0f} % interval {_percent(interval.low)} to "
-        f"{_percent(interval.high)} ({interval.method})"
+        f"[bold]success rate {percent(rate)}[/], "
+        f"{100 * interval.confidence:.0f} % interval {percent(interval.low)} to "
+        f"{percent(interval.high)} ({interval.method})"
     )
-
-
-def decision_text(result: SequentialResult) -> str:
-    """What a sequential test decided."""
-    if result.decision == "accepted":
-        return f"accepted at {_percent(result.test.accept_at)}"
-    if result.decision == "rejected":
-        return f"rejected at {_percent(result.test.accept_at)}"
-    return "undecided, therefore not accepted,"
 
 
 def _legend(result: SequentialResult) -> str:
     return (
         "  accepted: the episodes fit a success rate of "
-        f"{_percent(result.test.accept_at)} much better than one of "
-        f"{_percent(result.at_refused_rate.rate)}; the test ends as soon as it can "
+        f"{percent(result.test.accept_at)} much better than one of "
+        f"{percent(result.at_refused_rate.rate)}; the test ends as soon as it can "
         "decide (docs/robustness.md), and errs rarely:"
     )
 
@@ -136,16 +133,8 @@ def error_rates(result: SequentialResult) -> str:
     """How often a sequential test errs."""
     low, high = result.at_refused_rate, result.at_accepted_rate
     return (
-        f"  a true rate of {_percent(low.rate)} is accepted with probability "
-        f"{_percent(low.accepted)}\n"
-        f"  a true rate of {_percent(high.rate)} is rejected with probability "
-        f"{_percent(high.rejected)}, undecided with {_percent(high.undecided)}"
+        f"  a true rate of {percent(low.rate)} is accepted with probability "
+        f"{percent(low.accepted)}\n"
+        f"  a true rate of {percent(high.rate)} is rejected with probability "
+        f"{percent(high.rejected)}, undecided with {percent(high.undecided)}"
     )
-
-
-def _percent(share: float) -> str:
-    """A percentage with one decimal; with three if it would round to 0 or 100 %."""
-    rounded = f"{100 * share:.1f}"
-    if rounded in ("0.0", "100.0") and 0.0 < share < 1.0:
-        rounded = f"{100 * share:.3f}"
-    return f"{rounded} %"

@@ -56,6 +56,8 @@ def run(folder: Path, as_json: bool) -> int:
                 continue
             if "steps" in row:
                 print_sentences(console, _training_progress(row))
+            if row.get("agent"):
+                print_sentences(console, _agent(row))
             if row["go_on"]:
                 console.print(f"to continue: {escape(row['go_on'])}", soft_wrap=True)
     else:
@@ -68,6 +70,12 @@ def _training_progress(row: dict[str, Any]) -> str:
     rate = row["success_rate"]
     best = "" if rate is None else f", the best policy reached {rate:.0%} of the goals"
     return f"{row['run']}: {row['steps']:,} of {row['of_steps']:,} steps{best}"
+
+
+def _agent(row: dict[str, Any]) -> str:
+    """How the agent of a run was connected, and its programs."""
+    clients = ", ".join(row["clients"])
+    return f"{row['run']}: agent: {row['agent']}{f' ({clients})' if clients else ''}"
 
 
 def _age(row: dict[str, Any]) -> tuple[str, str]:

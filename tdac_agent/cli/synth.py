@@ -14,8 +14,13 @@ from tdac_agent.cli.progress import Progress
 from tdac_agent.cli.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault, RunError
 from tdac_agent.library.listing import next_folder
-from tdac_agent.runs.resume import check_own, existing_run, resume_arguments
-from tdac_agent.runs.run_record import Run, load_run
+from tdac_agent.runs.resume import (
+    check_own,
+    existing_run,
+    resume_arguments,
+    resume_words,
+)
+from tdac_agent.runs.run_record import AGENT, Run, load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import Task, called
 from tdac_agent.tasks.task_file import TASK_FILE, Profile
@@ -77,6 +82,9 @@ def resume(
         then_verify: Whether a controller for a task set drives on hidden worlds.
     """
     before = load_run(folder)
+    if before.learner == AGENT:
+        command = resume_words(before, folder)
+        raise RunError(f"the candidates of {folder} come from an agent: {command}")
     if before.on_set:
         from tdac_agent.cli import synth_set
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import json
-import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -174,10 +173,12 @@ def controller_file(controller: str) -> Path:
 
 def _without_controller(folder: Path) -> str:
     """Why a folder has no controller, and what to do."""
-    from tdac_agent.runs.run_record import RUN_FILE  # slow to import
+    from tdac_agent.runs.run_record import RUN_FILE, load_run  # slow to import
 
     if (folder / RUN_FILE).is_file():
-        command = f"tdac synth --resume {shlex.quote(str(folder))}"
+        from tdac_agent.runs.resume import resume_words
+
+        command = resume_words(load_run(folder), folder)
         return f"the run {folder} has no controller yet; to continue it: {command}"
     return f"there is no controller.py in {folder}"
 

@@ -17,12 +17,13 @@ from rich.table import Table
 from tdac_agent.builtin.level import controller_of
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
-from tdac_agent.cli.robust_view import decision_text, error_rates, rate_text
+from tdac_agent.cli.robust_view import error_rates, rate_text
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.set_flags import SetFlags
 from tdac_agent.cli.verify import check_folder, controller_file
 from tdac_agent.evaluation.entrants import BUILTIN
 from tdac_agent.evaluation.kept_sets import REPORT_FILE, TRAJECTORIES
+from tdac_agent.evaluation.robust_report import decision_text
 from tdac_agent.evaluation.set_report import HiddenCount, SetReport
 from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
 from tdac_agent.runs.selection_record import Scores

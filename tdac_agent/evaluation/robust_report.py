@@ -143,3 +143,20 @@ def result_of(test: SequentialTest, successes: int, failures: int) -> Sequential
         at_refused_rate=test.characteristics(test.refuse_at),
         at_accepted_rate=test.characteristics(test.accept_at),
     )
+
+
+def decision_text(result: SequentialResult) -> str:
+    """What a sequential test decided."""
+    if result.decision == "accepted":
+        return f"accepted at {percent(result.test.accept_at)}"
+    if result.decision == "rejected":
+        return f"rejected at {percent(result.test.accept_at)}"
+    return "undecided, therefore not accepted,"
+
+
+def percent(share: float) -> str:
+    """A percentage with one decimal; with three if it would round to 0 or 100 %."""
+    rounded = f"{100 * share:.1f}"
+    if rounded in ("0.0", "100.0") and 0.0 < share < 1.0:
+        rounded = f"{100 * share:.3f}"
+    return f"{rounded} %"

@@ -15,7 +15,13 @@ from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.models.budget import format_usd
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import CandidateHistory, Told, learner_named
-from tdac_agent.runs.run_record import GIVEN_FILE, GIVEN_RULES_FILE, PROMPT_FILE
+from tdac_agent.runs.resume import resume_words
+from tdac_agent.runs.run_record import (
+    AGENT,
+    GIVEN_FILE,
+    GIVEN_RULES_FILE,
+    PROMPT_FILE,
+)
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
@@ -132,6 +138,9 @@ def _origin(told: Told) -> Iterator[tuple[str, str]]:
     yield "task", f"{run.task}, sha256 {run.task_sha256}"
     yield "Learner", learner_named(run.learner)
     yield "Optimizer", learner_named(run.optimizer)
+    if run.agent:
+        yield "agent", run.agent
+        yield "programs of the agent (as reported)", ", ".join(run.clients) or "none"
     if run.models:
         yield "models (as reported)", ", ".join(run.models)
     for model, address in run.served_at.items():
@@ -167,6 +176,9 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     run = told.run
     about = ["--set", f"{name}/{SET_FILE}"] if run.on_set else ["--task", name]
     limits = []
+    if run.learner == AGENT:
+        yield from _agent_commands(told, name, about)
+        return
     if run.on_set:
         limits += ["--episodes", str(run.episodes)]
         limits += ["--feedback-episodes", str(run.feedback_episodes)]
@@ -192,6 +204,25 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     if not run.finished and told.status != "running":
         more = run.enough.split()
         yield shlex.join(["tdac", "synth", "--resume", name, *more]), "resume the run"
+    yield from _uses(told, name, about)
+
+
+def _agent_commands(
+    told: Told, name: str, about: list[str]
+) -> Iterator[tuple[str, str]]:
+    """The commands of a run whose candidates an agent submitted."""
+    run = told.run
+    words = ["tdac", "mcp", *about]
+    words += ["--episodes", str(run.episodes)] if run.on_set else []
+    yield shlex.join(words), "let an agent repeat the run"
+    if not run.finished and told.status != "running":
+        yield resume_words(run, name), "resume the run"
+    yield from _uses(told, name, about)
+
+
+def _uses(told: Told, name: str, about: list[str]) -> Iterator[tuple[str, str]]:
+    """What can be done with the controller of a run."""
+    run = told.run
     if run.on_set and run.tau is not None:
         verify = ["tdac", "verify", f"{name}/controller.py", *about]
         yield shlex.join(verify), "verify the controller on public worlds"

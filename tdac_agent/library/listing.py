@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.errors import RunError
+from tdac_agent.runs.resume import resume_words
 from tdac_agent.runs.run_record import (
     JOURNAL,
     RUN_FILE,
@@ -95,6 +96,8 @@ def row_of(folder: Path) -> dict[str, Any]:
         "task": run.task,
         "learner": run.learner,
         "optimizer": run.optimizer,
+        "agent": run.agent,
+        "clients": list(run.clients),
         "status": status,
         "k": _begun(run),
         "iterations": run.iterations,
@@ -124,7 +127,7 @@ def resume_command(run: Run) -> str:
     if run.finished:
         return ""
     more = f" {run.enough}" if run.enough else ""
-    return f"tdac synth --resume {shlex.quote(str(run.folder))}{more}"
+    return f"{resume_words(run, run.folder)}{more}"
 
 
 def next_folder(name: str, place: Path = Path()) -> Path:

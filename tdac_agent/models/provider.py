@@ -87,6 +87,14 @@ class Reply:
     notes: tuple[str, ...] = field(default=())
 
 
+class Author(Protocol):
+    """Who writes controllers, for the record of a run."""
+
+    @property
+    def name(self) -> str:
+        """Name in messages and records; must not contain a key."""
+
+
 class Provider(Protocol):
     """Answers requests; both Learner and Optimizer are providers.
 
@@ -118,7 +126,7 @@ class Provider(Protocol):
         ...
 
 
-def served_at(model: Provider) -> str | None:
+def served_at(model: Author) -> str | None:
     """Returns the URL of a model's server; None for the vendor's own or no server."""
     address: str | None = getattr(model, "served_at", None)
     return address

@@ -12,6 +12,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.runs.rule_history import RuleChanges, rule_changes
 from tdac_agent.runs.run_record import (
+    AGENT,
     JOURNAL,
     RUN_FILE,
     Attempt,
@@ -29,6 +30,10 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 MOST_BYTES = 8 << 20
 T = TypeVar("T")
+_NO_MODELS = {
+    "builtin": "a tuned template, no language model",
+    AGENT: "an agent that submits controllers; tdac asked no model",
+}
 State = Literal["passed", "failed", "no code", "unfinished"]
 
 
@@ -102,9 +107,9 @@ class Told:
 
 
 def learner_named(learner: str) -> str:
-    """The name of a learner for display; `builtin` is marked as no language model."""
-    plain = learner == "builtin"
-    return f"{learner} (a tuned template, no language model)" if plain else learner
+    """The name of a learner for display, with what it is if it is no model."""
+    told = _NO_MODELS.get(learner)
+    return learner if told is None else f"{learner} ({told})"
 
 
 def gather_run(source: Path | Run) -> Told:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +12,14 @@ from tdac_agent.errors import RunError
 from tdac_agent.prompting.given_rules import given_book
 from tdac_agent.prompting.prompt import VARIANTS
 from tdac_agent.runs.ownership import is_own, is_own_folder, wishes_of
-from tdac_agent.runs.run_record import GIVEN_FILE, PROMPT_FILE, RUN_FILE, Run, load_run
+from tdac_agent.runs.run_record import (
+    AGENT,
+    GIVEN_FILE,
+    PROMPT_FILE,
+    RUN_FILE,
+    Run,
+    load_run,
+)
 from tdac_agent.storage.files import UNFINISHED
 from tdac_agent.storage.locks import LOCK_FILE
 from tdac_agent.tasks.task import Task, load_task
@@ -77,11 +85,17 @@ def check_same(before: Run, now: Run) -> None:
         if getattr(before, name) != getattr(now, name)
     ]
     if differences:
+        command = resume_words(before, before.folder)
         raise RunError(
             f"{before.folder} contains another run ({'; '.join(differences)}): give a "
-            "new folder with --out, or resume that run: tdac synth --resume "
-            f"{before.folder}"
+            f"new folder with --out, or resume that run: {command}"
         )
+
+
+def resume_words(run: Run, folder: Path | str) -> str:
+    """The command that continues a run in a folder."""
+    command = "tdac mcp --out" if run.learner == AGENT else "tdac synth --resume"
+    return f"{command} {shlex.quote(str(folder))}"
 
 
 def check_own(before: Run) -> None:
@@ -136,7 +150,7 @@ def resume_arguments(
             f"command with --out {folder}"
         )
     flags = {name: value for name, value in (given or {}).items() if value is not None}
-    task = _task(folder)
+    task = recorded_task(folder)
     if not is_own(run, task.suite):
         permit(folder, wishes_of(run, task.suite, flags), trust=trust)
     suite = flags.pop("suite", None)
@@ -187,7 +201,7 @@ def _text(file: Path) -> str:
         raise RunError(f"cannot read {file}: {one_line_reason(error)}") from error
 
 
-def _task(folder: Path) -> Task:
+def recorded_task(folder: Path) -> Task:
     """Loads the task of a run with its original parameters.
 
     The folder has a copy of the map or world; `params.json` names the original file.

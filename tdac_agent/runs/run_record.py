@@ -24,7 +24,12 @@ Status = Literal[
     "fault",
     "budget",
 ]
-Setting = Literal["dual tier", "edit only", "prompt only", "best of N", "one shot"]
+Setting = Literal[
+    "dual tier", "edit only", "prompt only", "best of N", "one shot", "agent"
+]
+Agent = Literal["", "unconfined", "over HTTP"]
+AGENT = "mcp"
+"""The learner of a run whose candidates an agent submits to `tdac mcp`."""
 RUN_FILE = "run.json"
 JOURNAL = "journal.jsonl"
 RULES_FILE = "rules.json"
@@ -120,6 +125,14 @@ class Run(PrintableRecord):
     then_verify: bool = Field(
         False, description="Whether the selected controller drives on hidden worlds."
     )
+    agent: Agent = Field(
+        "",
+        description="How the agent that submits candidates is connected, if one does: "
+        "`unconfined` if it ran, at least once, as the same user.",
+    )
+    clients: tuple[str, ...] = Field(
+        (), description="Name and version of its programs, as they reported them."
+    )
     id: str = ""
     started: str
     seconds: float = 0.0
@@ -146,6 +159,8 @@ class Run(PrintableRecord):
     @property
     def setting(self) -> Setting:
         """Which parts of the loop were used."""
+        if self.learner == AGENT:
+            return "agent"
         return setting_of(self.iterations, self.patience, refine=self.refine)
 
     @property

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,30 +18,22 @@ from tdac_agent.prompting.given_rules import given_lines
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.prompting.set_prompt import set_prompt
-from tdac_agent.runs.recorder import Event, Recorder
+from tdac_agent.runs.recorder import Event
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
-from tdac_agent.runs.selection_record import (
-    SELECTION_FILE,
-    CandidateFigures,
-    Improvement,
-    Selection,
-)
+from tdac_agent.runs.selection_record import Improvement
 from tdac_agent.set_synthesis.archive import Archive
+from tdac_agent.set_synthesis.delivery import deliver_selected, start_on_set
 from tdac_agent.set_synthesis.hidden import verify_hidden
 from tdac_agent.set_synthesis.improve import ImprovingSearch, base_of, finalists
 from tdac_agent.set_synthesis.search import search
-from tdac_agent.set_synthesis.selection import scores_of_selected, select
-from tdac_agent.set_synthesis.trials import BLOCKS, MOST_EPISODES, Candidate, Trials
-from tdac_agent.storage.files import write_atomic
+from tdac_agent.set_synthesis.selection import select
+from tdac_agent.set_synthesis.trials import MOST_EPISODES, Candidate, Trials
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
 from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.setup import account_of, hold_folder, new_run, open_record
 from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_agent.tasks.installation import drawn_seed
-from tdac_agent.tasks.provenance import sha256_of
-from tdac_agent.tasks.task_file import SET_FILE
-from tdac_agent.verification.judge.set_files import level_params
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.ladder.task_sets import TaskSet
@@ -174,13 +164,7 @@ def synthesize_on_set(
             ):
                 check_own(before)
                 return before
-        start = partial(
-            Recorder.begin,
-            write=partial(_write_level, tasks),
-            last=(SET_FILE, _set_text(tasks)),
-            template=template,
-            given=start_from,
-        )
+        start = start_on_set(tasks, template, start_from)
         recorder = open_record(start, run, before, account, on_event)
         terms = (account.budget, account.tariffs, retry or RetryPolicy(), max_output)
         calls = Calls(recorder, *terms)
@@ -258,7 +242,7 @@ def _finish(writing: _Writing) -> None:
         recorder.finish("not verified", reason=_why_none(able))
         return
     improvement = None if archive is None else _compared(trials, archive, chosen)
-    _deliver(trials, written, chosen, stopped, improvement)
+    deliver_selected(trials, written, chosen, stopped, improvement)
     recorder.run.tau = chosen.k
     status, facts = "selected", {"k": chosen.k, "j": chosen.j, "reason": stopped}
     if recorder.run.then_verify:
@@ -308,69 +292,3 @@ def _why_none(able: list[Candidate]) -> str:
     if not able:
         return "no candidate passed the static and contract tests"
     return "no candidate reached a goal on the validation worlds"
-
-
-def _deliver(
-    trials: Trials,
-    written: list[Candidate],
-    chosen: Candidate,
-    stopped: str,
-    improvement: Improvement | None,
-) -> None:
-    """Writes the selected controller and the report to the top of the run folder."""
-    run, first = trials.recorder.run, trials.first
-    assert run.episodes is not None
-    selection = Selection(
-        set=trials.tasks.name,
-        set_sha256=trials.tasks.sha256,
-        first_feedback=first,
-        first_validation=BLOCKS + first,
-        episodes=run.episodes,
-        feedback_used=trials.feedback_used,
-        validation_used=trials.validation_used,
-        improve=run.improve,
-        improve_used=trials.explore_used + trials.comparison_used,
-        candidates=tuple(map(_figures, written)),
-        k=chosen.k,
-        j=chosen.j,
-        controller_sha256=_sha256(chosen),
-        optimistic=scores_of_selected(chosen),
-        improvement=improvement,
-        stopped=stopped,
-    )
-    write_atomic(run.controller, chosen.source)
-    write_atomic(
-        run.folder / SELECTION_FILE, selection.model_dump_json(indent=2) + "\n"
-    )
-    values = selection.model_dump(mode="json", exclude={"candidates", "stopped"})
-    trials.recorder.event("select.end", **values)
-
-
-def _figures(candidate: Candidate) -> CandidateFigures:
-    drives = candidate.feedback
-    return CandidateFigures(
-        k=candidate.k,
-        j=candidate.j,
-        controller_sha256=_sha256(candidate),
-        feedback_worlds=sum(report.worlds for report in drives),
-        feedback_reached=sum(report.successes for report in drives),
-        validation_worlds=len(candidate.validation),
-        validation_reached=sum(each.success for each in candidate.validation),
-        validation_time=candidate.score if candidate.validation else None,
-        improve_time=candidate.explored_score,
-    )
-
-
-def _sha256(candidate: Candidate) -> str:
-    return sha256_of(candidate.source.encode("utf-8", "surrogatepass"))
-
-
-def _write_level(tasks: TaskSet, folder: Path) -> None:
-    """Writes what every controller of the level has in its folder."""
-    text = json.dumps(level_params(tasks.file), indent=2) + "\n"
-    write_atomic(folder / "params.json", text)
-
-
-def _set_text(tasks: TaskSet) -> str:
-    values: Any = tasks.file.model_dump(mode="json", by_alias=True)
-    return json.dumps(values, indent=2) + "\n"  # JSON is YAML

@@ -140,8 +140,7 @@ class Trials:
         A candidate that reaches all goals goes on with the next worlds.
         """
         while self.feedback_left and candidate.first_failure is None:
-            count = min(self.block, self.feedback_left)
-            self._give_feedback(candidate, self.first + self.feedback_used, count)
+            self.drive_next(candidate)
         return candidate.first_failure
 
     def test_alike(self, candidates: Sequence[Candidate]) -> None:
@@ -155,12 +154,19 @@ class Trials:
             if self.feedback_left >= count:
                 self._give_feedback(candidate, first, count)
 
-    def _give_feedback(self, candidate: Candidate, first: int, count: int) -> None:
+    def drive_next(self, candidate: Candidate) -> SetReport:
+        """Drives on the next block of feedback worlds; there must be some left."""
+        count = min(self.block, self.feedback_left)
+        first = self.first + self.feedback_used
+        return self._give_feedback(candidate, first, count)
+
+    def _give_feedback(self, candidate: Candidate, first: int, count: int) -> SetReport:
         out = candidate.folder / f"feedback-{len(candidate.feedback) + 1}"
         report = self._drive(candidate, first, count, out)
         candidate.feedback.append(report)
         self.feedback_used += report.worlds
         self.feedback_left -= report.worlds
+        return report
 
     def validate(self, candidate: Candidate, count: int) -> None:
         """Drives on the next `count` validation worlds of this candidate."""

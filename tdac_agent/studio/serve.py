@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import webbrowser
 from collections.abc import Callable
 from contextlib import closing
@@ -12,6 +11,7 @@ import fastapi
 import uvicorn
 from nicegui import ui
 
+from tdac_agent.loopback import listen
 from tdac_agent.studio.gate import Gate
 from tdac_agent.studio.pages import compare, files, home, run, shelf, worlds
 
@@ -33,7 +33,7 @@ def serve(
     Raises:
         OSError: The port cannot be opened.
     """
-    with closing(_listen(port)) as opened:
+    with closing(listen(port)) as opened:
         port = opened.getsockname()[1]
         gate = Gate(_application(place.resolve()), port)
         address = f"http://127.0.0.1:{port}/?token={gate.token}"
@@ -44,18 +44,6 @@ def serve(
         if open_it:
             webbrowser.open(address)
         uvicorn.Server(config).run(sockets=[opened])
-
-
-def _listen(port: int) -> socket.socket:
-    opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        opened.bind(("127.0.0.1", port))
-    except OSError:
-        opened.close()
-        raise
-    opened.listen(64)
-    return opened
 
 
 def _application(place: Path) -> fastapi.FastAPI:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from queue import SimpleQueue
 
 from tdac_agent.errors import Fault
 from tdac_agent.models.budget import Budget
@@ -24,8 +21,13 @@ from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
-from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
+from tdac_agent.synthesis.candidates import (
+    Tests,
+    deliver,
+    verify_all,
+    verify_candidate,
+)
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
 from tdac_agent.synthesis.setup import (
     account_of,
@@ -35,11 +37,9 @@ from tdac_agent.synthesis.setup import (
     settled_seed,
 )
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.figures import draw_trajectories
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
-from tdac_agent.verification.verify import kept_report, load_trajectories, verify
 from tdac_envs.core.arguments import whole_number
 
 MOST_SPENT = 3
@@ -162,19 +162,10 @@ def synthesize(
         paid = any(model.paid for model in models)
         with ExitStack() as stack:
             warm = judge or stack.enter_context(WarmJudge(task=task))
-            return _run(dialogue, start_from, _Tests(task, warm, tier), paid=paid)
+            return _run(dialogue, start_from, Tests(task, warm, tier), paid=paid)
 
 
-@dataclass(frozen=True, slots=True)
-class _Tests:
-    """Where candidates are tested: on a task, by a judge, in a sandbox tier."""
-
-    task: Task
-    judge: WarmJudge
-    tier: str
-
-
-def _run(dialogue: Dialogue, given: str | None, tests: _Tests, *, paid: bool) -> Run:
+def _run(dialogue: Dialogue, given: str | None, tests: Tests, *, paid: bool) -> Run:
     """Runs the loop, and records how it ended."""
     recorder = dialogue.calls.recorder
     try:
@@ -195,7 +186,7 @@ def _run(dialogue: Dialogue, given: str | None, tests: _Tests, *, paid: bool) ->
     return recorder.run
 
 
-def _search(dialogue: Dialogue, given: str | None, tests: _Tests) -> None:
+def _search(dialogue: Dialogue, given: str | None, tests: Tests) -> None:
     """Algorithm 2, until a candidate has passed or K iterations are over."""
     run = dialogue.calls.recorder.run
     loop = _Loop(dialogue, tests)
@@ -226,7 +217,7 @@ class _Loop:
         tests: Where candidates are tested.
     """
 
-    def __init__(self, dialogue: Dialogue, tests: _Tests) -> None:
+    def __init__(self, dialogue: Dialogue, tests: Tests) -> None:
         self._dialogue, self._tests = dialogue, tests
         self._recorder = dialogue.calls.recorder
         # Recorded answers do not count, so that a resumed run asks as often again.
@@ -258,7 +249,7 @@ class _Loop:
                 self._recorder.judged(k, j, report, notes, unchanged=True)
                 dialogue.saw_no_change(k, j)
                 continue
-            report = _verify(self._recorder, k, j, source, folder, self._tests)
+            report = verify_candidate(self._recorder, k, j, source, folder, self._tests)
             self._recorder.judged(k, j, report, notes)
             failure = feedback_of(report)
             dialogue.saw(k, j, failure)
@@ -283,7 +274,7 @@ class _Loop:
             begun.append((k, source, notes, self._recorder.candidate(k, 0, source)))
         jobs = [(k, 0, source, folder) for k, source, _, folder in begun]
         tested = []
-        reports = _verify_all(self._recorder, jobs, self._tests)
+        reports = verify_all(self._recorder, jobs, self._tests)
         for (k, source, notes, folder), report in zip(begun, reports, strict=True):
             self._recorder.judged(k, 0, report, notes)
             tested.append(_Tested(k, source, report, folder))
@@ -309,7 +300,7 @@ class _Loop:
 
     def _deliver(self, best: _Tested) -> None:
         task, at = self._tests.task, (best.k, best.source, best.report, best.folder)
-        _deliver(self._recorder, task, *at)
+        deliver(self._recorder, task, *at)
 
 
 def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
@@ -320,7 +311,7 @@ def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
     )
 
 
-def _prove(recorder: Recorder, tests: _Tests) -> None:
+def _prove(recorder: Recorder, tests: Tests) -> None:
     """Checks the test suite before an answer is paid for, once per run.
 
     Raises:
@@ -340,74 +331,3 @@ def _prove(recorder: Recorder, tests: _Tests) -> None:
     )
     facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
     recorder.event("prove.end", **facts)
-
-
-_Job = tuple[int, int, str, Path]
-"""k, j, source and folder of a candidate."""
-
-
-def _verify_all(
-    recorder: Recorder, jobs: Sequence[_Job], tests: _Tests
-) -> list[Report]:
-    """The reports on candidates; at a time as many as there are cores."""
-    if len(jobs) < 2:
-        return [_verify(recorder, *job, tests) for job in jobs]
-    for k, j, *_ in jobs:
-        recorder.event("verify.start", k=k, j=j)
-    cores = min(len(jobs), len(os.sched_getaffinity(0)))
-    with ExitStack() as stack:
-        others = [
-            stack.enter_context(WarmJudge(task=tests.task)) for _ in range(cores - 1)
-        ]
-        judges: SimpleQueue[WarmJudge] = SimpleQueue()
-        for judge in (tests.judge, *others):
-            judges.put(judge)
-
-        def report(job: _Job) -> Report:
-            judge = judges.get()
-            try:
-                return _report(recorder.run, *job[2:], replace(tests, judge=judge))
-            finally:
-                judges.put(judge)
-
-        with ThreadPoolExecutor(cores) as pool:
-            return list(pool.map(report, jobs))
-
-
-def _verify(
-    recorder: Recorder, k: int, j: int, source: str, folder: Path, tests: _Tests
-) -> Report:
-    """The report on a candidate."""
-    recorder.event("verify.start", k=k, j=j)
-    return _report(recorder.run, source, folder, tests)
-
-
-def _report(run: Run, source: str, folder: Path, tests: _Tests) -> Report:
-    """The report on a candidate; a recorded one is reused."""
-    task, seed = tests.task, run.seed
-    kept = kept_report(folder, task, source, seed) if run.mark else None
-    return kept or verify(
-        folder / "controller.py",
-        task,
-        tier=tests.tier,
-        seed=seed,
-        out=folder,
-        judge=tests.judge,
-    )
-
-
-def _deliver(
-    recorder: Recorder, task: Task, k: int, source: str, report: Report, evidence: Path
-) -> None:
-    """Copies the verified controller and its evidence to the top of the run folder."""
-    folder = recorder.run.folder
-    write_atomic(folder / "controller.py", source)
-    write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")
-    (folder / "trajectories").mkdir(exist_ok=True)
-    for path in sorted((evidence / "trajectories").glob("*.npz")):
-        write_atomic(folder / "trajectories" / path.name, path.read_bytes())
-    outcomes = {episode.name: episode.outcome for episode in report.episodes}
-    trajectories = load_trajectories(folder / "trajectories")
-    draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")
-    recorder.run.tau = k
-    recorder.finish("verified", k=k)

@@ -13,7 +13,7 @@ from typing import Any
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.budget import Budget
-from tdac_agent.models.provider import Provider, recorded_seed, served_at
+from tdac_agent.models.provider import Author, Provider, recorded_seed, served_at
 from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
 from tdac_agent.runs.journal_state import read_past
@@ -74,7 +74,7 @@ def account_of(
 
 def describe(
     task: Task,
-    models: Sequence[Provider],
+    models: Sequence[Author],
     template: PromptTemplate,
     *,
     start_from: str | None,
@@ -106,7 +106,7 @@ def describe(
 
 
 def new_run(
-    models: Sequence[Provider], question: str, start_from: str | None, **facts: Any
+    models: Sequence[Author], question: str, start_from: str | None, **facts: Any
 ) -> Run:
     """The record of a run that has not begun.
 

@@ -27,7 +27,7 @@ class WorldPictures:
 
     def backdrop(self) -> WorldBackground:
         """Returns the world as a background."""
-        return WorldBackground.of(self.setting.nominal)
+        return backdrop_of(self.setting.nominal)
 
     def trajectories(
         self,
@@ -37,13 +37,29 @@ class WorldPictures:
         movers: Sequence[Points] = (),
     ) -> Image:
         """Draws the world with all trajectories; it has no movers."""
-        del movers
         nominal = self.setting.nominal
-        return trajectory_picture(nominal, runs, outcomes=outcomes, labels=labels)
+        return trajectories_of(nominal, runs, outcomes, labels, movers)
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
         """Draws frames of the e-puck with its sensors."""
         return frames_of(self.setting.nominal, rollout, stride)
+
+
+def backdrop_of(nominal: EPuckTask) -> WorldBackground:
+    """Returns the world of a task as a background."""
+    return WorldBackground.of(nominal)
+
+
+def trajectories_of(
+    nominal: EPuckTask,
+    runs: Sequence[Points],
+    outcomes: Sequence[str],
+    labels: Sequence[str],
+    movers: Sequence[Points] = (),
+) -> Image:
+    """See `Pictures.trajectories`; there are no movers."""
+    del movers
+    return trajectory_picture(nominal, runs, outcomes=outcomes, labels=labels)
 
 
 def frames_of(nominal: EPuckTask, rollout: Rollout, stride: int) -> Iterator[Image]:

@@ -25,7 +25,7 @@ class MapPictures:
 
     def backdrop(self) -> Background:
         """Returns the map as a background."""
-        return Background.of(self.setting.nominal)
+        return backdrop_of(self.setting.nominal)
 
     def trajectories(
         self,
@@ -36,18 +36,7 @@ class MapPictures:
     ) -> Image:
         """Draws the map with all trajectories, and the movers of the first one."""
         nominal = self.setting.nominal
-        return trajectory_picture(
-            nominal.terrain.grid.cells,
-            runs,
-            nominal.start,
-            nominal.goal,
-            goal_tolerance=nominal.goal_tolerance,
-            radius=nominal.robot.radius,
-            path=nominal.shortest_path(nominal.start),
-            outcomes=outcomes,
-            labels=labels,
-            movers=movers,
-        )
+        return trajectories_of(nominal, runs, outcomes, labels, movers)
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
         """Draws frames of the robot with its rays."""
@@ -55,6 +44,33 @@ class MapPictures:
         return frames_of(
             setting.nominal, rollout, stride, setting.robot_image, setting.shown_in
         )
+
+
+def backdrop_of(nominal: Map2DTask) -> Background:
+    """Returns the map of a task as a background."""
+    return Background.of(nominal)
+
+
+def trajectories_of(
+    nominal: Map2DTask,
+    runs: Sequence[Points],
+    outcomes: Sequence[str],
+    labels: Sequence[str],
+    movers: Sequence[Points] = (),
+) -> Image:
+    """See `Pictures.trajectories`."""
+    return trajectory_picture(
+        nominal.terrain.grid.cells,
+        runs,
+        nominal.start,
+        nominal.goal,
+        goal_tolerance=nominal.goal_tolerance,
+        radius=nominal.robot.radius,
+        path=nominal.shortest_path(nominal.start),
+        outcomes=outcomes,
+        labels=labels,
+        movers=movers,
+    )
 
 
 def frames_of(

@@ -118,7 +118,9 @@ class Watching:
         go_on = row.get("go_on", "") if row else ""
         self._command.text = job.command if job else go_on or f"tdac report {self._at}"
         self._stop.visible = running
-        self._resume.visible = bool(go_on) and not running and status != "running"
+        # An agent starts its server itself.
+        continues = bool(go_on) and not row.get("agent")
+        self._resume.visible = continues and not running and status != "running"
         self._follow.visible = running
         done = bool(row) and status in ("verified", "selected")
         self._download.visible = done

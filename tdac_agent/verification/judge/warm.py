@@ -15,9 +15,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from tdac_agent.errors import Fault
@@ -50,6 +51,7 @@ class WarmJudge:
         task: Task of most jobs, which a new interpreter reads in advance.
         turn: File that is locked during a job, so that judges that share it run one job
             at a time.
+        watch: Called repeatedly during each job; an exception from it ends the job.
 
     Attributes:
         folder: Its temporary folder, which `close` removes.
@@ -61,8 +63,9 @@ class WarmJudge:
         *,
         task: Task | None = None,
         turn: Path | None = None,
+        watch: Callable[[], None] | None = None,
     ) -> None:
-        self._turn = turn
+        self._turn, self._watch = turn, watch
         environment = {
             name: value
             for name, value in os.environ.items()
@@ -108,10 +111,11 @@ class WarmJudge:
     def _run(
         self, request: Path, seconds: float, meanwhile: Callable[[], None] | None
     ) -> None:
-        worker = self._worker()
+        poll = partial(_call_all, (self._watch, meanwhile))
+        worker = self._worker(poll)
         try:
             os.write(self._server.requests, f"{request}\n".encode())
-            self._line(seconds, meanwhile)
+            self._line(seconds, poll)
         except BaseException:
             # A worker leads a process group; its children end with it.
             with suppress(ProcessLookupError):  # it has just ended by itself
@@ -119,11 +123,11 @@ class WarmJudge:
             self._line(EXIT_SECONDS)
             raise
 
-    def _worker(self) -> int:
+    def _worker(self, poll: Callable[[], None]) -> int:
         """Process id of the worker that waits for a job."""
         line = b""
         while not line.startswith(b"worker "):
-            line = self._line(START_SECONDS)
+            line = self._line(START_SECONDS, poll)
         return int(line.split()[1])
 
     def close(self) -> None:
@@ -162,6 +166,12 @@ class WarmJudge:
         text = self._log.read().decode("utf-8", "replace")
         kept = [line.strip() for line in text.splitlines() if line.strip()][-4:]
         return " | ".join(kept) or "no output"
+
+
+def _call_all(functions: Iterable[Callable[[], None] | None]) -> None:
+    for function in functions:
+        if function is not None:
+            function()
 
 
 @dataclass(frozen=True, slots=True)

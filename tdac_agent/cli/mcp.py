@@ -1,0 +1,99 @@
+"""`tdac mcp`: serves coding agents by the Model Context Protocol."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tdac_agent.library.listing import next_folder
+from tdac_agent.runs.run_record import Agent
+from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.trust import allowed
+from tdac_envs.core.errors import TaskError
+from tdac_envs.core.extras import install_command
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+
+if TYPE_CHECKING:
+    from tdac_agent.mcp.desk import Desk
+
+DEFAULT = "maze"
+
+
+def run(
+    task: str | None,
+    set_name: str | None,
+    episodes: int | None,
+    out: Path | None,
+    port: int | None,
+    http: bool,
+) -> None:
+    """Serves until the agent leaves, or a signal.
+
+    Raises:
+        TaskError: Flags contradict each other, an extra is missing, or the task or the
+            task set cannot be used.
+        RunError: The run folder cannot be used.
+    """
+    if find_spec("mcp") is None:
+        raise TaskError(f"the server needs an extra: {install_command('mcp')}")
+    if task is not None and set_name is not None:
+        raise TaskError("give --task or --set, not both")
+    if port is not None and not http:
+        raise TaskError("--port needs --http")
+    from tdac_agent.mcp.gate import given_token
+    from tdac_agent.mcp.opening import EPISODES, begun, open_desk
+    from tdac_agent.mcp.serve import serve_stdio
+
+    known = None
+    if out is not None and task is None and set_name is None:
+        known = begun(out)
+    about = known.about if known else _named(task, set_name)
+    most = episodes or (known.episodes if known else EPISODES)
+    folder = out if out is not None else next_folder(about.name)
+    agent: Agent = "over HTTP" if http else "unconfined"
+    token = given_token() if http else None
+    try:
+        with open_desk(about, folder, most, agent) as desk:
+            try:
+                if http:
+                    _serve_http(desk, port or 0, token)
+                else:
+                    serve_stdio(desk)
+            finally:
+                if out is None and not desk.submissions:
+                    shutil.rmtree(folder)
+    except KeyboardInterrupt:
+        if http:
+            raise
+        # The thread that reads stdin would keep the process.
+        print("interrupted", file=sys.stderr, flush=True)
+        os._exit(130)
+
+
+def _named(task: str | None, set_name: str | None) -> Task | TaskSet:
+    """The task or the task set of the flags."""
+    if set_name is not None:
+        return load_set(set_name)
+    return allowed(load_task(task or DEFAULT), None, trust=False)
+
+
+def _serve_http(desk: Desk, port: int, token: str | None) -> None:
+    """Serves over HTTP; prints the address, and on stderr a token that was drawn."""
+    from tdac_agent.mcp.gate import drawn_token
+    from tdac_agent.mcp.serve import serve_http
+
+    secret = drawn_token() if token is None else token
+
+    def announce(address: str) -> None:
+        print(address, flush=True)
+        if token is None:
+            print(f"bearer token: {secret}", file=sys.stderr, flush=True)
+
+    try:
+        serve_http(desk, port, secret, announce)
+    except OSError as error:
+        raise TaskError(f"--port {port}: {error.strerror}; give another one") from error

@@ -1,0 +1,114 @@
+"""What the tools answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pydantic import BaseModel, Field
+
+
+class Refused(Exception):
+    """A request that cannot be answered: what is wrong, in one line."""
+
+
+class EpisodeAnswer(BaseModel):
+    """An episode of a submission."""
+
+    name: str = Field(description="Its name, for `picture`.")
+    outcome: str = Field(description="`reached`, `collision`, `out of time`, …")
+    steps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """How a submission did.
+
+    Attributes:
+        verified: Whether it passed all tests of a task; never true on a task set.
+        summary: The result in one line.
+        failures: What failed, for the agent; never empty.
+        episodes: Its episodes that may be told; those of held-out starts may not.
+        unfit: Why it cannot be chosen; empty if it can.
+    """
+
+    verified: bool
+    summary: str
+    failures: str
+    episodes: tuple[EpisodeAnswer, ...]
+    unfit: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """What is left of the budget.
+
+    Attributes:
+        submissions: Number of submissions.
+        episodes: Number of episodes on worlds of `dev`; None on a single task.
+    """
+
+    submissions: int
+    episodes: int | None = None
+
+    @property
+    def spent(self) -> bool:
+        """Whether nothing can be submitted any more."""
+        return self.submissions == 0 or self.episodes == 0
+
+    def __str__(self) -> str:
+        parts = [] if self.episodes is None else [_count(self.episodes, "episode")]
+        return " and ".join([*parts, _count(self.submissions, "submission")])
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+class SubmitAnswer(BaseModel):
+    """Answer of `submit`."""
+
+    submission: int = Field(description="Its number, for the other tools.")
+    verified: bool = Field(
+        description="Whether it passed all tests of the task. On a task set always "
+        "false: there, only `choose` verifies."
+    )
+    summary: str = Field(description="The result in one line.")
+    episodes: list[EpisodeAnswer] = Field(description="Episodes that may be shown.")
+    submissions_left: int
+    episodes_left: int | None = Field(
+        description="Episodes that are left on a task set; null on a single task."
+    )
+
+
+class SubmissionLine(BaseModel):
+    """One of the submissions."""
+
+    submission: int
+    verified: bool
+    can_be_chosen: bool
+    summary: str
+
+
+class SubmissionsAnswer(BaseModel):
+    """Answer of `submissions`."""
+
+    submissions: list[SubmissionLine]
+    submissions_left: int = Field(description="0 if the run has ended.")
+    episodes_left: int | None = Field(description="Null on a single task.")
+    chosen: int | None = Field(description="The submission that was chosen, if any.")
+    ended: str | None = Field(description="How the run ended; null while it goes on.")
+
+
+class ChooseAnswer(BaseModel):
+    """Answer of `choose`: the verdict, which ends the run."""
+
+    submission: int
+    verified: bool
+    summary: str = Field(description="The verdict in one line.")
+    worlds: int | None = Field(description="Hidden worlds driven; null on a task.")
+    reached: int | None = Field(description="Those in which the goal was reached.")
+
+
+def first_word(*, verified: bool) -> str:
+    """The first word of the text of a result."""
+    return "verified" if verified else "failed"

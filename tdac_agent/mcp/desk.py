@@ -1,0 +1,421 @@
+"""The work of the server on one run: what each tool does, one request at a time."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.errors import Fault, RunError
+from tdac_agent.mcp.answers import (
+    ChooseAnswer,
+    Left,
+    Refused,
+    SubmissionLine,
+    SubmissionsAnswer,
+    SubmitAnswer,
+)
+from tdac_agent.mcp.judging import Judging, Submission
+from tdac_agent.prompting.extract import read_answer
+from tdac_agent.runs.recorder import Recorder
+from tdac_agent.runs.run_record import JOURNAL, Run
+from tdac_agent.sandbox import MAX_SOURCE_BYTES
+from tdac_agent.storage.journal import read_records
+from tdac_agent.storage.plain import one_line
+from tdac_agent.tasks.provenance import sha256_of
+from tdac_envs.core.errors import TdacError, one_line_reason
+from tdac_envs.core.intake import TEXT_BYTES, read_file
+
+MOST_CLIENTS = 20
+LONGEST_NAME = 100
+SUBMIT, CHOOSE, CLIENT = "submit", "choose", "client"
+"""Records of the journal."""
+
+
+class Stopped(Exception):
+    """The server ends while it judges; the submission is judged at the next start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """How far the present request is.
+
+    Attributes:
+        progress: Increases with each step.
+        total: Its value at the end; None if it is not known.
+        message: The same in words.
+    """
+
+    progress: float
+    total: float | None
+    message: str
+
+
+class Watch:
+    """Follows the work of a request, and can stop it from another thread.
+
+    Attributes:
+        on_step: Called with each step of the present request; None for nobody.
+    """
+
+    def __init__(self) -> None:
+        self.on_step: Callable[[Step], None] | None = None
+        self._stopping = threading.Event()
+        self._total: float | None
+        self._began = time.monotonic()
+        self._counts, self._total = False, None
+
+    def begin(self, on_step: Callable[[Step], None] | None) -> None:
+        """A request begins."""
+        self.on_step, self._began = on_step, time.monotonic()
+        self._counts = False
+
+    def stop(self) -> None:
+        """Ends the present request, and all later ones, with `Stopped`."""
+        self._stopping.set()
+
+    def poll(self) -> None:
+        """Called repeatedly while the judge works; tells the time without episodes.
+
+        Raises:
+            Stopped: The server ends.
+        """
+        if self._stopping.is_set():
+            raise Stopped
+        if not self._counts:
+            seconds = int(time.monotonic() - self._began)
+            if seconds:
+                self._tell(Step(seconds, None, f"judging for {seconds} s"))
+
+    def record(self, record: dict[str, Any]) -> None:
+        """Called with each record of the run."""
+        if record["event"] == "drive.start":
+            self._counts = True
+            self._total = record["worlds"]
+        elif record["event"] == "hidden.start":
+            self._counts, self._total = True, None
+        elif record["event"] == "drive.step":
+            done = record["done"]
+            self._tell(Step(done, self._total, f"{done} episodes driven"))
+
+    def _tell(self, step: Step) -> None:
+        if self.on_step is not None:
+            self.on_step(step)
+
+
+@dataclass(slots=True)
+class Desk:
+    """A run whose candidates are submitted by agents.
+
+    All methods but `watch.stop` are called from one thread, one after another.
+
+    Attributes:
+        judging: What the submissions are judged on.
+        watch: Follows the work.
+        submissions: The submissions so far.
+        chosen: Number of the submission that was chosen, if one was.
+        ready: Whether the record of earlier processes has been read.
+    """
+
+    judging: Judging
+    watch: Watch
+    submissions: list[Submission] = field(default_factory=list)
+    chosen: int | None = None
+    ready: bool = False
+
+    @property
+    def recorder(self) -> Recorder:
+        """Records the run."""
+        return self.judging.recorder
+
+    @property
+    def run(self) -> Run:
+        """The record of the run."""
+        return self.recorder.run
+
+    @property
+    def left(self) -> Left:
+        """What is left of the budget."""
+        left = self.judging.left(len(self.submissions))
+        fixed = self.run.finished or self.chosen is not None
+        return Left(0, left.episodes) if fixed else left
+
+    def catch_up(self) -> None:
+        """Reads what earlier processes did, and judges what they had not finished.
+
+        Raises:
+            Fault: The sandbox is broken.
+        """
+        if self.ready:
+            return
+        ended = self.run.finished
+        while (source := self._source(len(self.submissions) + 1)) is not None:
+            number = len(self.submissions) + 1
+            if ended:
+                self._recall(number, source)
+            else:
+                self._judge(number, source)
+        choices = [each for each in read_records(self._journal) if _is_choice(each)]
+        if choices and 1 <= choices[-1]["k"] <= len(self.submissions):
+            self.chosen = choices[-1]["k"]
+        self.ready = True
+        if not ended and self.chosen is not None:
+            self.judging.choose(self.submissions[self.chosen - 1])
+        self._end_if_hopeless()
+
+    def met(self, client: str) -> None:
+        """Records the program of an agent, once."""
+        name = _named(client)
+        known = self.run.clients
+        if name in known or len(known) == MOST_CLIENTS or self.run.finished:
+            return
+        self.run.clients = (*known, name)
+        self.recorder.event(CLIENT, client=name, agent=self.run.agent)
+        self.recorder.save()
+
+    def read_task(self) -> str:
+        """What is to be written, and how this server works."""
+        return _HOW.format(
+            about=self.judging.about,
+            left=self.left,
+            judged=_ON_TASK if self.left.episodes is None else _ON_SET,
+            question=self.judging.question(),
+        )
+
+    def submit(self, text: str, client: str) -> SubmitAnswer:
+        """Judges a controller.
+
+        Args:
+            text: Its source; fences around it are removed.
+            client: Who submits it.
+
+        Raises:
+            Refused: The budget is spent, the run has ended, or the file is too large.
+            Fault: The sandbox is broken; the submission does not count.
+        """
+        source = _source_of(text)
+        self._check_open()
+        if self.left.episodes is None:
+            for each in self.submissions:
+                if each.source == source:  # the verdict would be the same
+                    return self._answer(each)
+        if self.left.spent:
+            raise Refused(
+                f"the budget is spent after {len(self.submissions)} submissions: call "
+                "choose with the best one"
+            )
+        number = len(self.submissions) + 1
+        try:
+            submission = self._judge(number, source, client)
+        except (Fault, TdacError) as error:
+            # The next start shall not judge what the agent will submit again.
+            (self._folder(number) / "controller.py").unlink(missing_ok=True)
+            raise Fault(f"{error}; this submission does not count") from error
+        answer = self._answer(submission)
+        self._end_if_hopeless()
+        return answer
+
+    def failures(self, number: int) -> str:
+        """What failed in a submission."""
+        return self._submission(number).judged.failures
+
+    def picture(self, number: int, episode: str) -> bytes:
+        """A PNG of an episode of a submission."""
+        return self.judging.picture(self._submission(number), episode)
+
+    def listed(self) -> SubmissionsAnswer:
+        """All submissions, and what is left of the budget."""
+        left = self.left
+        return SubmissionsAnswer(
+            submissions=[
+                SubmissionLine(
+                    submission=each.number,
+                    verified=each.judged.verified,
+                    can_be_chosen=not each.judged.unfit and not self.run.finished,
+                    summary=each.judged.summary,
+                )
+                for each in self.submissions
+            ],
+            submissions_left=left.submissions,
+            episodes_left=left.episodes,
+            chosen=self.chosen,
+            ended=self._ending() if self.run.finished else None,
+        )
+
+    def choose(self, number: int) -> ChooseAnswer:
+        """Fixes the controller, gives the verdict, and ends the run.
+
+        The same choice again is answered with the same verdict.
+
+        Raises:
+            Refused: It cannot be chosen, or another one was.
+            Fault: The sandbox is broken; the choice remains.
+        """
+        submission = self._submission(number)
+        if self.chosen not in (None, number):
+            raise Refused(f"submission {self.chosen} was chosen; that is final")
+        if not self.run.finished:
+            if submission.judged.unfit:
+                unfit = submission.judged.unfit
+                raise Refused(f"submission {number} cannot be chosen: {unfit}")
+            if self.chosen is None:
+                self.recorder.event(CHOOSE, k=number)
+                self.chosen = number
+            self.judging.choose(submission)
+        elif self.chosen is None:
+            raise Refused(self._ending())
+        return self.judging.verdict(number)
+
+    def close(self) -> None:
+        """Records that the run was interrupted, unless it has ended."""
+        if self.ready and not self.run.finished:
+            self.recorder.finish("interrupted")
+
+    @property
+    def _journal(self) -> Path:
+        return self.run.folder / JOURNAL
+
+    def _folder(self, number: int) -> Path:
+        return self.run.folder / "iterations" / f"k{number:02d}" / "j0"
+
+    def _source(self, number: int) -> str | None:
+        """The source of a submission on disk; None if there is none."""
+        path = self._folder(number) / "controller.py"
+        if not path.is_file():
+            return None
+        return read_file(path, TEXT_BYTES).decode("utf-8", "surrogatepass")
+
+    def _recall(self, number: int, source: str) -> None:
+        """Reads a submission of a finished run.
+
+        Raises:
+            RunError: Its report cannot be read.
+        """
+        folder = self._folder(number)
+        try:
+            judged = self.judging.recorded(number, folder)
+        except (OSError, ValueError) as error:
+            reason = one_line_reason(error)
+            raise RunError(f"submission {number} cannot be read: {reason}") from error
+        self.submissions.append(Submission(number, source, folder, judged))
+
+    def _judge(self, number: int, source: str, client: str | None = None) -> Submission:
+        """Judges a file, which is written before; a new one has a client."""
+        folder = self.recorder.candidate(number, 0, source)
+        if client is not None:
+            sha256 = sha256_of(source.encode("utf-8", "surrogatepass"))
+            facts = {"sha256": sha256, "client": _named(client)}
+            self.recorder.event(SUBMIT, k=number, **facts)
+        judged = self.judging.judge(number, source, folder)
+        submission = Submission(number, source, folder, judged)
+        self.submissions.append(submission)
+        return submission
+
+    def _submission(self, number: int) -> Submission:
+        if 1 <= number <= len(self.submissions):
+            return self.submissions[number - 1]
+        known = len(self.submissions)
+        many = f"expected 1 to {known}" if known > 1 else "there is only submission 1"
+        raise Refused(
+            f"there is no submission {number}; "
+            + (many if known else "nothing has been submitted")
+        )
+
+    def _check_open(self) -> None:
+        """Refuses submissions after the choice.
+
+        Raises:
+            Refused: The run has ended, or will end with this choice.
+        """
+        if self.run.finished:
+            raise Refused(f"{self._ending()}; nothing can be submitted any more")
+        if self.chosen is not None:
+            raise Refused(
+                f"submission {self.chosen} was chosen, so nothing can be submitted; "
+                f"choose({self.chosen}) gives the verdict"
+            )
+
+    def _answer(self, submission: Submission) -> SubmitAnswer:
+        judged, left = submission.judged, self.left
+        return SubmitAnswer(
+            submission=submission.number,
+            verified=judged.verified,
+            summary=judged.summary,
+            episodes=list(judged.episodes),
+            submissions_left=left.submissions,
+            episodes_left=left.episodes,
+        )
+
+    def _end_if_hopeless(self) -> None:
+        """Ends a run in which nothing can be submitted or chosen any more."""
+        if self.run.finished or not self.left.spent:
+            return
+        if all(each.judged.unfit for each in self.submissions):
+            self.recorder.finish("not verified", reason="all submissions failed")
+
+    def _ending(self) -> str:
+        """How the run ended, in one line."""
+        if self.chosen is None:
+            return f"the run has ended, {self.run.status}: {self.run.reason}"
+        return (
+            f"the run has ended: submission {self.chosen} was chosen and is "
+            f"{self.run.status}"
+        )
+
+
+def _named(client: str) -> str:
+    """The name of an agent's program, for records."""
+    return one_line(client)[:LONGEST_NAME]
+
+
+def _is_choice(record: dict[str, Any]) -> bool:
+    return record.get("event") == CHOOSE and isinstance(record.get("k"), int)
+
+
+def _source_of(text: str) -> str:
+    """The source in a submitted text.
+
+    Raises:
+        Refused: It is too large, or empty.
+    """
+    size = len(text.encode("utf-8", "surrogatepass"))
+    if size > MAX_SOURCE_BYTES:
+        raise Refused(
+            f"the file has {size} bytes, and at most {MAX_SOURCE_BYTES} are allowed; "
+            "it was not judged and does not count"
+        )
+    if not text.strip():
+        raise Refused("the file is empty; it was not judged and does not count")
+    if text.lstrip().startswith("```"):
+        return read_answer(text).source or text
+    return text
+
+
+_ON_TASK = """\
+Each submission is verified by the task's test suite. `verified` means that all tests
+passed; such a submission can be chosen."""
+_ON_SET = """\
+Each submission drives on the next few worlds of the split `dev`, none of which comes
+twice. That is feedback, and no verdict: only `choose` verifies, by driving one
+submission on hidden worlds that are drawn after the choice. Choose when you can do no
+better."""
+_HOW = """\
+You are asked for a robot controller for {about}, one Python file.
+
+1. Write the file as described below, and call `submit` with its whole text.
+2. `failures` tells what went wrong, `picture` shows an episode. Repair, submit again.
+3. Call `choose` with the best submission: it gives the verdict and ends the run.
+
+{judged}
+
+Left: {left}.
+
+Where the text below asks for an answer with a fenced block, call `submit` instead. The
+judge runs the file in a sandbox; only what it does in an episode counts.
+
+---
+
+{question}"""

@@ -1,0 +1,87 @@
+"""Serves a desk over stdio, or over HTTP on the loopback interface."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Generator
+from contextlib import closing, contextmanager
+
+import anyio
+import uvicorn
+from mcp.server.stdio import stdio_server
+
+from tdac_agent.loopback import HOST, listen
+from tdac_agent.mcp.desk import Desk
+from tdac_agent.mcp.gate import Gate
+from tdac_agent.mcp.server import Counter
+
+PATH = "/mcp"
+END_SECONDS = 1
+"""How long open requests are waited for at the end."""
+
+
+def serve_stdio(desk: Desk) -> None:
+    """Serves one agent until it closes stdin; stdout belongs to the protocol.
+
+    Raises:
+        KeyboardInterrupt: A signal ended it. A thread may still wait for stdin, so that
+            the process must be ended by `os._exit`.
+    """
+    with closing(Counter(desk)) as counter, _interrupted_at_once():
+        anyio.run(_speak, counter)
+
+
+async def _speak(counter: Counter) -> None:
+    server = counter.server()
+    async with stdio_server() as (requests, answers):
+        await server.run(requests, answers, server.create_initialization_options())
+
+
+def serve_http(
+    desk: Desk, port: int, token: str, announce: Callable[[str], None]
+) -> None:
+    """Serves agents on the loopback interface until it is interrupted.
+
+    Args:
+        desk: The desk.
+        port: Port; 0 for a free one.
+        token: The bearer token that each request must have.
+        announce: Called with the address once the port is open.
+
+    Raises:
+        OSError: The port cannot be opened.
+    """
+    with closing(listen(port)) as opened, closing(Counter(desk)) as counter:
+        port = opened.getsockname()[1]
+        application = counter.server().streamable_http_app(
+            streamable_http_path=PATH, host=HOST
+        )
+        config = uvicorn.Config(
+            Gate(application, port, token),
+            log_level="critical",
+            access_log=False,
+            timeout_graceful_shutdown=END_SECONDS,
+        )
+        announce(f"http://{HOST}:{port}{PATH}")
+        uvicorn.Server(config).run(sockets=[opened])
+
+
+@contextmanager
+def _interrupted_at_once() -> Generator[None]:
+    """Signals interrupt the event loop itself.
+
+    asyncio's own handler of SIGINT cancels the main task, which would wait for the
+    thread that reads stdin.
+    """
+
+    def interrupt(number: int, frame: object) -> None:
+        del number, frame
+        raise KeyboardInterrupt
+
+    numbers = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+    before = [signal.signal(number, interrupt) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

@@ -1,0 +1,66 @@
+"""Servers, and what agents submit to them."""
+
+import contextlib
+
+import pytest
+
+pytest.importorskip("mcp.server", reason="needs tdac[mcp]")
+
+from few_worlds import KNOWN, write_set
+from mcp_agent import Running, converse
+
+from tdac_agent.mcp.opening import open_desk
+from tdac_agent.mcp.server import Counter
+from tdac_envs import load_set
+
+
+@pytest.fixture
+def few(tmp_path):
+    """A set that `known.py` solves."""
+    return load_set(write_set(tmp_path / "few.yaml"))
+
+
+@pytest.fixture
+def easy(tmp_path):
+    """The same, with a low bar: few hidden worlds decide that it is met."""
+    return load_set(write_set(tmp_path / "easy.yaml", bar=0.1))
+
+
+@pytest.fixture(scope="session")
+def solver():
+    """The source of a controller that reaches all goals of `few`."""
+    return KNOWN.read_text()
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "run"
+
+
+@pytest.fixture
+def serve(out):
+    """Runs a conversation with a server in this process."""
+
+    def run(about, conversation, episodes=128):
+        with (
+            open_desk(about, out, episodes, "unconfined") as desk,
+            contextlib.closing(Counter(desk)) as counter,
+        ):
+            return converse(counter.server(), conversation)
+
+    return run
+
+
+@pytest.fixture
+def running(tmp_path):
+    """Starts servers over HTTP, which end with the test."""
+    started = []
+
+    def start(*arguments, **options):
+        started.append(Running(tmp_path, arguments, **options).start())
+        return started[-1]
+
+    yield start
+    for server in started:
+        server.process.kill()
+        server.process.communicate()
