@@ -83,6 +83,7 @@ def _named(task: str | None, set_name: str | None) -> Task | TaskSet:
 
 def _serve_http(desk: Desk, port: int, token: str | None) -> None:
     """Serves over HTTP; prints the address, and on stderr a token that was drawn."""
+    from tdac_agent.loopback import listen
     from tdac_agent.mcp.gate import drawn_token
     from tdac_agent.mcp.serve import serve_http
 
@@ -94,6 +95,8 @@ def _serve_http(desk: Desk, port: int, token: str | None) -> None:
             print(f"bearer token: {secret}", file=sys.stderr, flush=True)
 
     try:
-        serve_http(desk, port, secret, announce)
+        opened = listen(port)
     except OSError as error:
         raise TaskError(f"--port {port}: {error.strerror}; give another one") from error
+    with opened:
+        serve_http(desk, opened, secret, announce)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import socket
 from collections.abc import Callable, Generator
 from contextlib import closing, contextmanager
 
@@ -10,7 +11,7 @@ import anyio
 import uvicorn
 from mcp.server.stdio import stdio_server
 
-from tdac_agent.loopback import HOST, listen
+from tdac_agent.loopback import HOST
 from tdac_agent.mcp.desk import Desk
 from tdac_agent.mcp.gate import Gate
 from tdac_agent.mcp.server import Counter
@@ -38,20 +39,17 @@ async def _speak(counter: Counter) -> None:
 
 
 def serve_http(
-    desk: Desk, port: int, token: str, announce: Callable[[str], None]
+    desk: Desk, opened: socket.socket, token: str, announce: Callable[[str], None]
 ) -> None:
     """Serves agents on the loopback interface until it is interrupted.
 
     Args:
         desk: The desk.
-        port: Port; 0 for a free one.
+        opened: An open port, from `listen`.
         token: The bearer token that each request must have.
-        announce: Called with the address once the port is open.
-
-    Raises:
-        OSError: The port cannot be opened.
+        announce: Called with the address.
     """
-    with closing(listen(port)) as opened, closing(Counter(desk)) as counter:
+    with closing(Counter(desk)) as counter:
         port = opened.getsockname()[1]
         application = counter.server().streamable_http_app(
             streamable_http_path=PATH, host=HOST
