@@ -41,7 +41,7 @@ from tdac_agent.cli.places import with_places
 from tdac_agent.cli.terminal import filter_streams
 
 FOR_HELP = frozenset(["-h", "--help"])
-DEFAULT = "run"
+DEFAULTS = ("run", "show")
 
 
 class _Command(TyperCommand):
@@ -50,11 +50,12 @@ class _Command(TyperCommand):
 
 
 class _Group(TyperGroup):
-    """A group; its command `run`, if it has one, may be left out."""
+    """A group; its command `run`, or else `show`, may be left out."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if DEFAULT in self.commands and args and args[0] not in self.commands:
-            args = [DEFAULT, *args]
+        default = [name for name in DEFAULTS if name in self.commands][:1]
+        if default and args and args[0] not in self.commands:
+            args = [*default, *args]
         return list(super().parse_args(ctx, args))
 
     def get_params(self, ctx: Any) -> list[Any]:

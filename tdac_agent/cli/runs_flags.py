@@ -32,11 +32,11 @@ rules_app = typer.Typer(
 app.add_typer(rules_app, name="rules")
 
 
-@rules_app.command("run", epilog="Example: `tdac rules runs/office-1`")
+@rules_app.command("show", epilog="Example: `tdac rules runs/office-1`")
 def show_rules(
     run: Annotated[Path, typer.Argument(help="Run folder.")], as_json: Json = False
 ) -> None:
-    """Show the rules of a run, with their origin and effect; `run` may be left out."""
+    """Show the rules of a run, with origin and effect; `show` may be left out."""
     from tdac_agent.cli import rules
 
     raise typer.Exit(rules.run(run, as_json))

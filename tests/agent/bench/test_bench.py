@@ -94,6 +94,7 @@ def test_rows_are_what_verify_says(judge, tmp_path, files):
     assert mean == pytest.approx(own.time.value)
 
 
+@pytest.mark.slow
 def test_several_sets_have_equal_weight(judge, tmp_path, level, files):
     """An entrant that does not drive on all of them is in no row over all."""
     other = tmp_path / "other.yaml"
@@ -110,6 +111,7 @@ def test_several_sets_have_equal_weight(judge, tmp_path, level, files):
     assert {pair.set for pair in found.pairs} == {"other", "few", None}
 
 
+@pytest.mark.slow
 def test_it_goes_on_after_an_interruption(judge, tmp_path, level, files):
     """What has been driven is not driven again, and the results are the same."""
     out, driven = tmp_path / "out", []
@@ -152,6 +154,7 @@ def test_hidden_worlds(judge, tmp_path, level, files, monkeypatch):
     assert bench(files[:2], [level], out=out, **given) == found
 
 
+@pytest.mark.slow
 def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
     """With a salt of one's own, no row of a world is shown until it is revealed."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
@@ -231,6 +234,7 @@ def test_a_ray_cluster(judge, tmp_path, level, files):
     assert found[0] == found[1]
 
 
+@pytest.mark.slow
 def test_seeds_of_a_training(judge, tmp_path, level, files):
     """Several files under one name are one entrant, resampled by file and world."""
     paths = [file.partition("=")[2] for file in files[:2]]
@@ -249,6 +253,7 @@ def test_seeds_of_a_training(judge, tmp_path, level, files):
     assert still.files[0] in both.files
 
 
+@pytest.mark.slow
 def test_a_privileged_planner_stands_apart(judge, tmp_path, files, monkeypatch):
     """It plans on the same worlds, after the others, and is compared with none."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
@@ -271,6 +276,7 @@ def test_a_privileged_planner_stands_apart(judge, tmp_path, files, monkeypatch):
     assert hidden.rows[0].worlds == 2
 
 
+@pytest.mark.slow
 def test_runs_on_the_same_world(judge, tmp_path, files):
     """The unit is a world: a success rate with several runs has no exact interval."""
     short = {"factor": 1.0, "least": 40, "most": 40}
@@ -342,6 +348,7 @@ def test_nobody_drives(tdac, tmp_path, level, files):
     assert (code, len(err.strip().splitlines())) == (2, 1)
 
 
+@pytest.mark.slow
 def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
     """Not only whole files, but each of their episodes is driven once."""
     out, seen = tmp_path / "out", []

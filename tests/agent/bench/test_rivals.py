@@ -23,7 +23,7 @@ ALL = [(name, level) for name in rival_names() for level in levels_of(name)]
 PAIRS = [*FIRST, *(pair for pair in ALL if pair not in FIRST)]
 
 
-@pytest.mark.slow_after(6)
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(("name", "level"), PAIRS)
 def test_it_drives(name, level, warm):
     """It passes the tests, and no episode ends with an error of its own."""
@@ -36,6 +36,7 @@ def test_it_drives(name, level, warm):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_dwa_arrives(warm):
     """A planner with a map of what it has seen is no straw man."""
     tasks = load_set("unknown")
@@ -43,6 +44,7 @@ def test_dwa_arrives(warm):
     assert report.successes >= 4
 
 
+@pytest.mark.slow
 def test_values_on_record_are_of_this_file():
     """Known constants, within their ranges, on levels of the planner."""
     tuned = json.loads((FOLDER / TUNED).read_text())

@@ -55,6 +55,7 @@ def planned(folder, name="few"):
     return make_plan(read_config(file), file.parent)
 
 
+@pytest.mark.slow
 def test_a_campaign_on_a_set(on_set, tdac, monkeypatch):
     """Each run selects on `dev` and is verified on hidden worlds of its own."""
     on_set.write(keep="records", seed=7)

@@ -40,6 +40,7 @@ def doctor():
     return done.returncode, {check.pop("name"): check for check in record["checks"]}
 
 
+@pytest.mark.slow
 def test_all_is_tried():
     """Exit 0 where a step, a verification and a film work, each told with how."""
     code, checks = doctor()

@@ -83,6 +83,7 @@ def policy(obs):
 """
 
 
+@pytest.mark.slow
 def test_from_nothing_to_verified_on_a_small_set(serve, easy, solver, out):
     """Feedback on new worlds each time, a verdict only by `choose`, aggregates only."""
 
@@ -152,6 +153,7 @@ def test_a_bad_choice_fails(serve, few, out):
     assert record(out)["status"] == "not verified"
 
 
+@pytest.mark.slow
 def test_an_agent_of_the_old_protocol(tmp_path):
     """The handshake with `initialize` tells its name, too."""
 

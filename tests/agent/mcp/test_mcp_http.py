@@ -104,6 +104,7 @@ def test_an_agent_over_http(server):
     assert (run["agent"], run["clients"]) == ("over HTTP", ["scripted 7"])
 
 
+@pytest.mark.slow
 def test_a_token_is_drawn(running, tmp_path):
     """Printed once, on stderr; the address has none."""
     write_set(tmp_path / "few.yaml")

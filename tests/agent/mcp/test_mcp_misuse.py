@@ -68,6 +68,7 @@ def test_a_spent_budget_on_a_task(serve, small_task, out):
     assert record(out)["status"] == "not verified"
 
 
+@pytest.mark.slow
 def test_a_spent_budget_on_a_set(serve, few):
     """The last submission gets what is left; one can still be chosen."""
 
@@ -125,6 +126,7 @@ def test_a_broken_judge(serve, small_task, out):
     assert list(out.glob("iterations/*/*/controller.py")) == []
 
 
+@pytest.mark.slow
 def test_two_at_once(running, tmp_path, small_task, good_source):
     """Over HTTP: both get right answers, and no number twice."""
     from mcp import Client
@@ -179,6 +181,7 @@ def test_flags_that_are_refused(tdac, arguments, told):
     assert told in error
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "end of stdin"])
 def test_the_end_of_a_server(tmp_path, how, no_traces, small_task):
     """At once, although a submission is being judged; stdout has the protocol only."""
@@ -220,6 +223,7 @@ def test_the_end_of_a_server(tmp_path, how, no_traces, small_task):
     assert run["clients"] == ["raw\N{REPLACEMENT CHARACTER}[2J 1"]
 
 
+@pytest.mark.slow
 def test_nothing_is_left_of_a_server_that_was_not_used(tmp_path, tdac):
     """An agent's program may start its server each time, and need it never."""
     from mcp_agent import over_stdio

@@ -113,6 +113,7 @@ def test_killed_after_the_choice(running, tmp_path, solver):
     assert record(out)["status"] == "verified"
 
 
+@pytest.mark.slow
 def test_a_finished_run_answers_from_its_record(serve, small_task, good_source, out):
     """All but `submit`, without another verification."""
 

@@ -91,6 +91,7 @@ def check(cases, task, seed, out):
         assert not any(secret in content for secret in secrets), path
 
 
+@pytest.mark.slow
 def test_a_few_attacks(tmp_path):
     """What is tried in each run of the tests."""
     few = [case for case in ATTACKS if case.name in FEW and case.kind == "map2d"]

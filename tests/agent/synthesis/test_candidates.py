@@ -122,6 +122,7 @@ def test_a_fault_loses_no_answer_of_the_others(write, good_source):
     assert again.asked == [("generate", 2, 0)]
 
 
+@pytest.mark.slow
 def test_without_a_success_there_are_all_iterations(write):
     """K = 6 in two groups; one edit and one summary each."""
     answers = {("generate", k, 0): code(f"{STILL}\nA = {k}\n") for k in range(1, 7)}
@@ -134,6 +135,7 @@ def test_without_a_success_there_are_all_iterations(write):
     assert frames_of([run]).runs["done"].tolist() == [6]
 
 
+@pytest.mark.slow
 def test_on_a_set_all_drive_on_the_same_worlds(tmp_path, warm):
     few = load_set(write_set(tmp_path / "few.yaml"))
     answers = {

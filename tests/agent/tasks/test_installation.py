@@ -77,6 +77,7 @@ def spoiled_by(kind, file):
         file.chmod(0o644 if kind == "for others to read" else 0o600)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(
     "kind", ["not a folder", "a link", "a pipe", "too short", "for others to read"]
 )

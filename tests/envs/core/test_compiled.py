@@ -261,6 +261,7 @@ def test_an_unprivileged_user_reads_a_warm_package(home, cold_start, copied_pack
         assert said.count("\n") == 0
 
 
+@pytest.mark.slow
 def test_warming_uses_every_kernel():
     """After `tdac warm` nobody waits for a compiler; each has one set of types."""
     script = (

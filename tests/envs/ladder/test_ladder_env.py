@@ -164,6 +164,7 @@ def test_a_pickled_environment_goes_on():
     assert all(same(a[0], b[0]) for a, b in zip(one, other, strict=True))
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @pytest.mark.parametrize("privileged", [False, True])
