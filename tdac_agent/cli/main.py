@@ -50,10 +50,15 @@ class _Command(TyperCommand):
 
 
 class _Group(TyperGroup):
-    """A group; its command `run`, or else `show`, may be left out."""
+    """A group; its command `run`, or else `show`, may be left out.
+
+    Not of a group that does something by itself, such as `tdac sets`.
+    """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         default = [name for name in DEFAULTS if name in self.commands][:1]
+        if self.invoke_without_command:
+            default = []
         if default and args and args[0] not in self.commands:
             args = [*default, *args]
         return list(super().parse_args(ctx, args))

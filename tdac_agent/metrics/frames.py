@@ -123,8 +123,8 @@ def _candidate(run: Run, attempt: Attempt) -> Row:
     }
 
 
-def _row(run: Run) -> Row:
-    tokens = run.tokens_in + run.tokens_out
+def labels_of(run: Run) -> Row:
+    """The columns that say what a run is, but for its seed."""
     return {
         "run": str(run.folder),
         "task": run.task,
@@ -134,6 +134,13 @@ def _row(run: Run) -> Row:
         "K": run.iterations,
         "J": run.patience,
         "setting": run.setting,
+    }
+
+
+def _row(run: Run) -> Row:
+    tokens = run.tokens_in + run.tokens_out
+    return {
+        **labels_of(run),
         "seed": run.index if run.seed is None else run.seed,
         "status": run.status,
         "tau": run.tau,

@@ -11,19 +11,15 @@ from numpy.typing import NDArray
 from scipy.stats import ttest_1samp
 
 from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
+from tdac_agent.metrics.frames import RUN_COLUMNS, Row, labels_of
 from tdac_agent.metrics.table import KIND, per_verified
 from tdac_agent.runs.run_record import Run
 from tdac_agent.runs.selection_record import Selection, read_selection
 
+_LABELS = ("run", "learner", "optimizer", "prompt", "K", "J", "setting")
 SET_RUN_COLUMNS = {
-    "run": "Run folder, or another unique name.",
     "task": "Name of the task set.",
-    "learner": "LLM1, as given to `--learner`.",
-    "optimizer": "LLM2, as given to `--optimizer`.",
-    "prompt": "Template of the first prompt.",
-    "K": "Maximum number of iterations.",
-    "J": "Maximum number of edits per iteration.",
-    "setting": "Parts of the loop in use; see `tdac_agent.runs.run_record.Setting`.",
+    **{name: RUN_COLUMNS[name] for name in _LABELS},
     "seed": "Determines the worlds of `dev`.",
     "status": "Status in `run.json`; `verified` and `not verified`: on hidden worlds.",
     "censored": "Whether budget, time or a fault ended the run.",
@@ -33,11 +29,8 @@ SET_RUN_COLUMNS = {
     "success": "Goals reached by the selected candidate on validation worlds, as a "
     "fraction; optimistic, because it was selected by these worlds.",
     "time_score": "Its mean time score there, likewise.",
-    "tokens": "Tokens of all prompts and answers; missing if not counted.",
-    "cost": "Cost, USD; missing if a price is unknown.",
-    "seconds": "Wall time, s.",
+    **{name: RUN_COLUMNS[name] for name in ("tokens", "cost", "seconds")},
 }
-Row = dict[str, object]
 
 
 def set_frame_of(runs: Iterable[Run]) -> pd.DataFrame:
@@ -107,14 +100,7 @@ def _row(run: Run, selected: Selection | None) -> Row:
     best = None if selected is None else selected.optimistic
     codes = sum(each.valid and not each.unchanged for each in run.attempts)
     return {
-        "run": str(run.folder),
-        "task": run.task,
-        "learner": run.learner,
-        "optimizer": run.optimizer,
-        "prompt": run.prompt,
-        "K": run.iterations,
-        "J": run.patience,
-        "setting": run.setting,
+        **labels_of(run),
         "seed": run.seed,
         "status": run.status,
         "censored": not run.finished,

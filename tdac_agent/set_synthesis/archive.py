@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from statistics import fmean
 
 import numpy as np
@@ -45,7 +45,7 @@ class Figures:
 
     def beats(self, other: Figures) -> bool:
         """Whether it is nowhere worse, and better somewhere."""
-        pairs = [(getattr(self, name), getattr(other, name)) for name in self.__slots__]
+        pairs = list(zip(astuple(self), astuple(other), strict=True))
         return all(a >= b for a, b in pairs) and any(a > b for a, b in pairs)
 
 

@@ -78,6 +78,7 @@ def write(few, tmp_path, warm):
     return run
 
 
+@pytest.mark.slow
 def test_a_better_variation_is_asked_for_and_selected(write, solver, tmp_path):
     """The model sees the parent, its figures, and what was tried with it."""
     slow = solver.replace("def policy(", "def fast(") + (

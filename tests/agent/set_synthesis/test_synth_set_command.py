@@ -13,6 +13,7 @@ from few_worlds import STILL_ANSWER, write_set
 SCRIPTED = Path(__file__).parents[1] / "scripted_model.py"
 
 
+@pytest.mark.slow
 def test_the_built_in_controller(tdac, tmp_path):
     """It is selected without a model; the report and the list show the run."""
     few = write_set(tmp_path / "few.yaml")
