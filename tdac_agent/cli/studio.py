@@ -21,6 +21,7 @@ def run(port: int, open_it: bool) -> None:
         text = "who opens this address is let in; Ctrl-C ends the studio, not its runs"
         print(text, file=sys.stderr)
 
+    print("starting the studio …", file=sys.stderr, flush=True)
     try:
         serve(Path(), port, announce, open_it=open_it)
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +30,7 @@ from tdac_envs.grid.plan import path_length
 
 MOST_BYTES = 64 << 20
 FIRST = "map: maze"
+LEAST_RADIUS, RADIUS_STEP = 1.0, 0.5
 # A file that is dropped beside the box would replace the page.
 DROP = """<script>
 addEventListener("dragover", (event) => event.preventDefault());
@@ -136,15 +138,16 @@ class Choosing:
                 )
         with ui.column().classes("w-full gap-0") as self._sized:
             self._radius_text = ui.label("robot radius")
-            self._radius = ui.slider(min=1, max=40, step=0.5, value=15).props(
-                "label aria-label='robot radius, px'"
-            )
+            self._radius = ui.slider(
+                min=LEAST_RADIUS, max=40, step=RADIUS_STEP, value=15
+            ).props("label aria-label='robot radius, px'")
             self._radius.on("change", self._resized)
         self._told = ui.label().classes("text-sm").props("role=status")
         self._snap = ui.button("Use the nearest free place", on_click=self._move).props(
             "outline no-caps dense"
         )
-        self._snap.visible = False
+        self._fit = ui.button(on_click=self._shrink).props("outline no-caps dense")
+        self._snap.visible = self._fit.visible = False
 
     def _build_start(self) -> None:
         ui.label("3. Who writes").classes("text-lg font-bold")
@@ -186,7 +189,8 @@ class Choosing:
         await self._check()
 
     def _refuse(self, text: str) -> None:
-        self._checked, self._draft, self._snap.visible = None, None, False
+        self._checked, self._draft = None, None
+        self._snap.visible = self._fit.visible = False
         for number in self._numbers.values():
             number.value = None
         self._radius_text.text = ""
@@ -270,6 +274,14 @@ class Choosing:
         self._show_numbers(moved)
         await self._check()
 
+    async def _shrink(self) -> None:
+        """Takes the largest radius of the slider that gets through."""
+        draft = self._draft
+        fitting = None if draft is None else fitting_radius(draft, self._checked)
+        if fitting is not None:
+            self._radius.value = fitting
+            await self._resized()
+
     async def _resized(self) -> None:
         if self._draft is not None:
             self._draft = replace(self._draft, radius=float(self._radius.value))
@@ -292,7 +304,11 @@ class Choosing:
             self._tell(*_sentence(checked, board))
             self._show_picture(checked.picture or board.png)
         stuck = self._checked is not None and self._checked.task is None
-        self._snap.visible = stuck and board.kind == "map"
+        fitting = fitting_radius(draft, self._checked) if stuck else None
+        self._snap.visible = stuck and board.kind == "map" and fitting is None
+        self._fit.visible = fitting is not None
+        if fitting is not None:
+            self._fit.text = f"Use a radius of {fitting:g} px"
         self._image.content = overlay(board, draft, self._checked)
         self._show_radius(draft)
         self._refresh_command()
@@ -354,6 +370,14 @@ def _kind(kind: str) -> Kind:
 def _on_pixel(place: Place, unit: str) -> Place:
     """A clicked place; on a map, the middle of a pixel."""
     return (round(place[0]), round(place[1])) if unit == "px" else place
+
+
+def fitting_radius(draft: Draft, checked: Checked | None) -> float | None:
+    """The largest radius of the slider that gets through; None if that is no help."""
+    if checked is None or checked.widest is None or draft.radius is None:
+        return None
+    fitting = math.floor(checked.widest / RADIUS_STEP) * RADIUS_STEP
+    return fitting if LEAST_RADIUS <= fitting < draft.radius else None
 
 
 def _sentence(checked: Checked, board: Board) -> tuple[str, bool]:

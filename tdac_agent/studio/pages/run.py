@@ -12,6 +12,7 @@ from nicegui import ui
 from tdac_agent.library.listing import row_of
 from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
 from tdac_agent.runs.run_record import RUN_FILE, load_run
+from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
     framed,
@@ -70,7 +71,7 @@ class Watching:
             self._resume = ui.button(
                 "Continue", icon="play_arrow", on_click=self._go_on
             )
-            self._download = ui.button("Download controller.py", on_click=self._save)
+            self._download = ui.button("Download the controller", on_click=self._save)
             self._judge = ui.button("Verify on hidden worlds", on_click=self._hidden)
             self._follow = ui.switch("show each new candidate", value=True)
         self._verdict = ui.element("pre").classes("output")
@@ -126,6 +127,10 @@ class Watching:
         self._download.visible = done
         self._judge.visible = done and status == "selected"
         self._wishes.clear()
+        given = about_given(self._folder) if row else ""
+        if given:
+            with self._wishes:
+                ui.label(given).classes("problem")
         if row and is_from_elsewhere(self._folder):
             with self._wishes:
                 ui.label(ELSEWHERE).classes("note text-sm")
@@ -158,7 +163,9 @@ class Watching:
         start(self._place, words, self._verdict_about)
 
     def _save(self) -> None:
-        ui.download(load_run(self._folder).controller)
+        ui.download.content(
+            deployable(self._folder), f"{self._folder.name}.zip", "application/zip"
+        )
 
     def _interrupt(self) -> None:
         job = job_of(self._place, self._at)
@@ -232,3 +239,20 @@ def _progress(row: dict[str, Any], running: bool) -> str:
     if row.get("reason"):
         text += f"; {row['reason']}"
     return text
+
+
+def about_given(folder: Path) -> str:
+    """What came of the controller that the run began with, if it failed."""
+    try:
+        run = load_run(folder)
+    except (TdacError, OSError):
+        return ""
+    first = next((each for each in run.attempts if (each.k, each.j) == (1, 0)), None)
+    if run.given_sha256 is None or first is None or first.passed:
+        return ""
+    failed = len(first.failed_tests)
+    text = f"Your controller failed {failed} test{'' if failed == 1 else 's'}"
+    if not run.verified:
+        return f"{text}."
+    author = "the built-in template" if run.optimizer == "builtin" else run.optimizer
+    return f"{text}. The verified controller is another one, by {author}."

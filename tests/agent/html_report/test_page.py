@@ -208,9 +208,24 @@ def test_a_run_that_is_still_at_work(copied):
     shown = " ".join("".join(Outline(text).shown).split())
     assert "running after 2 candidates" in shown
     assert "This run is still in progress" in shown
-    assert "1 running" in shown
     for word in ("killed", "ended early", "--resume"):
         assert word not in shown
+
+
+def test_only_several_runs_have_rates(copied):
+    """One that is at work is counted as such."""
+    alone = make_page(copied).html.decode()
+    assert "Clopper-Pearson" not in alone
+    assert 'id="summary"' not in alone
+    other = shutil.copytree(copied, copied.parent / "other")
+    run = load_run(other)
+    left = {"status": "running", "tau": None, "attempts": run.attempts[:1]}
+    (other / "run.json").write_text(run.model_copy(update=left).model_dump_json())
+    with hold(other / LOCK_FILE):
+        text = make_page(copied.parent).html.decode()
+    shown = " ".join("".join(Outline(text).shown).split())
+    assert "1 running" in shown
+    assert "Clopper-Pearson" in shown
 
 
 def test_a_run_that_ends_while_its_record_is_read_was_not_killed(copied):

@@ -170,6 +170,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "a.cell")) > 1)
     assert page.find_elements(By.CSS_SELECTOR, "a.cell.failed")
     page.switch_to.default_content()
+    says(page, "The verified controller is another one, by the built-in template.")
 
 
 def test_two_runs_side_by_side(page, studio, plan):

@@ -4,6 +4,7 @@ import io
 import json
 import math
 import shlex
+import shutil
 import time
 import zipfile
 from dataclasses import replace
@@ -15,12 +16,15 @@ pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
 import tdac_agent
 from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.studio.board import board_of, names_of
-from tdac_agent.studio.draft import Draft, check
+from tdac_agent.studio.deployable import deployable
+from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
 from tdac_agent.studio.jobs import job_of, jobs, start
-from tdac_agent.studio.pages.run import is_from_elsewhere
+from tdac_agent.studio.pages.home import fitting_radius
+from tdac_agent.studio.pages.run import about_given, is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
@@ -160,3 +164,41 @@ def test_keys_drive(tmp_path):
     # y points down: a turn to the left is negative.
     assert -1.0 < math.remainder(env.pose()[2] - before, math.tau) < 0.0
     assert drive.status == f"{drive.dt:.1f} s"
+
+
+def test_a_controller_is_downloaded_with_what_it_reads(tmp_path):
+    """A file alone could not be imported: it reads its map."""
+    folder = tmp_path / "run"
+    shutil.copytree(DEMO, folder)
+    for name in ("controller.py", "sensors.py", "params.json", "report.json"):
+        (folder / name).write_text(name)
+    with zipfile.ZipFile(io.BytesIO(deployable(folder))) as packed:
+        names = "controller.py params.json sensors.py"
+        assert sorted(packed.namelist()) == names.split()
+        assert packed.read("sensors.py") == b"sensors.py"
+
+
+@pytest.mark.parametrize(
+    ("widest", "radius", "fits"),
+    [(24.3, 38.0, 24.0), (24.3, 20.0, None), (None, 38.0, None), (0.4, 3.0, None)],
+)
+def test_a_radius_that_gets_through(widest, radius, fits):
+    """A step of the slider below the widest one, if a smaller radius helps."""
+    draft = Draft.of(board_of("map", "maze", None), "maze", None)
+    assert (
+        fitting_radius(replace(draft, radius=radius), Checked(None, widest=widest))
+        == fits
+    )
+
+
+def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
+    folder = tmp_path / "run"
+    shutil.copytree(DEMO, folder)
+    assert about_given(folder) == ""  # it began with no file
+    run = load_run(folder)
+    given = run.model_copy(update={"given_sha256": "0" * 64, "optimizer": "builtin"})
+    (folder / "run.json").write_text(given.model_dump_json())
+    failed = len(run.attempts[0].failed_tests)
+    text = about_given(folder)
+    assert text.startswith(f"Your controller failed {failed} tests. The verified")
+    assert text.endswith("is another one, by the built-in template.")
