@@ -14,6 +14,7 @@ from queue import SimpleQueue
 from tdac_agent.errors import Fault
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
+from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.extract import same_code
@@ -29,6 +30,7 @@ from tdac_agent.synthesis.calls import Calls, OutOfBudget
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
 from tdac_agent.synthesis.setup import (
     account_of,
+    checked_vision,
     describe,
     hold_folder,
     open_record,
@@ -36,6 +38,10 @@ from tdac_agent.synthesis.setup import (
 )
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import draw_trajectories
+from tdac_agent.verification.diagnosis.model_picture import (
+    FailurePicture,
+    failure_picture,
+)
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
@@ -62,6 +68,7 @@ def synthesize(
     prompt: str = "full",
     refine: bool = True,
     rules: RuleBook | None = None,
+    vision: bool = False,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
     max_tokens: int | None = None,
@@ -97,6 +104,8 @@ def synthesize(
             `underspecified`, or a file (docs/prompts.md).
         refine: Whether failures become rules of the prompt for new controllers.
         rules: Rules to begin with (`read_given`); none by default.
+        vision: Whether a picture of the failure goes with the feedback to the
+            optimizer; never one of a held-out start.
         max_output: Token limit of an answer; twice that after a truncated answer.
         max_cost: Limit in USD; by default the one the run was begun with, or 2.
         max_tokens: Limit of input plus output; by default the earlier one, or none.
@@ -114,7 +123,7 @@ def synthesize(
     Raises:
         RunError: The folder cannot be used, or contains another run.
         ProviderError: A model cannot be used, e.g. without its key, or nothing bounds
-            what it costs.
+            what it costs; or pictures would have no effect.
         PriceError: The user's price file is broken.
         PromptError: The template cannot be used.
         Fault: The sandbox, suite or provider is broken; the fault is also recorded.
@@ -136,6 +145,7 @@ def synthesize(
         patience=patience,
         candidates=whole_number("candidates", candidates, 1),
         refine=refine,
+        vision=checked_vision(vision, models[1].name, patience),
         given_rules=given_lines(book),
         seed=settled_seed(seed, models[0], out),
     )
@@ -248,7 +258,8 @@ class _Loop:
         for j in range(1, run.patience + 1):
             if report.passed:
                 break
-            parent, (edited, notes) = source, dialogue.edit(k, j, source, failure)
+            parent, picture = source, self._picture(best)
+            edited, notes = dialogue.edit(k, j, source, failure, picture)
             if edited is None:
                 self._no_code(k, j, notes)
                 return False
@@ -294,6 +305,14 @@ class _Loop:
         for each in [*(one for one in tested if one is not best), best]:
             self._dialogue.saw(each.k, 0, feedback_of(each.report))
         return best
+
+    def _picture(self, failed: _Tested) -> FailurePicture | None:
+        """A picture of a failure, if the models are shown pictures."""
+        if not self._recorder.run.vision:
+            return None
+        trajectories = load_trajectories(failed.folder / "trajectories")
+        task = self._tests.task
+        return failure_picture(task, failed.report, trajectories, LARGEST_SIDE)
 
     def _no_code(self, k: int, j: int, notes: tuple[str, ...]) -> None:
         """Records an answer without code.
