@@ -82,8 +82,9 @@ def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
         poses: Shape (T + 1, 3): x, y, heading.
         event: The event to show.
     """
-    whole, column = _parts(background, poses, event)
-    return _side_by_side(whole, column)
+    chart = background.whole()
+    column = _draw(background, chart, poses, event)
+    return _side_by_side(_map_of(chart), column)
 
 
 def bounded_picture(
@@ -94,8 +95,10 @@ def bounded_picture(
     The map is shrunk and the text is not, as long as that suffices. No side is shorter
     than three quarters of the other.
     """
-    whole, column = _parts(background, poses, event)
-    picture = _side_by_side(_shrunk(whole, side - COLUMN, side), column)
+    chart = background.whole()
+    room = side - COLUMN, side
+    column = _draw(background, chart, poses, event, _zoom(_map_of(chart), *room))
+    picture = _side_by_side(_shrunk(_map_of(chart), *room), column)
     picture = _shrunk(picture, side, side)
     rows, columns = picture.shape[:2]
     rows, columns = max(rows, 3 * columns // 4), max(columns, 3 * rows // 4)
@@ -104,17 +107,25 @@ def bounded_picture(
     return padded
 
 
-def _parts(background: Backdrop, poses: Points, event: Event) -> tuple[Image, Image]:
-    """The whole map, and the column beside it."""
-    chart, radius = background.whole(), background.radius
-    canvas = chart.canvas
-    window = _window(background, event, poses, chart.scale)
+def _draw(
+    background: Backdrop, chart: Chart, poses: Points, event: Event, zoom: float = 1.0
+) -> Image:
+    """Draws the run on the whole map, and returns the column beside it.
+
+    `zoom` is how much the map is shrunk later.
+    """
+    radius = background.radius
+    window = _window(background, event, poses, chart.scale * zoom)
     _draw_run(chart, poses, event, radius, show_path=window is None)
     close = None
     if window is not None:
         _draw_window(chart, window)
         close = _close_up(background.close_up(window), poses, event, radius)
-    return canvas.image[: canvas.strip_top], _column(event, close)
+    return _column(event, close)
+
+
+def _map_of(chart: Chart) -> Image:
+    return chart.canvas.image[: chart.canvas.strip_top]
 
 
 def _side_by_side(whole: Image, column: Image) -> Image:
@@ -127,12 +138,18 @@ def _side_by_side(whole: Image, column: Image) -> Image:
 
 def _shrunk(picture: Image, width: int, height: int) -> Image:
     """A picture that fits into a box; unchanged if it does already."""
-    rows, columns = picture.shape[:2]
-    zoom = min(1.0, width / columns, height / rows)
+    zoom = _zoom(picture, width, height)
     if zoom == 1.0:
         return picture
-    size = (max(1, int(zoom * columns)), max(1, int(zoom * rows)))
+    rows, columns = (max(1, int(zoom * n)) for n in picture.shape[:2])
+    size = (columns, rows)
     return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _zoom(picture: Image, width: int, height: int) -> float:
+    """The largest scale, 1 at most, at which a picture fits into a box."""
+    rows, columns = picture.shape[:2]
+    return float(min(1.0, width / columns, height / rows))
 
 
 def _draw_run(
@@ -147,14 +164,14 @@ def _draw_run(
     canvas.disc(places[0], 4, FREE)
     canvas.disc(places[0], 4, EARLY, width=2)
     _draw_trail(canvas, places)
-    if event.axes is not None:
-        _draw_axes(chart, places[0], event.axes)
     x, y = places[-1]
     canvas.disc((x, y), body, TRAIL, 0.35)
     canvas.disc((x, y), body, TRAIL, width=2)
     turns = chart.turned(float(poses[-1, 2])) + np.array([0.0, 2.6, -2.6])
     nose = np.column_stack([np.cos(turns), np.sin(turns)]) * 0.6 * body / canvas.scale
     canvas.polygon(np.add(nose, (x, y)), TRAIL)
+    if event.axes is not None:
+        _draw_axes(chart, places[0], event.axes)
     if event.contact is not None:
         size, contact = max(0.3 * body, 6.0), chart.at(np.array([event.contact]))
         canvas.disc(contact, size, FREE, 0.9, 5)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from few_worlds import write_set
 from PIL import Image
-from script import STILL, Script, code
+from script import NO_RULES, STILL, Script, code
 
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.html_report import make_page
@@ -40,8 +40,8 @@ def shown_in(request):
 
 
 def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm):
-    model = Script(code(BUMP), code(STILL), code(STILL))
-    given = {"episodes": 4, "feedback_episodes": 2, "seed": 3, "judge": warm}
+    model = Script(code(BUMP), code(STILL), NO_RULES)
+    given = {"episodes": 12, "feedback_episodes": 2, "seed": 3, "judge": warm}
     run = synthesize_on_set(
         crowded, model, out=tmp_path / "run", iterations=1, vision=True, **given
     )
