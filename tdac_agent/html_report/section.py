@@ -162,6 +162,8 @@ def _origin(told: Told) -> Iterator[tuple[str, str]]:
     yield "prompt", f"{run.prompt} {run.prompt_sha256}".strip()
     several = f", {run.candidates} side by side" if run.candidates > 1 else ""
     yield "loop", f"K = {run.iterations}, J = {run.patience}{several}"
+    if run.vision:
+        yield "pictures", "a failure, with each question to edit or improve"
     for rule in run.given_rules:
         yield "given rule", rule
     yield "tokens and cost", spent(told)
