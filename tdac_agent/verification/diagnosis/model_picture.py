@@ -31,12 +31,14 @@ class FailurePicture:
         png: PNG file, without a time or name in it.
         caption: Name and cause of the episode.
         event: What it shows.
-        y_up: Whether the y axis of the printed coordinates points up, not down.
+        place: Unit of the printed places.
+        y_up: Whether their y axis points up, not down.
     """
 
     png: bytes
     caption: str
     event: Event
+    place: str
     y_up: bool
 
 
@@ -80,7 +82,8 @@ def picture_of_event(
     turn = units.heading_of(1.0) - units.heading_of(0.0)
     y_up = math.remainder(turn, math.tau) < 0.0
     picture = bounded_picture(background, trajectory.poses, event, side)
-    return FailurePicture(_png(picture), event.title, event, y_up)
+    place = units.printed_place
+    return FailurePicture(_png(picture), event.title, event, place, y_up)
 
 
 def _png(picture: Image) -> bytes:

@@ -59,7 +59,7 @@ def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm
     section = edit.prompt.partition("## A picture of one failure")[2]
     assert picture.caption in section
     assert "purple discs: the movers" in section
-    assert "black arrows: the axes x and y" in section
+    assert "black arrows: the axes x and y of all places" in section
     assert "do not fit the controller to this one" in section
     assert (
         'alt="A failure of the previous version"' in make_page(run.folder).html.decode()

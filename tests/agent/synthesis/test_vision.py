@@ -72,7 +72,7 @@ def test_the_edit_alone_has_a_picture_of_the_failure(seen, task):
         assert picture.caption == "nominal: collision"
         assert edit.prompt.count("`edit.picture.png`") == 1
         assert "- orange ring: the contact;" in edit.prompt
-        assert "x points right, y points down" in edit.prompt
+        assert "- places in px: x points right, y points down." in edit.prompt
         assert "movers" not in edit.prompt.partition("## A picture")[2]
         # What a vendor may cache is the same as without a picture.
         assert edit.prompt[: edit.stable] == first.prompt[: first.stable]
