@@ -1,8 +1,9 @@
 """The interface of a controller writer: a language model or `builtin`.
 
-The public names of `tdac_agent.models.provider`.
+The public names of `tdac_agent.models.provider` and `picture`.
 """
 
+from tdac_agent.models.picture import Picture
 from tdac_agent.models.provider import (
     ANSWER_SECONDS,
     MAX_OUTPUT_TOKENS,
@@ -24,6 +25,7 @@ __all__ = [
     "MAX_OUTPUT_TOKENS",
     "Kind",
     "PermanentFault",
+    "Picture",
     "Provider",
     "ProviderFault",
     "RateLimited",

@@ -13,10 +13,8 @@ from tdac_agent.html_report.animation import encoded, shares
 from tdac_agent.html_report.page import rendered
 from tdac_agent.html_report.scene import TaskPicture, data_address, picture_of
 from tdac_agent.storage.files import write_atomic
-from tdac_envs.epuck.run_picture import WorldBackground
-from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.ladder.picture import backdrop_of
 from tdac_envs.ladder.task_sets import AnyTask
-from tdac_envs.map2d.run_picture import Background
 
 PAGE = "bench.html"
 MOST_WORLDS = 6
@@ -65,7 +63,7 @@ def write_page(
         for replay in known:
             key, task = f"{own.name} {replay.index}", tasks[own.name][replay.index]
             if key not in scenes:
-                scenes[key] = picture_of(_backdrop(task))
+                scenes[key] = picture_of(backdrop_of(task))
             episodes.append(_episode(replay, key, task, scenes[key], most))
         first = next(iter(episodes), None)
         sections.append(
@@ -100,9 +98,3 @@ def _episode(
         "scene": key,
         **encoded(task, scene, replay.trajectory, replay.outcome, most),
     }
-
-
-def _backdrop(task: AnyTask) -> Background | WorldBackground:
-    if isinstance(task, EPuckTask):
-        return WorldBackground.of(task)
-    return Background.of(task)

@@ -15,6 +15,7 @@ from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
 from tdac_agent.prompting.prompt import generate_prompt, load_template
 from tdac_agent.prompting.rules import RepairRule, RuleBook
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
+from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.task_file import Profile
 from tdac_envs.ladder.task_sets import TaskSet
@@ -34,7 +35,7 @@ def run(
         profile: What a controller must define; by default as the task says.
         models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
             `max_output`, `rules`, `max_cost` and `max_tokens`, as for `synthesize`.
-        loop: `iterations`, `patience`, `candidates` and `refine`.
+        loop: `iterations`, `patience`, `candidates`, `refine` and `vision`.
         as_json: Whether to print the forecast as JSON.
     """
     for name in _names(models):
@@ -71,10 +72,13 @@ def show(
         setting: Setting of the task, or the task set.
         question: The question.
         models: As for `run`.
-        loop: `iterations`, `patience`, `candidates` and `refine`; on a set `improve`.
+        loop: `iterations`, `patience`, `candidates`, `refine` and `vision`; on a set
+            `improve`.
         as_json: Whether to print the forecast as JSON.
     """
     names = _names(models)
+    improve = loop.get("improve", 0)
+    checked_vision(loop["vision"], names[1], loop["patience"], improve)
     options = Options(setting, models["base_url"], models["key_over_http"])
     missing = [line for each in names for line in missing_for_name(each, options)]
     limits = ("base_url", "max_output", "max_cost", "max_tokens")
@@ -105,6 +109,8 @@ def _estimates(forecast: CostForecast) -> list[str]:
         reserved = format_usd(forecast.first_cost)
         lines.append(f"first question: at most {reserved}, reserved before it is asked")
     whole = f"whole run: {forecast.questions} questions (K={k}, J={j})"
+    if forecast.pictures:
+        whole += f" with {forecast.pictures} pictures"
     whole += " if no controller passes"
     if forecast.cost_once is not None and forecast.cost_most is not None:
         whole += (

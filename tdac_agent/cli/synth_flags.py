@@ -104,6 +104,13 @@ def synth(
             "own.",
         ),
     ] = None,
+    vision: Annotated[
+        bool,
+        typer.Option(
+            "--vision",
+            help="Show the optimizer a picture of the failure that it shall repair.",
+        ),
+    ] = False,
     dry_run: Annotated[
         bool,
         typer.Option(
@@ -207,6 +214,7 @@ def synth(
         "patience": j,
         "candidates": candidates,
         "refine": refine,
+        "vision": vision,
     }
     on_set = SynthSetFlags(set_name, episodes, feedback_episodes, improve, then_verify)
     if on_set != SynthSetFlags():

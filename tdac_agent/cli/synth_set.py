@@ -138,7 +138,7 @@ def dry_run(
     Args:
         flags: Flags that concern task sets.
         models: As for `dry_run.run`.
-        loop: `iterations`, `patience`, `candidates` and `refine`.
+        loop: `iterations`, `patience`, `candidates`, `refine` and `vision`.
         as_json: Whether to print the forecast as JSON.
     """
     assert flags.name is not None

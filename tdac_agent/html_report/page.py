@@ -17,7 +17,11 @@ from tdac_agent.errors import RunError
 from tdac_agent.html_report.code import count_changes, highlighted, shown_diff
 from tdac_agent.html_report.overview import format_seconds, overview_of
 from tdac_agent.html_report.scene import TaskPicture, scene_of
-from tdac_agent.html_report.section import grouped_failures, section_of
+from tdac_agent.html_report.section import (
+    grouped_failures,
+    question_picture,
+    section_of,
+)
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.history import Told, gather_run, learner_named, run_folders
 
@@ -157,6 +161,7 @@ def _environment() -> jinja2.Environment:
         "diff": shown_diff,
         "duration": format_seconds,
         "learner": learner_named,
+        "picture": question_picture,
         "python": highlighted,
         "shortened": shortened,
         "test": short_test,

@@ -11,8 +11,11 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.animation import animations
 from tdac_agent.html_report.overview import drawn, format_seconds
-from tdac_agent.html_report.scene import TaskPicture
+from tdac_agent.html_report.scene import TaskPicture, data_address
 from tdac_agent.models.budget import format_usd
+from tdac_agent.models.picture import MEDIA_TYPE, PNG_SIGNATURE
+from tdac_agent.models.picture import MOST_BYTES as MOST_PICTURE_BYTES
+from tdac_agent.models.provider import PICTURED
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import CandidateHistory, Told, learner_named
 from tdac_agent.runs.resume import resume_words
@@ -20,11 +23,13 @@ from tdac_agent.runs.run_record import (
     AGENT,
     GIVEN_FILE,
     GIVEN_RULES_FILE,
+    PICTURE_FILE,
     PROMPT_FILE,
 )
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
+from tdac_envs.core.intake import read_file
 
 DIFF_LINES = (100, 600)
 ALL_DIFF_LINES = 20_000
@@ -108,6 +113,20 @@ def grouped_failures(report: Report) -> list[FailureGroup]:
     return rows
 
 
+def question_picture(candidate: CandidateHistory) -> str | None:
+    """The picture that went with the question for a candidate, as a data URL."""
+    for kind in PICTURED:
+        try:
+            content = read_file(
+                candidate.folder / f"{kind}.{PICTURE_FILE}", MOST_PICTURE_BYTES
+            )
+        except OSError:
+            continue
+        if content.startswith(PNG_SIGNATURE):
+            return data_address(content, MEDIA_TYPE)
+    return None
+
+
 def spent(told: Told) -> str:
     """Tokens and cost of a run, as text."""
     run = told.run
@@ -148,6 +167,8 @@ def _origin(told: Told) -> Iterator[tuple[str, str]]:
     yield "prompt", f"{run.prompt} {run.prompt_sha256}".strip()
     several = f", {run.candidates} side by side" if run.candidates > 1 else ""
     yield "loop", f"K = {run.iterations}, J = {run.patience}{several}"
+    if run.vision:
+        yield "pictures", "a failure, with each question to edit or improve"
     for rule in run.given_rules:
         yield "given rule", rule
     yield "tokens and cost", spent(told)
@@ -185,6 +206,7 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
         limits += ["--improve", str(run.improve)] if run.improve else []
     if run.given_rules:
         limits += ["--rules", f"{name}/{GIVEN_RULES_FILE}"]
+    limits += ["--vision"] if run.vision else []
     limits += ["--candidates", str(run.candidates)] if run.candidates > 1 else []
     words = ["tdac", "synth", *about, *limits, "--learner", run.learner]
     if run.optimizer != run.learner:

@@ -5,13 +5,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tdac_agent.models.faults import as_faults
+from tdac_agent.models.picture import MEDIA_TYPE, Picture
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.streamed import Stop, StreamedAnswer, count
 from tdac_agent.models.vendor import Vendor, VendorModel
 
 if TYPE_CHECKING:
     import anthropic
-    from anthropic.types import RawMessageStreamEvent, TextBlockParam
+    from anthropic.types import (
+        ImageBlockParam,
+        RawMessageStreamEvent,
+        TextBlockParam,
+    )
 
 STOPS: dict[str, Stop] = {
     "end_turn": "end",
@@ -56,14 +61,28 @@ class AnthropicModel(VendorModel["anthropic.Anthropic"]):
             return gathered.reply()
 
 
-def _content(request: Request) -> list[TextBlockParam]:
-    """Returns the prompt's parts; the stable one is marked for caching."""
+def _content(request: Request) -> list[TextBlockParam | ImageBlockParam]:
+    """Returns the prompt's parts; the stable one is marked for caching.
+
+    Pictures follow it, since a cached part ends where a question differs from others.
+    """
     blocks: list[TextBlockParam] = [
         {"type": "text", "text": part} for part in request.parts
     ]
     if len(blocks) > 1:
         blocks[0]["cache_control"] = {"type": "ephemeral"}
-    return blocks
+    return [*blocks[:-1], *map(_image, request.images), *blocks[-1:]]
+
+
+def _image(picture: Picture) -> ImageBlockParam:
+    return {
+        "type": "image",
+        "source": {
+            "type": "base64",
+            "media_type": MEDIA_TYPE,
+            "data": picture.base64,
+        },
+    }
 
 
 def _add_event(gathered: StreamedAnswer, event: RawMessageStreamEvent) -> None:

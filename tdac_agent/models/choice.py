@@ -34,6 +34,9 @@ OFFLINE = frozenset({"builtin", "command", "manual", "replay", "scripted"})
 IN_FILES = frozenset({"replay", "scripted"})
 """Providers whose answers are all stored in files."""
 
+BLIND = frozenset({"builtin", "scripted"})
+"""Providers that ignore pictures; a replay needs them, to find the same questions."""
+
 
 @dataclass(frozen=True, slots=True)
 class Options:

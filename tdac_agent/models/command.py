@@ -52,7 +52,8 @@ class Command:
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
-        answer = self._run(request.prompt.encode("utf-8", "replace"), request.seconds)
+        prompt = request.prompt_naming(lambda picture: str(picture.file))
+        answer = self._run(prompt.encode("utf-8", "replace"), request.seconds)
         text = answer.decode("utf-8", "replace")
         if len(text) > MAX_CHARS:
             raise ProviderFault(f"the answer has more than {MAX_CHARS} characters")

@@ -38,7 +38,8 @@ class Manual:
     """A provider that waits for `NNN.reply.md` without a time limit; see `Provider`.
 
     A question that is already in the folder keeps its number, so that a restarted run
-    finds the earlier answers. `Request.repeat` tells identical questions apart.
+    finds the earlier answers. `Request.repeat` tells identical questions apart. A
+    picture is beside its question, as `NNN.picture.png`.
 
     Args:
         folder: Folder of the questions and answers.
@@ -56,26 +57,39 @@ class Manual:
         """Answers one request; see `Provider`."""
         try:
             existing = set(self._folder.glob("*.reply.md"))
-            number = self._number(request.prompt, request.repeat)
+            number = self._number(request)
             reply = self._folder / f"{number:03}.reply.md"
             self._announce(number, reply, exists=reply in existing)
             return Reply(self._wait(reply))
         except OSError as error:
             raise PermanentFault(f"{error.filename}: {error.strerror}") from None
 
-    def _number(self, prompt: str, repeat: int) -> int:
+    def _number(self, request: Request) -> int:
         """Returns the number of a question; writes the question if it is new."""
-        question = prompt.encode("utf-8", "surrogatepass")
+        repeat = request.repeat
         for number in itertools.count(1):
             path = self._folder / f"{number:03}.prompt.md"
+            files = self._files(request, number)
             if not path.exists():
-                write_atomic(path, question)
+                for file, content in files.items():
+                    write_atomic(file, content)
                 return number
-            if read_file(path, RECORD_BYTES) == question:
+            if all(_has(file, content) for file, content in files.items()):
                 if repeat == 0:
                     return number
                 repeat -= 1
         raise AssertionError("unreachable")
+
+    def _files(self, request: Request, number: int) -> dict[Path, bytes]:
+        """The files of a question; the prompt, which names the others, is last."""
+        names = {
+            picture: f"{number:03}.picture{f'-{n}' if n > 1 else ''}.png"
+            for n, picture in enumerate(request.images, 1)
+        }
+        files = {self._folder / name: image.png for image, name in names.items()}
+        prompt = request.prompt_naming(names.__getitem__)
+        path = self._folder / f"{number:03}.prompt.md"
+        return {**files, path: prompt.encode("utf-8", "surrogatepass")}
 
     def _announce(self, number: int, reply: Path, *, exists: bool) -> None:
         """Prints which answer is awaited, or which existing one is used."""
@@ -95,3 +109,8 @@ class Manual:
                 return now.decode("utf-8", "replace")
             before = now
             time.sleep(self._poll)
+
+
+def _has(path: Path, content: bytes) -> bool:
+    """Whether a file has this content."""
+    return path.exists() and read_file(path, RECORD_BYTES) == content

@@ -5,13 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from tdac_agent.models.faults import as_faults
+from tdac_agent.models.picture import MEDIA_TYPE, Picture
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.streamed import Stop, StreamedAnswer, count
 from tdac_agent.models.vendor import Vendor, VendorModel
 
 if TYPE_CHECKING:
     import openai
-    from openai.types.chat import ChatCompletionChunk
+    from openai.types.chat import (
+        ChatCompletionChunk,
+        ChatCompletionContentPartImageParam,
+        ChatCompletionContentPartParam,
+        ChatCompletionContentPartTextParam,
+    )
 
 STOPS: dict[str, Stop] = {
     "stop": "end",
@@ -47,7 +53,7 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
         with as_faults((openai.OpenAIError, httpx2.HTTPError)):
             with client.chat.completions.create(
                 model=self._model,
-                messages=[{"role": "user", "content": request.prompt}],
+                messages=[{"role": "user", "content": _content(request)}],
                 max_completion_tokens=request.max_tokens if is_openai else openai.omit,
                 max_tokens=openai.omit if is_openai else request.max_tokens,
                 stream=True,
@@ -57,6 +63,25 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
                 for chunk in stream:
                     _add_chunk(gathered, chunk)
             return gathered.reply()
+
+
+def _content(request: Request) -> str | list[ChatCompletionContentPartParam]:
+    """Returns the prompt; with pictures, its parts.
+
+    Pictures follow the stable part, since a cached part ends where a question differs
+    from others.
+    """
+    if not request.images:
+        return request.prompt
+    texts: list[ChatCompletionContentPartTextParam] = [
+        {"type": "text", "text": part} for part in request.parts
+    ]
+    return [*texts[:-1], *map(_image, request.images), *texts[-1:]]
+
+
+def _image(picture: Picture) -> ChatCompletionContentPartImageParam:
+    url = f"data:{MEDIA_TYPE};base64,{picture.base64}"
+    return {"type": "image_url", "image_url": {"url": url, "detail": "high"}}
 
 
 def _add_chunk(gathered: StreamedAnswer, chunk: ChatCompletionChunk) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 from jinja2.sandbox import ImmutableSandboxedEnvironment
@@ -24,9 +24,27 @@ from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
+if TYPE_CHECKING:
+    from tdac_agent.verification.diagnosis.model_picture import FailurePicture
+
 VARIANTS = ("full", "underspecified")
 ONE_TASK = "this map or world"
 """What the scope `task` of a rule means in a run on one task."""
+
+
+@dataclass(frozen=True, slots=True)
+class NamedPicture:
+    """A picture that goes with a question, for its template.
+
+    Attributes:
+        name: Name of its file.
+        shown: The picture.
+        on_set: Whether it shows a world of a task set.
+    """
+
+    name: str
+    shown: FailurePicture
+    on_set: bool
 
 
 class PromptError(TdacError):
@@ -201,6 +219,7 @@ def repair_question(
     rules: tuple[RepairRule, ...] = (),
     unchanged: bool = False,
     about: str = ONE_TASK,
+    picture: NamedPicture | None = None,
 ) -> str:
     """Like `repair_prompt`, from the text of the feedback.
 
@@ -213,6 +232,7 @@ def repair_question(
         rules: The rules in force, with their effects.
         unchanged: Whether the last edit returned the same code.
         about: What the scope `task` of a rule means.
+        picture: The picture that goes with the question.
     """
     return (
         _templates()
@@ -225,6 +245,7 @@ def repair_question(
             rules=rules,
             unchanged=unchanged,
             about=about,
+            picture=picture,
             most_operations=MAX_OPERATIONS,
             longest_rule=MAX_RULE_CHARS,
         )

@@ -42,6 +42,8 @@ def call_key(model: Provider, request: Request) -> str:
         "sample": request.sample,
         "turn": request.turn,
     }
+    if request.images:
+        facts["images"] = [image.sha256 for image in request.images]
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.models.budget import Amount
-from tdac_agent.models.provider import Reply, Request
+from tdac_agent.models.provider import Kind, Reply, Request
 from tdac_agent.models.retry import FailedCall
 from tdac_agent.prompting.prompt import PromptTemplate
 from tdac_agent.prompting.rules import RuleBook
@@ -23,6 +23,7 @@ from tdac_agent.runs.run_record import (
     GIVEN_FILE,
     GIVEN_RULES_FILE,
     JOURNAL,
+    PICTURE_FILE,
     PROMPT_FILE,
     RULES_FILE,
     RUN_FILE,
@@ -64,7 +65,7 @@ class Recorder:
     _clock: float = field(default_factory=time.monotonic)
     _previous: str = ""
     _turns: Counter[tuple[str, int, int]] = field(default_factory=Counter)
-    _prompts: Counter[str] = field(default_factory=Counter)
+    _asked: Counter[tuple[str, ...]] = field(default_factory=Counter)
 
     def start(
         self, task: Task, template: PromptTemplate, given: str | None, **facts: Any
@@ -155,14 +156,19 @@ class Recorder:
     def numbered(self, request: Request) -> Request:
         """The request with `turn` and `repeat`, counted from earlier requests."""
         _, k, j = request.sample
-        turn, repeat = self._turns[request.kind, k, j], self._prompts[request.prompt]
+        question = (request.prompt, *(image.sha256 for image in request.images))
+        turn, repeat = self._turns[request.kind, k, j], self._asked[question]
         self._turns[request.kind, k, j] += 1
-        self._prompts[request.prompt] += 1
+        self._asked[question] += 1
         return replace(request, turn=turn, repeat=repeat)
 
     def asked(self, request: Request, model: str, key: str, reserved: Amount) -> None:
-        """Records a prompt before it is sent to a model."""
-        write_if_changed(self._call_file(request, "prompt"), request.prompt)
+        """Records a prompt and its pictures before they are sent to a model."""
+        self._write_question(request)
+        images = [
+            {"file": image.name, "sha256": image.sha256, "caption": image.caption}
+            for image in request.images
+        ]
         self.event(
             "call.intent",
             **_about(request, key),
@@ -170,6 +176,7 @@ class Recorder:
             prompt=self._blobs.put(request.prompt),
             max_tokens=request.max_tokens,
             reserved=asdict(reserved),
+            **({"images": images} if images else {}),
         )
 
     def missed(
@@ -220,10 +227,20 @@ class Recorder:
         text = self._blobs.get(str(record.get("blob")))
         reply = None if text is None else reply_of(record, text)
         if reply is not None:
-            write_if_changed(self._call_file(request, "prompt"), request.prompt)
+            self._write_question(request)
             self._count(request, reply, record.get("cost"))
             self.tell(record)
         return reply
+
+    def picture_file(self, kind: Kind, k: int, j: int) -> Path:
+        """Absolute path of the picture of a question about candidate (k, j)."""
+        return self._folder(k, j).absolute() / f"{kind}.{PICTURE_FILE}"
+
+    def _write_question(self, request: Request) -> None:
+        # The prompt names the pictures.
+        for image in request.images:
+            write_if_changed(image.file, image.png)
+        write_if_changed(self._call_file(request, "prompt"), request.prompt)
 
     def _count(self, request: Request, reply: Reply, cost: float | None) -> None:
         write_if_changed(self._call_file(request, "reply"), reply.text)

@@ -36,6 +36,8 @@ RULES_FILE = "rules.json"
 GIVEN_FILE = "given.py"
 GIVEN_RULES_FILE = "given_rules.md"
 PROMPT_FILE = "prompt.j2"
+PICTURE_FILE = "picture.png"
+"""Ending of the name of a question's picture, after its kind."""
 
 
 class Attempt(PrintableRecord):
@@ -91,6 +93,9 @@ class Run(PrintableRecord):
     profile: Profile = Field("paper", description="What a controller must define.")
     prompt: str = Field("full", description="Template of the first question.")
     refine: bool = Field(True, description="Whether failures become rules.")
+    vision: bool = Field(
+        False, description="Whether a picture of the failure goes with its feedback."
+    )
     max_output: int = Field(0, description="Token limit of an answer.")
     index: int = Field(0, description="Index among otherwise equal runs.")
     version: str = Field("", description="Version of tdac.")

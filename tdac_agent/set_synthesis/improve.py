@@ -11,8 +11,10 @@ from tdac_agent.runs.recorder import difference
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.set_synthesis.archive import Archive, Figures, Member
 from tdac_agent.set_synthesis.feedback import set_feedback
+from tdac_agent.set_synthesis.pictures import world_picture
 from tdac_agent.set_synthesis.trials import Candidate, Trials
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
+from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 
 FOUNDERS = 3
 """Most candidates of the loop that the search begins with."""
@@ -88,10 +90,20 @@ class ImprovingSearch:
         while self._trials.can_explore and stale < MOST_STALE:
             parent = self.archive.parent(self._random)
             answer = self._dialogue.improve(
-                number, parent.candidate.source, self._text(parent)
+                number,
+                parent.candidate.source,
+                self._text(parent),
+                self._picture(parent),
             )
             stale = 0 if self._tried(number, parent, answer) else stale + 1
             number += 1
+
+    def _picture(self, parent: Member) -> FailurePicture | None:
+        """A picture of a failure, if the models are shown pictures."""
+        if not self._trials.recorder.run.vision:
+            return None
+        folder = parent.candidate.exploring_folder
+        return world_picture(self._trials.tasks, parent.report, folder)
 
     def _text(self, parent: Member) -> str:
         """What the models are told about a member and its variations."""

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tdac_agent.models.provider import is_fixed
 from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
+from tdac_agent.set_synthesis.pictures import world_picture
 from tdac_agent.set_synthesis.trials import Candidate, Trials
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
 from tdac_agent.synthesis.loop import MOST_SPENT, given_up
+
+if TYPE_CHECKING:
+    from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 
 NO_EPISODES = "all feedback episodes were driven"
 
@@ -112,7 +117,8 @@ class _Search:
         for j in range(run.patience + 1):
             if j > 0:
                 assert failure is not None
-                edited, notes = dialogue.edit(k, j, source, failure)
+                picture = self._picture(parent)
+                edited, notes = dialogue.edit(k, j, source, failure, picture)
                 if edited is None:
                     self._no_code(k, j, notes)
                     return ""
@@ -171,6 +177,13 @@ class _Search:
         if not made:
             return None
         return max(made, key=lambda each: (each[0].feedback_score, each[0].drives))
+
+    def _picture(self, failed: Candidate) -> FailurePicture | None:
+        """A picture of a failure, if the models are shown pictures."""
+        report, folder = failed.first_failure, failed.failure_folder
+        if not self._recorder.run.vision or report is None:
+            return None
+        return world_picture(self._trials.tasks, report, folder)
 
     def _fixed(self) -> bool:
         """Whether the models have nothing else to answer."""

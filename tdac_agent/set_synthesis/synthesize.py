@@ -31,7 +31,13 @@ from tdac_agent.set_synthesis.selection import select
 from tdac_agent.set_synthesis.trials import MOST_EPISODES, Candidate, Trials
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
 from tdac_agent.synthesis.dialogue import Dialogue
-from tdac_agent.synthesis.setup import account_of, hold_folder, new_run, open_record
+from tdac_agent.synthesis.setup import (
+    account_of,
+    checked_vision,
+    hold_folder,
+    new_run,
+    open_record,
+)
 from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_agent.tasks.installation import drawn_seed
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -64,6 +70,7 @@ def synthesize_on_set(
     prompt: str = "full",
     refine: bool = True,
     rules: RuleBook | None = None,
+    vision: bool = False,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
     max_tokens: int | None = None,
@@ -99,6 +106,7 @@ def synthesize_on_set(
         prompt: `full`, or a template file.
         refine: See there.
         rules: See there.
+        vision: See there; the pictures show worlds of `dev`.
         max_output: See there.
         max_cost: See there.
         max_tokens: See there.
@@ -116,7 +124,7 @@ def synthesize_on_set(
     Raises:
         TaskError: A number is out of range.
         RunError: The folder cannot be used, or contains another run.
-        ProviderError: A model cannot be used.
+        ProviderError: A model cannot be used, or pictures would have no effect.
         PriceError: The user's price file is broken.
         PromptError: The template cannot be used.
         Fault: The sandbox or provider is broken; the fault is also recorded.
@@ -147,6 +155,7 @@ def synthesize_on_set(
         patience=patience,
         candidates=whole_number("candidates", candidates, 1),
         refine=refine,
+        vision=checked_vision(vision, models[1].name, patience, improve),
         given_rules=given_lines(book),
         seed=_seed(seed, models[0], before),
         episodes=episodes,

@@ -67,6 +67,20 @@ class Candidate:
         return next(failed, None)
 
     @property
+    def failure_folder(self) -> Path:
+        """Folder of the report that ended its tests: the last one."""
+        return self.feedback_folder(len(self.feedback))
+
+    @property
+    def exploring_folder(self) -> Path:
+        """Folder of the report on the worlds for variations."""
+        return self.folder / "improve-1"
+
+    def feedback_folder(self, number: int) -> Path:
+        """Folder of the report on a test, from 1."""
+        return self.folder / f"feedback-{number}"
+
+    @property
     def feedback_score(self) -> float:
         """Mean time score on feedback worlds; 0 if it did not drive."""
         return _mean([each for report in self.feedback for each in report.episodes])
@@ -161,7 +175,7 @@ class Trials:
         return self._give_feedback(candidate, first, count)
 
     def _give_feedback(self, candidate: Candidate, first: int, count: int) -> SetReport:
-        out = candidate.folder / f"feedback-{len(candidate.feedback) + 1}"
+        out = candidate.feedback_folder(len(candidate.feedback) + 1)
         report = self._drive(candidate, first, count, out)
         candidate.feedback.append(report)
         self.feedback_used += report.worlds
@@ -181,7 +195,7 @@ class Trials:
     def explore(self, candidate: Candidate) -> SetReport:
         """Drives on the worlds for variations, the same ones for each candidate."""
         first, count = self._first_for("improve"), self.shares.block
-        report = self._drive(candidate, first, count, candidate.folder / "improve-1")
+        report = self._drive(candidate, first, count, candidate.exploring_folder)
         candidate.explored.extend(report.episodes)
         self.explore_used += report.worlds
         self.explore_left -= report.worlds

@@ -46,9 +46,9 @@ def _write(path: Path, raw: bytes, lasting: bool) -> None:
         raise
 
 
-def write_if_changed(path: Path, text: str) -> None:
-    """Writes a file unless it already contains this text."""
-    raw = text.encode("utf-8", "surrogatepass")
+def write_if_changed(path: Path, data: str | bytes) -> None:
+    """Writes a file unless it already contains this text (as UTF-8), or these bytes."""
+    raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     if not path.is_file() or path.read_bytes() != raw:
         write_atomic(path, raw)
 

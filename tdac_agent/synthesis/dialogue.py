@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+from tdac_agent.models.picture import Picture
 from tdac_agent.models.provider import (
     Kind,
     Provider,
@@ -17,12 +18,15 @@ from tdac_agent.models.provider import (
 from tdac_agent.prompting.extract import Answer, read_answer
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.given_rules import GIVEN, RUN_HEADING, written
-from tdac_agent.prompting.prompt import ONE_TASK, repair_question
+from tdac_agent.prompting.prompt import ONE_TASK, NamedPicture, repair_question
 from tdac_agent.prompting.rule_answer import RuleAnswerError, apply, parse_operations
 from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
 from tdac_agent.storage.secrets import one_line
 from tdac_agent.synthesis.calls import Calls
 from tdac_agent.synthesis.side_by_side import side_by_side
+
+if TYPE_CHECKING:
+    from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 
 MAX_ASKS = 3
 MAX_EARLIER = 12
@@ -88,20 +92,45 @@ class Dialogue:
         )
         return self._code(self.learner, request)
 
-    def edit(self, k: int, j: int, source: str, failure: Feedback) -> ModelAnswer:
-        """Asks for a repaired controller, candidate (k, j)."""
-        request = self._repair("edit", source, failure, self._at(k, j))
+    def edit(
+        self,
+        k: int,
+        j: int,
+        source: str,
+        failure: Feedback,
+        picture: FailurePicture | None = None,
+    ) -> ModelAnswer:
+        """Asks for a repaired controller, candidate (k, j).
+
+        Args:
+            k: Its iteration.
+            j: Its edit.
+            source: Source of the failed controller.
+            failure: How it failed.
+            picture: A picture of that.
+        """
+        request = self._repair("edit", source, failure, self._at(k, j), picture)
         return self._code(self.optimizer, request)
 
-    def improve(self, k: int, source: str, text: str) -> ModelAnswer:
+    def improve(
+        self, k: int, source: str, text: str, picture: FailurePicture | None = None
+    ) -> ModelAnswer:
         """Asks for a better controller, candidate (k, 0).
 
         Args:
             k: Number of the candidate.
             source: Source of the controller.
             text: How it drives, and what was tried with it.
+            picture: A picture of a failure.
         """
-        question = repair_question("improve", self._question(), source, text)
+        images = self._images("improve", k, 0, picture)
+        question = repair_question(
+            "improve",
+            self._question(),
+            source,
+            text,
+            picture=self._named(images, picture),
+        )
         request = Request(
             "improve",
             question,
@@ -110,6 +139,7 @@ class Dialogue:
             sample=self._at(k, 0),
             stable=_stable(question),
             max_tokens=self.calls.max_output,
+            images=images,
         )
         return self._code(self.optimizer, request)
 
@@ -158,9 +188,31 @@ class Dialogue:
     def _question(self) -> str:
         return self.question(self.book.in_force)
 
+    def _images(
+        self, kind: Kind, k: int, j: int, picture: FailurePicture | None
+    ) -> tuple[Picture, ...]:
+        """The pictures of a question about candidate (k, j)."""
+        if picture is None:
+            return ()
+        file = self.calls.recorder.picture_file(kind, k, j)
+        return (Picture(file, picture.png, picture.caption),)
+
+    def _named(
+        self, images: tuple[Picture, ...], picture: FailurePicture | None
+    ) -> NamedPicture | None:
+        if picture is None:
+            return None
+        return NamedPicture(images[0].name, picture, self.calls.recorder.run.on_set)
+
     def _repair(
-        self, kind: Kind, source: str, failure: Feedback, sample: tuple[int, int, int]
+        self,
+        kind: Kind,
+        source: str,
+        failure: Feedback,
+        sample: tuple[int, int, int],
+        picture: FailurePicture | None = None,
     ) -> Request:
+        images = self._images(kind, *sample[1:], picture)
         question = repair_question(
             kind,
             self._question(),
@@ -171,6 +223,7 @@ class Dialogue:
             rules=self.book.in_force,
             unchanged=self._unchanged,
             about=self.about,
+            picture=self._named(images, picture),
         )
         stable = _stable(question)
         return Request(
@@ -182,6 +235,7 @@ class Dialogue:
             sample,
             stable=stable,
             max_tokens=self.calls.max_output,
+            images=images,
         )
 
     def _code(self, model: Provider, request: Request) -> ModelAnswer:

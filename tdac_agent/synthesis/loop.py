@@ -11,6 +11,7 @@ from pathlib import Path
 from tdac_agent.errors import Fault
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
+from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.extract import same_code
@@ -31,15 +32,21 @@ from tdac_agent.synthesis.candidates import (
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
 from tdac_agent.synthesis.setup import (
     account_of,
+    checked_vision,
     describe,
     hold_folder,
     open_record,
     settled_seed,
 )
 from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.model_picture import (
+    FailurePicture,
+    failure_picture,
+)
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
+from tdac_agent.verification.verify import load_trajectories
 from tdac_envs.core.arguments import whole_number
 
 MOST_SPENT = 3
@@ -62,6 +69,7 @@ def synthesize(
     prompt: str = "full",
     refine: bool = True,
     rules: RuleBook | None = None,
+    vision: bool = False,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
     max_tokens: int | None = None,
@@ -97,6 +105,8 @@ def synthesize(
             `underspecified`, or a file (docs/prompts.md).
         refine: Whether failures become rules of the prompt for new controllers.
         rules: Rules to begin with (`read_given`); none by default.
+        vision: Whether a picture of the failure goes with the feedback to the
+            optimizer; never one of a held-out start.
         max_output: Token limit of an answer; twice that after a truncated answer.
         max_cost: Limit in USD; by default the one the run was begun with, or 2.
         max_tokens: Limit of input plus output; by default the earlier one, or none.
@@ -114,7 +124,7 @@ def synthesize(
     Raises:
         RunError: The folder cannot be used, or contains another run.
         ProviderError: A model cannot be used, e.g. without its key, or nothing bounds
-            what it costs.
+            what it costs; or pictures would have no effect.
         PriceError: The user's price file is broken.
         PromptError: The template cannot be used.
         Fault: The sandbox, suite or provider is broken; the fault is also recorded.
@@ -136,6 +146,7 @@ def synthesize(
         patience=patience,
         candidates=whole_number("candidates", candidates, 1),
         refine=refine,
+        vision=checked_vision(vision, models[1].name, patience),
         given_rules=given_lines(book),
         seed=settled_seed(seed, models[0], out),
     )
@@ -239,7 +250,8 @@ class _Loop:
         for j in range(1, run.patience + 1):
             if report.passed:
                 break
-            parent, (edited, notes) = source, dialogue.edit(k, j, source, failure)
+            parent, picture = source, self._picture(best)
+            edited, notes = dialogue.edit(k, j, source, failure, picture)
             if edited is None:
                 self._no_code(k, j, notes)
                 return False
@@ -285,6 +297,14 @@ class _Loop:
         for each in [*(one for one in tested if one is not best), best]:
             self._dialogue.saw(each.k, 0, feedback_of(each.report))
         return best
+
+    def _picture(self, failed: _Tested) -> FailurePicture | None:
+        """A picture of a failure, if the models are shown pictures."""
+        if not self._recorder.run.vision:
+            return None
+        trajectories = load_trajectories(failed.folder / "trajectories")
+        task = self._tests.task
+        return failure_picture(task, failed.report, trajectories, LARGEST_SIDE)
 
     def _no_code(self, k: int, j: int, notes: tuple[str, ...]) -> None:
         """Records an answer without code.

@@ -11,8 +11,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.errors import RunError
+from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.budget import Budget
+from tdac_agent.models.choice import BLIND
 from tdac_agent.models.provider import Author, Provider, recorded_seed, served_at
 from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
@@ -129,6 +130,33 @@ def new_run(
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         **facts,
     )
+
+
+def checked_vision(
+    vision: bool, optimizer: str, patience: int, improve: int = 0
+) -> bool:
+    """Whether pictures go to the optimizer; as given.
+
+    Args:
+        vision: Whether they should.
+        optimizer: Name of the model that gets them.
+        patience: J.
+        improve: Simulated episodes to improve what works, on a task set.
+
+    Raises:
+        ProviderError: They would have no effect.
+    """
+    if vision and optimizer.partition(":")[0] in BLIND:
+        raise ProviderError(
+            f"--vision has no effect: {optimizer}, which edits controllers, sees "
+            "no pictures; give --optimizer anthropic:MODEL, openai:MODEL, "
+            "command:PROGRAM or manual:DIR, or leave out --vision"
+        )
+    if vision and not patience and not improve:
+        raise ProviderError(
+            "--vision has no effect without edits: give -J 1 or more, or leave it out"
+        )
+    return vision
 
 
 def settled_seed(given: int | None, learner: Provider, out: Path) -> int | None:

@@ -45,6 +45,8 @@ _MARGIN_RADII = 5.0
 # Minimum enlargement that justifies a close-up.
 _MIN_ZOOM = 1.5
 _SMALLEST_BODY = 4.0
+# Length of an axis, frame px.
+_AXIS = 42.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +61,8 @@ class Event:
         way: Shape (m, 2): the shortest path from the last position.
         movers: Movers in the last steps, oldest first, each of shape (k, 3): x, y,
             radius.
+        axes: Headings of the x and the y axis of coordinates from the start, rad; None
+            if other coordinates are used.
     """
 
     title: str
@@ -67,6 +71,7 @@ class Event:
     contact: tuple[float, float] | None = None
     way: Points | None = None
     movers: Sequence[Points] = ()
+    axes: tuple[float, float] | None = None
 
 
 def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
@@ -77,21 +82,74 @@ def run_picture(background: Backdrop, poses: Points, event: Event) -> Image:
         poses: Shape (T + 1, 3): x, y, heading.
         event: The event to show.
     """
-    chart, radius = background.whole(), background.radius
-    canvas = chart.canvas
-    window = _window(background, event, poses, chart.scale)
+    chart = background.whole()
+    column = _draw(background, chart, poses, event)
+    return _side_by_side(_map_of(chart), column)
+
+
+def bounded_picture(
+    background: Backdrop, poses: Points, event: Event, side: int
+) -> Image:
+    """Like `run_picture`, at most `side` px wide and high.
+
+    The map is shrunk and the text is not, as long as that suffices. No side is shorter
+    than three quarters of the other.
+    """
+    chart = background.whole()
+    room = side - COLUMN, side
+    column = _draw(background, chart, poses, event, _zoom(_map_of(chart), *room))
+    picture = _side_by_side(_shrunk(_map_of(chart), *room), column)
+    picture = _shrunk(picture, side, side)
+    rows, columns = picture.shape[:2]
+    rows, columns = max(rows, 3 * columns // 4), max(columns, 3 * rows // 4)
+    padded = blank(rows, columns, PAPER)
+    padded[: picture.shape[0], : picture.shape[1]] = picture
+    return padded
+
+
+def _draw(
+    background: Backdrop, chart: Chart, poses: Points, event: Event, zoom: float = 1.0
+) -> Image:
+    """Draws the run on the whole map, and returns the column beside it.
+
+    `zoom` is how much the map is shrunk later.
+    """
+    radius = background.radius
+    window = _window(background, event, poses, chart.scale * zoom)
     _draw_run(chart, poses, event, radius, show_path=window is None)
     close = None
     if window is not None:
         _draw_window(chart, window)
         close = _close_up(background.close_up(window), poses, event, radius)
-    column = _column(event, close)
-    columns = canvas.image.shape[1]
-    rows = max(canvas.strip_top, column.shape[0])
+    return _column(event, close)
+
+
+def _map_of(chart: Chart) -> Image:
+    return chart.canvas.image[: chart.canvas.strip_top]
+
+
+def _side_by_side(whole: Image, column: Image) -> Image:
+    rows, columns = max(whole.shape[0], column.shape[0]), whole.shape[1]
     picture = blank(rows, columns + COLUMN, PAPER)
-    picture[: canvas.strip_top, :columns] = canvas.image[: canvas.strip_top]
+    picture[: whole.shape[0], :columns] = whole
     picture[: column.shape[0], columns:] = column
     return picture
+
+
+def _shrunk(picture: Image, width: int, height: int) -> Image:
+    """A picture that fits into a box; unchanged if it does already."""
+    zoom = _zoom(picture, width, height)
+    if zoom == 1.0:
+        return picture
+    rows, columns = (max(1, int(zoom * n)) for n in picture.shape[:2])
+    size = (columns, rows)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _zoom(picture: Image, width: int, height: int) -> float:
+    """The largest scale, 1 at most, at which a picture fits into a box."""
+    rows, columns = picture.shape[:2]
+    return float(min(1.0, width / columns, height / rows))
 
 
 def _draw_run(
@@ -112,10 +170,27 @@ def _draw_run(
     turns = chart.turned(float(poses[-1, 2])) + np.array([0.0, 2.6, -2.6])
     nose = np.column_stack([np.cos(turns), np.sin(turns)]) * 0.6 * body / canvas.scale
     canvas.polygon(np.add(nose, (x, y)), TRAIL)
+    if event.axes is not None:
+        _draw_axes(chart, places[0], event.axes)
     if event.contact is not None:
         size, contact = max(0.3 * body, 6.0), chart.at(np.array([event.contact]))
         canvas.disc(contact, size, FREE, 0.9, 5)
         canvas.disc(contact, size, EVENT, width=3)
+
+
+def _draw_axes(chart: Chart, start: Points, axes: tuple[float, float]) -> None:
+    """Draws arrows with the names of the axes at the start."""
+    canvas, size = chart.canvas, _AXIS / chart.canvas.scale
+    for name, heading in zip("xy", axes, strict=True):
+        turn = chart.turned(heading)
+        ahead = size * np.array([np.cos(turn), np.sin(turn)])
+        left = np.array([ahead[1], -ahead[0]])
+        tip = start + ahead
+        for colour, width in ((FREE, 4), (INK, 2)):
+            canvas.line(np.array([start, tip]), colour, width)
+        barbs = [tip - 0.3 * ahead + each * 0.15 * left for each in (1.0, -1.0)]
+        canvas.polygon(np.array([tip, *barbs]), INK)
+        canvas.label(start + 1.35 * ahead, name, INK)
 
 
 def _draw_trail(canvas: Canvas, places: Points) -> None:
@@ -173,6 +248,8 @@ def _column(event: Event, close: Image | None) -> Image:
         legend.append((EVENT, False, "contact"))
     if len(event.movers):
         legend.append((MOVER, False, "movers, and their last second"))
+    if event.axes is not None:
+        legend.append((INK, False, "x and y at the start"))
     rows = len(lines) + len(legend) + 1
     tall = 0 if close is None else close.shape[0] + MARGIN
     column = blank(2 * MARGIN + _LINE * rows + 10 + tall, COLUMN, PAPER)

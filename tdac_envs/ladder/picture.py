@@ -19,11 +19,12 @@ from tdac_envs.drawing.canvas import (
 )
 from tdac_envs.drawing.marks import draw_disc, draw_movers, draw_task
 from tdac_envs.epuck.picture import draw_epuck
-from tdac_envs.epuck.run_picture import task_view
+from tdac_envs.epuck.run_picture import WorldBackground, task_view
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.ladder.space_time import foreseen
 from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet
 from tdac_envs.ladder.worlds import LadderWorld
+from tdac_envs.map2d.run_picture import Background
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.state import RADIUS
 from tdac_envs.worlds.bodies import BODY_RADIUS
@@ -35,6 +36,13 @@ AHEAD = 2.0
 """Seconds of the motion of movers that a picture shows."""
 _LARGEST_TILE = 260
 _MARGIN, _LINE = 10, 22
+
+
+def backdrop_of(task: AnyTask) -> Background | WorldBackground:
+    """The background of pictures of episodes on a world."""
+    if isinstance(task, EPuckTask):
+        return WorldBackground.of(task)
+    return Background.of(task)
 
 
 def draw_world(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from nicegui import ui
 
 from tdac_agent.runs.run_record import JOURNAL
+from tdac_agent.runs.run_record import PICTURE_FILE as PICTURE
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.journal import read_records
 from tdac_agent.studio.pages.layout import copied
@@ -61,6 +63,10 @@ class Questions:
                     on_click=lambda: copied(text),
                 )  # fmt: skip
                 ui.label(f"{len(text):,} characters").classes("note")
+            picture = question.with_name(question.name.replace("prompt.md", PICTURE))
+            if picture.is_file():
+                ui.label(f"and give it the picture {picture}:")
+                ui.image(picture).classes("w-full max-w-2xl")
             shown = ui.expansion("Show the prompt").classes("w-full")
             with shown, ui.element("pre").classes("output"):
                 ui.label(text)
@@ -78,9 +84,15 @@ class Questions:
 def _asked_for(folder: Path, question: str) -> str:
     """What a question asks for, by the name under which the run keeps it."""
     for path in folder.glob("iterations/*/*/*.prompt*.md"):
-        if path.read_text(encoding="utf-8", errors="replace") == question:
+        kept = path.read_text(encoding="utf-8", errors="replace")
+        if _unnamed(kept) == _unnamed(question):
             return KINDS.get(path.name.partition(".")[0], "an answer")
     return "an answer"
+
+
+def _unnamed(question: str) -> str:
+    """A question without the name of its picture, which depends on the folder."""
+    return re.sub(rf"\w+\.{re.escape(PICTURE)}", PICTURE, question)
 
 
 def _last_unused(folder: Path) -> str:

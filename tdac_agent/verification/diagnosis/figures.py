@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -27,6 +29,30 @@ from tdac_envs.drawing.closeup import Event, run_picture
 from tdac_envs.drive.task import Pose
 
 MAX_FACT = 240
+
+
+class Figures(Protocol):
+    """Figures of an episode."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def held_out(self) -> bool:
+        """Whether its start is held out."""
+
+    @property
+    def outcome(self) -> str:
+        """How it ended."""
+
+    @property
+    def d0(self) -> float:
+        """Remaining path at the start, px or m."""
+
+    @property
+    def d_min(self) -> float:
+        """Least remaining path, px or m."""
 
 
 def draw_trajectories(
@@ -63,15 +89,9 @@ def draw_failures(
         folder: Existing folder to write to.
     """
     background, files = None, []
-    for episode in report.episodes:
-        trajectory = trajectories.get(episode.name)
-        # The file may hold an episode of `run_episode` from the same start.
-        if trajectory is None or trajectory.steps != episode.steps:
-            continue
-        if episode.outcome in ("reached", "not run"):
-            continue
+    for episode, trajectory in failed_episodes(report, trajectories):
         background = background or pictures_of(task.setting).backdrop()
-        diagnosis = _diagnosis_of(report, episode)
+        diagnosis = diagnosis_of(report, episode)
         event = event_of(
             task.nominal, trajectory, episode, diagnosis, task.setting.shown
         )
@@ -81,7 +101,21 @@ def draw_failures(
     return files
 
 
-def _diagnosis_of(report: Report, episode: Episode) -> Diagnosis | None:
+def failed_episodes(
+    report: Report, trajectories: dict[str, Trajectory]
+) -> Iterator[tuple[Episode, Trajectory]]:
+    """Yields failed episodes that have a trajectory."""
+    for episode in report.episodes:
+        trajectory = trajectories.get(episode.name)
+        # The file may hold an episode of `run_episode` from the same start.
+        if trajectory is None or trajectory.steps != episode.steps:
+            continue
+        if episode.outcome not in ("reached", "not run"):
+            yield episode, trajectory
+
+
+def diagnosis_of(report: Report, episode: Episode) -> Diagnosis | None:
+    """The diagnosis of an episode, if there is one."""
     found = (failure.diagnosis for failure in report.failures)
     return next((d for d in found if d is not None and d.episode == episode.name), None)
 
@@ -94,7 +128,7 @@ def file_stem(name: str) -> str:
 def event_of(
     task: Nominal,
     trajectory: Trajectory,
-    episode: Episode,
+    episode: Figures,
     diagnosis: Diagnosis | None,
     units: Units | None = None,
 ) -> Event:

@@ -336,7 +336,7 @@ def figures_of(
     driven = float(np.hypot(*np.diff(places, axis=0).T).sum())
     reached, failure = rollout.reached, {}
     if not reached:
-        found = diagnose(rollout, env.task, _shown(env))
+        found = diagnose(rollout, env.task, shown_units(env.set.file, env.task))
         failure = {"cause": found.cause, "text": found.text if told else None}
     return WorldEpisode(
         index=index,
@@ -379,9 +379,14 @@ def movers_of(task: AnyTask) -> dict[str, Any]:
     return {"movers": len(movers.traits), "mover_speed": round(speed, 4)}
 
 
-def _shown(env: OnSet) -> Units:
-    """Units of diagnoses, in the frame that the policy observes."""
-    units = UNITS[env.set.file.unit]
-    if env.set.file.frame == "map":
+def shown_units(file: SetFile, task: AnyTask) -> Units:
+    """Units of diagnoses, in the frame that the policy observes.
+
+    Args:
+        file: The task set.
+        task: The task of a world.
+    """
+    units = UNITS[file.unit]
+    if file.frame == "map":
         return units
-    return units.from_start(StartFrame.of(env.task.start, units))
+    return units.from_start(StartFrame.of(task.start, units))

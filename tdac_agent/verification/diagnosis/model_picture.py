@@ -1,0 +1,93 @@
+"""The picture of a failed episode that goes to a model."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass
+
+from PIL import Image as PilImage
+
+from tdac_agent.episodes.pictures import pictures_of
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.units import Units
+from tdac_agent.verification.diagnosis.figures import (
+    diagnosis_of,
+    event_of,
+    failed_episodes,
+)
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_envs.drawing.backdrop import Backdrop
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.drawing.closeup import Event, bounded_picture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FailurePicture:
+    """The picture of a failed episode.
+
+    Attributes:
+        png: PNG file, without a time or name in it.
+        caption: Name and cause of the episode.
+        event: What it shows.
+        place: Unit of the printed places.
+        y_up: Whether their y axis points up, not down.
+    """
+
+    png: bytes
+    caption: str
+    event: Event
+    place: str
+    y_up: bool
+
+
+def failure_picture(
+    task: Task, report: Report, trajectories: dict[str, Trajectory], side: int
+) -> FailurePicture | None:
+    """The picture of the first failed episode whose start is not held out.
+
+    Args:
+        task: Task whose map or world is drawn.
+        report: The report with the episodes and their diagnoses.
+        trajectories: Trajectories by episode name.
+        side: Most width and height, px.
+
+    Returns:
+        None if no such episode drove.
+    """
+    units = task.setting.units
+    for episode, trajectory in failed_episodes(report, trajectories):
+        if episode.held_out or not trajectory.steps:
+            continue
+        diagnosis = diagnosis_of(report, episode)
+        event = event_of(task.nominal, trajectory, episode, diagnosis, units)
+        background = pictures_of(task.setting).backdrop()
+        return picture_of_event(background, trajectory, event, units, side)
+    return None
+
+
+def picture_of_event(
+    background: Backdrop, trajectory: Trajectory, event: Event, units: Units, side: int
+) -> FailurePicture:
+    """The picture of an episode.
+
+    Args:
+        background: Background of its task.
+        trajectory: The episode.
+        event: What to show.
+        units: Units of the texts.
+        side: Most width and height, px.
+    """
+    turn = units.heading_of(1.0) - units.heading_of(0.0)
+    y_up = math.remainder(turn, math.tau) < 0.0
+    picture = bounded_picture(background, trajectory.poses, event, side)
+    place = units.printed_place
+    return FailurePicture(_png(picture), event.title, event, place, y_up)
+
+
+def _png(picture: Image) -> bytes:
+    """A picture as a PNG file; a palette would mix up the colours of its legend."""
+    stream = io.BytesIO()
+    PilImage.fromarray(picture).save(stream, "PNG", optimize=True)
+    return stream.getvalue()
