@@ -20,6 +20,7 @@ from tdac_agent.studio.board import board_of, names_of
 from tdac_agent.studio.draft import Draft, check
 from tdac_agent.studio.driving import Drive
 from tdac_agent.studio.jobs import job_of, jobs, start
+from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run import is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
 from tdac_envs.worlds.bodies import BODY_RADIUS
@@ -160,3 +161,13 @@ def test_keys_drive(tmp_path):
     # y points down: a turn to the left is negative.
     assert -1.0 < math.remainder(env.pose()[2] - before, math.tau) < 0.0
     assert drive.status == f"{drive.dt:.1f} s"
+
+
+def test_a_question_with_a_picture_is_recognised(tmp_path):
+    """Its picture has another name in the folder of the questions."""
+    kept = tmp_path / "iterations" / "k01" / "j1" / "edit.prompt.md"
+    kept.parent.mkdir(parents=True)
+    kept.write_text("Repair it. The picture `edit.picture.png` shows more.")
+    asked = "Repair it. The picture `002.picture.png` shows more."
+    assert asked_for(tmp_path, asked) == KINDS["edit"]
+    assert asked_for(tmp_path, f"{asked} Please.") == "an answer"
