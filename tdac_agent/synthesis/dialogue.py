@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -33,6 +34,7 @@ MAX_EARLIER = 12
 EXCERPT_CHARS = 160
 _AGAIN = "\n## Your last answer could not be used\nThe reason: "
 _SAME = "same code as the attempt before"
+_PARSING = threading.Lock()
 _ENDED = {"length": "it was truncated", "refusal": "it was refused"}
 
 
@@ -247,7 +249,9 @@ class Dialogue:
         problems = []
         for asked in range(1, MAX_ASKS + 1):
             reply = self.calls.ask(model, request)
-            answer = _file_in(reply)
+            # Two threads at once make Python 3.11's parser fail (SystemError).
+            with _PARSING:
+                answer = _file_in(reply)
             if answer.source is not None:
                 return ModelAnswer(answer.source, reply.notes)
             problems.append(answer.problem)

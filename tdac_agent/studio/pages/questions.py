@@ -55,7 +55,7 @@ class Questions:
             unused = _last_unused(self._run)
             if unused:
                 ui.label(unused[:1].upper() + unused[1:]).classes("problem")
-            what = _asked_for(self._run, text)
+            what = asked_for(self._run, text)
             ui.label(f"The run waits for {what}. Copy the prompt to a model:")
             with ui.row().classes("items-center"):
                 ui.button(
@@ -81,7 +81,7 @@ class Questions:
             ui.button("Use this answer", on_click=send)
 
 
-def _asked_for(folder: Path, question: str) -> str:
+def asked_for(folder: Path, question: str) -> str:
     """What a question asks for, by the name under which the run keeps it."""
     for path in folder.glob("iterations/*/*/*.prompt*.md"):
         kept = path.read_text(encoding="utf-8", errors="replace")

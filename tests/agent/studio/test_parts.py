@@ -24,6 +24,7 @@ from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
 from tdac_agent.studio.jobs import job_of, jobs, start
 from tdac_agent.studio.pages.home import fitting_radius
+from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run import about_given, is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
 from tdac_envs.worlds.bodies import BODY_RADIUS
@@ -185,10 +186,8 @@ def test_a_controller_is_downloaded_with_what_it_reads(tmp_path):
 def test_a_radius_that_gets_through(widest, radius, fits):
     """A step of the slider below the widest one, if a smaller radius helps."""
     draft = Draft.of(board_of("map", "maze", None), "maze", None)
-    assert (
-        fitting_radius(replace(draft, radius=radius), Checked(None, widest=widest))
-        == fits
-    )
+    checked = Checked(None, widest=widest)
+    assert fitting_radius(replace(draft, radius=radius), checked) == fits
 
 
 def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
@@ -202,3 +201,13 @@ def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
     text = about_given(folder)
     assert text.startswith(f"Your controller failed {failed} tests. The verified")
     assert text.endswith("is another one, by the built-in template.")
+
+
+def test_a_question_with_a_picture_is_recognised(tmp_path):
+    """Its picture has another name in the folder of the questions."""
+    kept = tmp_path / "iterations" / "k01" / "j1" / "edit.prompt.md"
+    kept.parent.mkdir(parents=True)
+    kept.write_text("Repair it. The picture `edit.picture.png` shows more.")
+    asked = "Repair it. The picture `002.picture.png` shows more."
+    assert asked_for(tmp_path, asked) == KINDS["edit"]
+    assert asked_for(tmp_path, f"{asked} Please.") == "an answer"
