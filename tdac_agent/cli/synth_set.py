@@ -256,7 +256,7 @@ def _improvement(found: Improvement) -> str:
     assert found.after is not None
     assert found.low is not None
     assert found.high is not None
-    told = "" if found.low > 0.0 else ", which may be chance"
+    told = "" if found.low > 0.0 else "; no improvement is shown"
     return (
         f"improving: {about}; time score {found.before:.3f} ({base}) -> "
         f"{found.after:.3f} on {found.worlds} other worlds: "
