@@ -39,6 +39,8 @@ myst_heading_anchors = 4
 nitpicky = True
 # Types of the code, of other packages, and words for shapes, which link nowhere.
 nitpick_ignore_regex = [("py:.*", r".*")]
+# The page of the API also has what needs this extra, which is large.
+autodoc_mock_imports = ["stable_baselines3"]
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 napoleon_use_ivar = True
