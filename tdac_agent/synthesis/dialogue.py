@@ -78,21 +78,22 @@ class Dialogue:
 
     def generate_all(self, ks: Sequence[int]) -> list[ModelAnswer]:
         """Asks for new controllers (k, 0), at the same time if the model permits it."""
+        question = self._question()
+        requests = [
+            Request(
+                "generate",
+                question,
+                rules=self._texts(),
+                sample=self._at(k, 0),
+                stable=_stable(question),
+                max_tokens=self.calls.max_output,
+            )
+            for k in ks
+        ]
+        asking = [partial(self._code, self.learner, request) for request in requests]
         if not is_concurrent(self.learner):
-            return [self.generate(k) for k in ks]
-        return side_by_side([partial(self.generate, k) for k in ks])
-
-    def generate(self, k: int) -> ModelAnswer:
-        """Asks for a new controller under the rules in force."""
-        request = Request(
-            "generate",
-            self._question(),
-            rules=self._texts(),
-            sample=self._at(k, 0),
-            stable=_stable(self._question()),
-            max_tokens=self.calls.max_output,
-        )
-        return self._code(self.learner, request)
+            return [ask() for ask in asking]
+        return side_by_side(asking)
 
     def edit(
         self,
@@ -249,7 +250,7 @@ class Dialogue:
         problems = []
         for asked in range(1, MAX_ASKS + 1):
             reply = self.calls.ask(model, request)
-            # Two threads at once make Python 3.11's parser fail (SystemError).
+            # Two threads that parse at once make Python 3.11 fail with SystemError.
             with _PARSING:
                 answer = _file_in(reply)
             if answer.source is not None:
