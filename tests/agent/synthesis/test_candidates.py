@@ -1,7 +1,11 @@
 """`--candidates N`: new controllers side by side, of which the best is repaired."""
 
+import gc
 import json
+import sys
 import threading
+from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from few_worlds import KNOWN, write_set
@@ -12,8 +16,10 @@ from tdac_agent.errors import RunError
 from tdac_agent.metrics import frames_of
 from tdac_agent.models.provider import PermanentFault
 from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.prompting.prompt import generate_prompt
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.side_by_side import side_by_side
 from tdac_agent.synthesis.workload import whole
@@ -191,3 +197,35 @@ def test_the_command_takes_candidates(tdac, tmp_path):
     code_, _, err = tdac(*words, "--out", tmp_path / "run")
     assert (code_, err) == (0, "")
     assert load_run(tmp_path / "run").candidates == 3
+
+
+def test_threads_do_not_parse_at_the_same_time(task):
+    """Python 3.11 raises SystemError if a garbage collection lets another one parse."""
+
+    class Calls:
+        max_output = 100
+        recorder = SimpleNamespace(run=SimpleNamespace(index=0))
+
+        def ask(self, model, request):
+            del model, request
+            return code(STILL * 100)
+
+    model = SimpleNamespace(name="model", concurrent=True)
+    before, interval = gc.get_threshold(), sys.getswitchinterval()
+
+    def collected(phase, info):
+        del phase, info
+        sum(range(200))
+
+    gc.callbacks.append(collected)
+    gc.set_threshold(20)
+    sys.setswitchinterval(1e-6)
+    try:
+        for _ in range(5):
+            dialogue = Dialogue(partial(generate_prompt, task), model, model, Calls())
+            answers = dialogue.generate_all(range(1, 9))
+            assert all(source == STILL * 100 for source, _ in answers)
+    finally:
+        gc.callbacks.remove(collected)
+        gc.set_threshold(*before)
+        sys.setswitchinterval(interval)
