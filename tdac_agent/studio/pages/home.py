@@ -151,7 +151,7 @@ class Choosing:
 
     def _build_start(self) -> None:
         ui.label("3. Who writes").classes("text-lg font-bold")
-        self._writers = Writers(self._place, self._refresh_command)
+        self._writers = Writers(self._place, self._refresh_command, on_task=True)
         self._go = ui.button("Write and verify a controller", on_click=self._begin)
         ui.label("The same on the command line:").classes("note text-sm")
         self._command = shown_command("")
@@ -384,7 +384,11 @@ def _sentence(checked: Checked, board: Board) -> tuple[str, bool]:
     """What was found, and whether it is good."""
     if checked.task is None:
         return checked.problem, False
-    text = f"A path of {path_length(checked.path):.4g} {board.unit}"
+    reach = checked.task.nominal.goal_tolerance
+    text = (
+        f"A path of {path_length(checked.path):.4g} {board.unit}; the goal is reached "
+        f"within {reach:.3g} {board.unit} (disc)"
+    )
     if checked.narrowest is not None:
         text += (
             f"; its narrowest place is {checked.clearance:.3g} {board.unit} from an "

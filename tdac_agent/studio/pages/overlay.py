@@ -27,6 +27,9 @@ def overlay(board: Board, draft: Draft, checked: Checked | None) -> str:
     if draft.goal is not None:
         ((x, y),) = board.at([draft.goal]).tolist()
         size = 5 * thick
+        if checked is not None and checked.task is not None:
+            reach = checked.task.nominal.goal_tolerance * board.scale
+            parts.append(_circle(x, y, reach, f"{GOAL}30", GOAL, 0.6 * thick))
         parts.append(_circle(x, y, size, "none", GOAL, 1.6 * thick))
         parts.append(_circle(x, y, 0.4 * size, GOAL, "none", 0))
     start = draft.start or (board.start[:2] if board.start else None)

@@ -125,9 +125,12 @@ class Looking:
         self._chosen = chosen
         self._timer.deactivate()
         self._drive = None
+        self._about.text = f"Drawing world {chosen[2]} of {name} …"
+        self._facts.clear()
         try:
             tasks, picture, facts = await asyncio.to_thread(look_at, *chosen)
         except TdacError as error:
+            self._about.text = ""
             ui.notify(str(error), type="warning")
             return
         if chosen != self._chosen:  # another one has been chosen meanwhile

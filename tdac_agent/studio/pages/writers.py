@@ -31,10 +31,14 @@ class Writers:
     Args:
         place: Folder of the studio.
         changed: Called after each change.
+        on_task: Whether it is for a single task, which has two forms of a controller.
     """
 
-    def __init__(self, place: Path, changed: Callable[[], None]) -> None:
+    def __init__(
+        self, place: Path, changed: Callable[[], None], *, on_task: bool = False
+    ) -> None:
         self._place, self._changed, self._file = place, changed, ""
+        self._on_task = on_task
         self._who = ui.radio(WHO, value="builtin", on_change=self._update).props(
             "dense"
         )
@@ -51,6 +55,10 @@ class Writers:
                 label="drop controller.py here", auto_upload=True,
                 max_file_size=200_000, on_upload=self._uploaded,
             ).props("accept=.py")  # fmt: skip
+        self._short = ui.checkbox(
+            "ask for policy(obs) alone, not for the paper's whole file",
+            on_change=self._update,
+        ).props("dense")
         self._note = ui.label().classes("text-sm note")
         self._update()
 
@@ -59,11 +67,13 @@ class Writers:
         who = self._who.value
         if who == "file":
             return ["--from", self._file or "controller.py", "--profile", "policy"]
-        if who == "manual":
-            return ["--learner", f"manual:{STATE}/{QUESTIONS}"]
         if who == "builtin":
             return []
-        words = ["--learner", f"{who}:{(self._model.value or '').strip()}"]
+        short = self._on_task and self._short.value
+        profile = ["--profile", "policy"] if short else []
+        if who == "manual":
+            return ["--learner", f"manual:{STATE}/{QUESTIONS}", *profile]
+        words = ["--learner", f"{who}:{(self._model.value or '').strip()}", *profile]
         if self._server.value:
             words += ["--base-url", self._server.value.strip()]
         return [*words, "--max-cost", f"{self._most.value or 0:g}"]
@@ -91,6 +101,7 @@ class Writers:
     def _update(self) -> None:
         who = self._who.value
         self._paid.visible, self._own.visible = who in KEYS, who == "file"
+        self._short.visible = self._on_task and who in {*KEYS, "manual"}
         self._note.text = self.problem() or self._price()
         self._changed_if_ready()
 
