@@ -41,9 +41,9 @@ class MapEntry(BaseModel):
     origin: str | None = Field(
         None, validation_alias=AliasChoices("origin", "repo"), max_length=500
     )
-    polarity: Literal["dark", "light", "dark_obstacle", "light_obstacle"] | None = (
-        Field(None, description="dark or light obstacles")
-    )
+    polarity: (
+        Literal["dark", "light", "dark_obstacle", "light_obstacle", "mixed"] | None
+    ) = Field(None, description="dark or light obstacles; `mixed` if neither")
     truth: str | None = Field(
         None, description="Picture of the obstacles in black, instead of the map."
     )

@@ -420,3 +420,9 @@ def test_public_worlds_of_barn(tmp_path):
     tasks = load_set(path)
     assert tasks.count("test") == 250
     assert tasks.world("test", 7).barn_steps > 50
+
+
+def test_a_map_whose_walls_are_neither_dark_nor_light(folder):
+    """Its `truth` says what the walls are; `mixed` is a polarity like the others."""
+    mixed = entry("20.png", polarity="mixed", truth="20.png")
+    assert load_set(folder([20], [mixed])).count("test") == 1
