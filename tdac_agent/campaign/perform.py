@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.campaign.gate import gated
-from tdac_agent.campaign.plan import SET_LIMITS, PlannedRun
+from tdac_agent.campaign.plan import SET_LIMITS, PlannedRun, setting_of
 from tdac_agent.errors import Fault
 from tdac_agent.executors.executor import Work
 from tdac_agent.models.budget import Budget
@@ -172,7 +172,7 @@ def _synthesize(
     models = choose_models(
         cell.learner,
         cell.optimizer,
-        about if isinstance(about, TaskSet) else about.setting,
+        setting_of(about),
         cell.base_url,
         key_over_http=terms.key_over_http,
     )

@@ -156,7 +156,7 @@ class Plan:
 
     def setting(self, cell: Cell) -> TaskSetting | TaskSet:
         """What models may have to know of the task of a cell."""
-        return self.sets[cell.task] if cell.on_set else self.tasks[cell.task].setting
+        return setting_of((self.sets if cell.on_set else self.tasks)[cell.task])
 
     def question(self, cell: Cell, template: PromptTemplate) -> str:
         """The first question of a cell's runs."""
@@ -253,8 +253,7 @@ def _cell(
         "version": importlib.metadata.version("tdac"),
         "seed": config.seed,
     }
-    setting_of_task = task if isinstance(task, TaskSet) else task.setting
-    options = Options(setting_of_task, config.base_url)
+    options = Options(setting_of(task), config.base_url)
     for model in {facts["learner"], facts["optimizer"]}:
         answers = answers_sha256(model, options)
         if answers is not None:
@@ -268,6 +267,11 @@ def _cell(
     ]
     folder = f"{slug('-'.join(shown))}-{digest[:8]}"
     return Cell(folder=folder, task=path, prompt=template, **facts)
+
+
+def setting_of(about: Task | TaskSet) -> TaskSetting | TaskSet:
+    """What models may have to know of a task or task set."""
+    return about if isinstance(about, TaskSet) else about.setting
 
 
 def _question(about: Task | TaskSet, template: PromptTemplate) -> str:

@@ -43,13 +43,10 @@ def search(
         OutOfBudget: The budget of money or tokens is used up.
         Fault: A model does not answer, or gives no code again and again.
     """
-    run = trials.recorder.run
     loop = _Search(dialogue, trials, candidates)
-    for first in range(1, run.iterations + 1, run.candidates):
-        ks = range(first, min(first + run.candidates, run.iterations + 1))
-        begun = [ModelAnswer(given)] if first == 1 and given is not None else []
-        answers = [*begun, *dialogue.generate_all(ks[len(begun) :])]
-        ending = loop.iteration(ks, answers, given=bool(begun))
+    for ks, answers in dialogue.new_candidates(given):
+        is_given = given is not None and ks[0] == 1
+        ending = loop.iteration(ks, answers, given=is_given)
         if ending:
             return ending
     return ""

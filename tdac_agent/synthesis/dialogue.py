@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -75,6 +75,23 @@ class Dialogue:
             notes = tuple(f"given {r.id}: {r.text}" for r in self.book.rules)
             self.calls.recorder.given_rules(written(self.book.rules, RUN_HEADING))
             self.calls.recorder.rules(GIVEN, self.book, notes)
+
+    def new_candidates(
+        self, given: str | None
+    ) -> Iterator[tuple[range, list[ModelAnswer]]]:
+        """Asks for the new controllers of the run, one group after the other.
+
+        Args:
+            given: Source of an initial controller, which is the first of all.
+
+        Yields:
+            The iterations of a group, and their controllers.
+        """
+        run = self.calls.recorder.run
+        for first in range(1, run.iterations + 1, run.candidates):
+            ks = range(first, min(first + run.candidates, run.iterations + 1))
+            begun = [ModelAnswer(given)] if first == 1 and given is not None else []
+            yield ks, [*begun, *self.generate_all(ks[len(begun) :])]
 
     def generate_all(self, ks: Sequence[int]) -> list[ModelAnswer]:
         """Asks for new controllers (k, 0), at the same time if the model permits it."""

@@ -199,12 +199,8 @@ def _run(dialogue: Dialogue, given: str | None, tests: Tests, *, paid: bool) -> 
 
 def _search(dialogue: Dialogue, given: str | None, tests: Tests) -> None:
     """Algorithm 2, until a candidate has passed or K iterations are over."""
-    run = dialogue.calls.recorder.run
     loop = _Loop(dialogue, tests)
-    for first in range(1, run.iterations + 1, run.candidates):
-        ks = range(first, min(first + run.candidates, run.iterations + 1))
-        begun = [ModelAnswer(given)] if first == 1 and given is not None else []
-        answers = [*begun, *dialogue.generate_all(ks[len(begun) :])]
+    for ks, answers in dialogue.new_candidates(given):
         if loop.iteration(ks, answers):
             return
     dialogue.calls.recorder.finish("not verified")
