@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tdac_agent.episodes.trajectory import Trajectory, nominal_first
-from tdac_agent.errors import ControllerFileError
+from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.installation import seed_of
@@ -97,8 +97,11 @@ def verify(
             metres=task.setting.shown != task.setting.units,
         )
         _prepare(job, task, source, suites)
+        given = _files_in(job.task)
         output = _run_judge(job, folder, warm, meanwhile)
         findings = read_findings(job.out, output)
+        if _files_in(job.task) != given:
+            raise Fault("the suite changed the task's files, so there is no verdict")
         tests, failures = read_outcomes(job.out / "report.jsonl", findings, output)
         report = Report(
             verdict=verdict_of(tests),
@@ -261,6 +264,10 @@ def _file_hashes(folder: Path) -> dict[str, str]:
         str(path.relative_to(folder)): sha256_of(read_file(path, RECORD_BYTES))
         for path in sorted(folder.rglob("*.py"))
     }
+
+
+def _files_in(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*") if path.is_file()}
 
 
 def _keep(report: Report, task: Task, results: Path, out: Path) -> None:

@@ -336,13 +336,21 @@ def test_it(controller):
         resource.setrlimit(resource.RLIMIT_NOFILE, limits)
 """
 NO_FILES = """
-import shutil
+import os
 
-shutil.rmtree("work")
+os.rename("work", "gone")
 
 
 def test_it(controller):
     controller.constant("N_RAYS")
+"""
+OTHER_FILES = """
+from pathlib import Path
+
+
+def test_it(rollout):
+    rollout()
+    Path("work/params.json").write_text("{}")
 """
 BROKEN_HOOK = "def pytest_runtest_logreport():\n    raise KeyError('a hook')\n"
 
@@ -353,9 +361,10 @@ BROKEN_HOOK = "def pytest_runtest_logreport():\n    raise KeyError('a hook')\n"
         (POOR.format(forgiving=""), None, "Too many open files"),
         (POOR.format(forgiving="except OSError: pass"), None, "Too many open files"),
         (NO_FILES, None, "cannot copy the working folder"),
+        (OTHER_FILES, None, "changed the task's files"),
         ("def test_it(): ...\n", BROKEN_HOOK, "KeyError: 'a hook'"),
     ],
-    ids=["no descriptors", "forgiven", "no files", "a hook"],
+    ids=["no descriptors", "forgiven", "no files", "other files", "a hook"],
 )
 def test_what_goes_wrong_in_the_judge_is_no_verdict(check, text, conftest, reason):
     """Whatever test it happens in, and whether or not that test forgives it."""
