@@ -84,6 +84,7 @@ def test_an_outcome_says_what_happened(tool, tmp_path, program, timeout, result,
     assert found.versions.startswith("gymnasium 1.")
 
 
+@pytest.mark.slow
 def test_the_example_trains_with_a_file_like_cleanrls(tmp_path):
     """It makes the maze by its id, with wrapper and batch as of Gymnasium 0.29."""
     file = tmp_path / "ppo.py"

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.stats import bootstrap
 
 from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
 from tdac_agent.metrics.frames import Frames, iterations_of
@@ -150,6 +149,8 @@ def _resampled(
 
     def ratio(passed: np.ndarray, tried: np.ndarray, axis: int = -1) -> np.ndarray:
         return np.asarray(passed.sum(axis=axis) / tried.sum(axis=axis))
+
+    from scipy.stats import bootstrap  # slow to import
 
     found = bootstrap(
         (passed, tried),

@@ -83,6 +83,7 @@ def test_a_run_is_made_verified_and_reported(homeless, place):
         assert told in done.stdout
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_to_is_one_line(homeless, place):
     """Where a container is started, say."""
     place.chmod(0o555)

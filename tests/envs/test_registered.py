@@ -131,6 +131,7 @@ def test_stable_baselines_has_nothing_to_say(name, options):
         checker.check_env(gym.make(name, **options).unwrapped)
 
 
+@pytest.mark.slow_after(4)
 @variants
 def test_equal_seeds_give_equal_rollouts(name, options):
     one, two = gym.make(name, **options), gym.make(name, **options)

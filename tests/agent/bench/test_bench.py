@@ -376,6 +376,7 @@ def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
     assert len(pd.read_csv(out / "worlds.csv")) == 6
 
 
+@pytest.mark.slow
 def test_the_page(judge, tmp_path, level, files):
     """Tables, and replays of all entrants on the same worlds; none of hidden ones."""
     out = tmp_path / "out"
@@ -401,6 +402,7 @@ def test_the_page(judge, tmp_path, level, files):
         assert (episode["contact"] is None) == (row.outcome != "collision")
 
 
+@pytest.mark.slow
 def test_the_page_in_a_browser(browser, judge, tmp_path, level, files):
     """Another entrant is shown in the same world, another world has its own map."""
     out = tmp_path / "out"

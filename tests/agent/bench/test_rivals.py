@@ -23,7 +23,7 @@ ALL = [(name, level) for name in rival_names() for level in levels_of(name)]
 PAIRS = [*FIRST, *(pair for pair in ALL if pair not in FIRST)]
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(("name", "level"), PAIRS)
 def test_it_drives(name, level, warm):
     """It passes the tests, and no episode ends with an error of its own."""

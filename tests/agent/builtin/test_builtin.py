@@ -80,6 +80,7 @@ UP, DOWN = 1, -1
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.slow_after(7)
 @pytest.mark.parametrize(
     ("cause", "name", "way"),
     [

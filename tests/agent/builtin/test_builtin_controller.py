@@ -217,6 +217,7 @@ def test_large_maps_are_planned_on_a_lattice(name, nodes, tmp_path, monkeypatch)
     assert rollout.reached, rollout.outcome
 
 
+@pytest.mark.slow_after(4)
 @pytest.mark.parametrize("name", bundled_maps())
 def test_drives_on_bundled_maps(name, tmp_path, monkeypatch):
     """After one repair every bundled map is solved, from jittered starts, too."""

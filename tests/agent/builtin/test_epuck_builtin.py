@@ -173,6 +173,7 @@ def test_never_tries_the_same_twice(crates, cause):
     assert len(set(tried)) == len(tried)
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("name", [*WORLDS, "drawn"])
 def test_it_reads_worlds(name, module, tmp_path):
     """Occupied is what the oracle says, in this world and in changed copies."""
@@ -315,6 +316,7 @@ def test_a_hundred_starts_with_noise(name, tmp_path, monkeypatch):
         assert [rollout.outcome for rollout in rollouts] == ["reached"] * 50
 
 
+@pytest.mark.slow_after(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_drives_in_random_worlds(seed, tmp_path, monkeypatch):
     """Among anything, also through gaps that leave it no margin."""
@@ -325,6 +327,7 @@ def test_drives_in_random_worlds(seed, tmp_path, monkeypatch):
         assert rollout.reached, rollout.outcome
 
 
+@pytest.mark.slow
 def test_unsolvable_says_so(module):
     """Where the body does not get to the goal, the error names both ends."""
     text = module.sensors.HERE.joinpath("world.wbt").read_text()

@@ -21,6 +21,16 @@ def once(tmp_path_factory):
     return small, small.run("--workers", 2, name="broken"), small.run("--json")
 
 
+def test_a_campaign_leaves_its_tables(small):
+    small.write(learners=["builtin"], runs=1)
+    code, said, _ = small.run()
+    assert code == 0
+    assert "1 of 1 runs have ended" in said
+    [run] = pd.read_csv(small.folder / "out/runs.csv").to_dict("records")
+    assert (run["learner"], run["tau"]) == ("builtin", 1)
+
+
+@pytest.mark.slow
 def test_runs_that_fail_stop_no_other_and_say_why(once):
     """Exit 3; the reason is told once, with how often it was met, and the way on."""
     _, (code, said, complained), _ = once
@@ -34,6 +44,7 @@ def test_runs_that_fail_stop_no_other_and_say_why(once):
     assert said.count(" fault, ") == 4  # tried once more, after all others
 
 
+@pytest.mark.slow
 def test_runs_of_another_file_are_not_made_again(once):
     """The same runs have the same names: `builtin` was done, `scripted` was not."""
     small, _, (code, said, _) = once
@@ -58,6 +69,7 @@ def test_the_same_command_again_does_nothing_and_says_so(once):
     assert small.table() == table
 
 
+@pytest.mark.slow
 def test_the_tables_hold_each_run_once_with_the_columns_of_the_metrics(once):
     small, _, _ = once
     runs = pd.read_csv(small.folder / "out/runs.csv")
@@ -87,6 +99,7 @@ def test_shards_make_all_runs_together(small):
     assert "nothing was done" in said
 
 
+@pytest.mark.slow
 def test_of_finished_runs_only_records_may_be_kept(once):
     """A handful of files; they are found finished, and count, as all others."""
     small, _, _ = once

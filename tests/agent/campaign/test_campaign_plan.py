@@ -142,6 +142,7 @@ def test_an_unknown_campaign_names_those_that_are_shipped():
         find_config("offlin")
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", shipped_names("*.yaml"))
 def test_shipped_campaigns_can_be_planned(name):
     """All but the offline one have the paper's K and J, and a limit of money."""

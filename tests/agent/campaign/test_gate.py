@@ -74,6 +74,7 @@ def test_a_wave_of_rate_limits_counts_once(tmp_path):
     assert gate.places == 4
 
 
+@pytest.mark.slow
 def test_workers_share_what_the_server_bears(tmp_path):
     """Sixteen workers, a server that bears four: every question is answered, and most
     of them are asked while there is room for them.
@@ -99,6 +100,7 @@ def test_workers_share_what_the_server_bears(tmp_path):
     assert server.refused < len(done)
 
 
+@pytest.mark.slow
 def test_who_is_killed_has_let_go_of_its_place(tmp_path):
     gate = Gate(tmp_path, most=1, sleep=lambda _: pytest.fail("there is no place"))
     hold = (

@@ -513,6 +513,7 @@ def test_a_folder_keeps_its_own_task(tdac, good, command, target):
     assert re.fullmatch(r"error: \S+ brings its own task: leave out --start\n", errors)
 
 
+@pytest.mark.slow
 def test_synth_says_no(tdac, tmp_path):
     """Exit 1 where nothing was verified in K iterations."""
     folder = write_small_task(tmp_path / "task", profile="policy")

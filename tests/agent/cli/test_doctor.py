@@ -74,6 +74,7 @@ def test_a_step_that_kills_its_process_is_told_with_the_signal(on_path, name):
     assert "NUMBA_CPU_NAME=generic" in detail or name != "ILL"
 
 
+@pytest.mark.slow
 def test_a_judge_that_dies_is_no_verification(on_path):
     """Although all else of it works."""
     on_path(

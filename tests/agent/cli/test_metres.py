@@ -108,6 +108,7 @@ def test_metres_of_what_has_none(tdac, plan, words, message):
     assert message in err
 
 
+@pytest.mark.slow
 def test_an_evaluation_in_metres(tdac, plan, folder):
     """Of a map, or of a task in pixels; JSON keeps pixels and says so."""
     words = ("evaluate", "random", "--episodes", "1", "--metres")

@@ -90,6 +90,7 @@ def row(found, policy):
     return next(row for row in found.rows if row.policy == policy)
 
 
+@pytest.mark.slow
 def test_what_our_policies_are_worth(ours):
     """Who knows the way gets there, who does not hits the wall; and it is said so."""
     for name, knows in (("reference", "privileged"), ("follow-guidance", "+ guidance")):
@@ -335,6 +336,7 @@ def test_nothing_of_a_saved_policy_is_run(tmp_path, small_task):
     assert trace.exists()
 
 
+@pytest.mark.slow
 def test_a_policy_of_other_observations_is_refused_by_name(tmp_path, small_task):
     """As are settings that are code, and algorithms that are not known."""
     sb3 = pytest.importorskip("stable_baselines3")
@@ -355,6 +357,7 @@ def test_a_policy_of_other_observations_is_refused_by_name(tmp_path, small_task)
             Learned(other, WRAPPERS, env)
 
 
+@pytest.mark.slow
 def test_metadata_is_read_inside_and_beside(tmp_path, small_task):
     """Written again it replaces what was there; nonsense is refused."""
     sb3 = pytest.importorskip("stable_baselines3")
@@ -441,6 +444,7 @@ def test_the_command_writes_what_it_says(tdac, controllers, tmp_path):
     assert json.loads(again)["rows"][0]["interval"]["method"] == "Clopper-Pearson"
 
 
+@pytest.mark.slow
 def test_the_picture_has_the_movers(tmp_path):
     """They are drawn where they were at the end of the first episode."""
     post = {"kind": "route", "points": [[110, 30]], "radius": 5}
@@ -480,6 +484,7 @@ def test_a_finished_evaluation_is_not_driven_again(tdac, tmp_path):
     assert (out / "small.png").read_bytes() == kept[out / "small.png"]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("words", "differs"),
     [

@@ -34,6 +34,7 @@ def barn(tmp_path):
     return load_set(path)
 
 
+@pytest.mark.slow
 def test_the_barn_score_takes_the_given_length(barn):
     """OT' is 5 s and 8 s; at a quarter of the speed, both drives take 18 s."""
     report = verify_on_set(AHEAD, barn, "test", 2)
@@ -45,6 +46,7 @@ def test_the_barn_score_takes_the_given_length(barn):
     assert set(report.by_generator) == {"barn"}
 
 
+@pytest.mark.slow
 def test_the_unit_of_an_interval_is_a_world(tmp_path, barn):
     """Ten runs on each of two worlds say what two worlds do, and no more."""
     path = tmp_path / "barn.yaml"
@@ -63,6 +65,7 @@ def test_more_worlds_than_there_are(barn):
         verify_on_set(AHEAD, barn, "test", 3)
 
 
+@pytest.mark.slow
 def test_a_folder_that_was_kept_back(tmp_path, monkeypatch):
     """Sums alone are told, and the ledger knows the worlds by their hash."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))

@@ -107,6 +107,7 @@ def test_play_replays_what_was_counted(small_task, good_source, moody):
         assert figures(driven, seed, small_task) == episode
 
 
+@pytest.mark.slow
 def test_each_way_to_fail_is_counted(small_task, moody):
     """Outcomes, successes and failed seeds are those of the starts that were drawn."""
     wanted = {seed: expected_outcome(small_task, seed) for seed in range(16)}

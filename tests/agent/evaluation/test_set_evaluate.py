@@ -49,6 +49,7 @@ def files(tmp_path):
     return [str(tmp_path / f"{name}.py") for name in sources]
 
 
+@pytest.mark.slow
 def test_a_row_is_what_verify_says(judge, tmp_path, level, files):
     """Scores, generators and causes; a refused file has a row without figures."""
     tasks, out = load_set(level), tmp_path / "out"
@@ -75,6 +76,7 @@ def test_a_row_is_what_verify_says(judge, tmp_path, level, files):
     assert len(list((out / "policies" / names[0] / "trajectories").iterdir())) == 4
 
 
+@pytest.mark.slow
 def test_finished_policies_are_not_driven_again(judge, tmp_path, level, files):
     """After an interruption, and of a finished evaluation; another one is refused."""
     tasks, out, driven = load_set(level), tmp_path / "out", []
@@ -155,6 +157,7 @@ def test_the_command(tdac, level, files):
     assert [row["successes"] for row in record["rows"]] == [0, 0, 0]
 
 
+@pytest.mark.slow
 def test_playing_a_world(tdac, level, files):
     """As a film; the exit code says whether the goal was reached."""
     words = ("--set", level, "--index", "1", "--video", "a.gif", "--speed", "20")

@@ -120,6 +120,7 @@ def test_folders_of_two_worlds_differ_by_the_map_alone(name, tmp_path):
         assert np.array_equal(cells, tasks.task("dev", 0).terrain.grid.cells)
 
 
+@pytest.mark.slow_after(5)
 @pytest.mark.parametrize(
     ("source", "lines"),
     [
@@ -449,6 +450,7 @@ def test_the_command(tdac, tmp_path):
     assert "not verified: rejected at 95.0 %" in out
 
 
+@pytest.mark.slow
 def test_our_own_controller_by_its_name(tdac):
     """As in bench, evaluate and play; a file of this name needs its suffix."""
     words = ("--set", "known", "--split", "dev", "-n", "1", "--json")
@@ -528,6 +530,7 @@ def test_mistakes_are_one_line(tdac, words, message):
     assert any(part in err for part in message.split("|"))
 
 
+@pytest.mark.slow
 def test_a_set_without_a_feasible_world(tmp_path):
     """One line, after the tries that the set allows; no verdict."""
     (tmp_path / "own.py").write_text("def policy(obs):\n    return 0.0, 0.0\n")

@@ -86,6 +86,7 @@ def test_the_file_that_nobody_changed_is_read(kind, tmp_path):
     kind.read(tmp_path)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
 def test_a_hostile_field_is_taken_or_refused_in_one_line(kind, patience):
     """Of each kind of file some 25, 300 in all: no traceback, and soon."""

@@ -156,6 +156,7 @@ def _gone(pids: set[int]) -> bool:
     return not pids & _children()
 
 
+@pytest.mark.slow_after(7)
 @pytest.mark.parametrize("name", [*READING, *JUDGED])
 def test_the_line_that_nobody_changed_is_carried_out(name, command, tmp_path):
     """With exit code 0, or up to its first episode."""
@@ -169,13 +170,14 @@ def test_the_line_that_nobody_changed_is_carried_out(name, command, tmp_path):
     assert code == wanted, errors
 
 
-@pytest.mark.slow_after(6)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", READING)
 def test_a_hostile_word_is_taken_or_refused_in_one_line(name, command):
     """Of the commands that judge nothing, 300 lines in all."""
     check_line(READING[name], 300 // len(READING) + 1, command)
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", JUDGED)
 def test_a_hostile_word_of_a_command_that_judges(name, command):
     """A few lines of each, up to the first episode."""

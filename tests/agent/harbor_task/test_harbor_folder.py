@@ -61,6 +61,7 @@ def judged(root, capfd):
     return rewards, capfd.readouterr().out
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", ["unknown", "small"])
 def test_the_folder_is_valid(name, request):
     """By Harbor's schema, without unknown fields, and with all files that it names."""
@@ -156,6 +157,7 @@ def test_a_broken_judge_gives_no_reward(small, tmp_path, capfd):
     assert not list((root / "logs/verifier").iterdir())
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_not_empty_is_refused(tmp_path):
     (tmp_path / "mine").touch()
     with pytest.raises(RunError, match="is not an empty folder"):
@@ -165,6 +167,7 @@ def test_a_folder_that_is_not_empty_is_refused(tmp_path):
     assert not (tmp_path / "barn").exists()
 
 
+@pytest.mark.slow
 def test_the_command_says_what_is_missing(tmp_path):
     for task, name, worlds, why in (
         (None, None, None, "give a task with --task NAME, or a task set"),

@@ -76,6 +76,7 @@ def test_places_of_a_world():
     assert (low[1] - high[1]) * 0.37 == pytest.approx(scene.radius)  # 37 mm
 
 
+@pytest.mark.slow
 def test_an_episode_as_numbers(runs):
     """The sums of the differences are the judge's poses, in quarters of a pixel."""
     told = gather_run(runs / "verified")

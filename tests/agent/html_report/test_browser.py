@@ -68,6 +68,7 @@ def until(browser, condition):
     return WebDriverWait(browser, 30, poll_frequency=0.05).until(condition)
 
 
+@pytest.mark.slow_after(1)
 def test_it_fits(opened):
     """Nothing makes the page wider than the window, and text is not tiny."""
     for part in opened.find_elements(By.CSS_SELECTOR, "details"):
@@ -79,6 +80,7 @@ def test_it_fits(opened):
         assert opened.execute_script(size, find(opened, selector)) >= 12
 
 
+@pytest.mark.slow_after(1)
 def test_the_player(opened):
     """Plays, pauses, is dragged, and shows the episode that is chosen."""
     player = "#run-2 .player"
@@ -114,6 +116,7 @@ def test_the_player(opened):
     until(opened, lambda _: "collision" in find(opened, f"{player} .clock").text)
 
 
+@pytest.mark.slow_after(1)
 def test_ways_through_the_page(opened):
     """A cell of the timeline opens its candidate, whose episodes can be watched."""
     click(opened, '#run-1 a.cell[href="#c-1-1-1"]')

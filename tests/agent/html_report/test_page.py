@@ -163,6 +163,7 @@ def damaged(folder, name, content=None):
     path.write_bytes(whole[: len(whole) // 2] if content is None else content)
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize(
     ("name", "told"),
     [

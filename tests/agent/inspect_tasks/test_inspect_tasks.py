@@ -235,6 +235,7 @@ def test_agents_find_the_working_folder_in_their_sandbox(tmp_path):
     assert list(level.files()) == ["params.json"]
 
 
+@pytest.mark.slow
 def test_tdac_alone_does_not_import_inspect():
     code = (
         "import sys, tdac_agent, tdac_agent.cli.main, tdac_agent.problems.problem;"

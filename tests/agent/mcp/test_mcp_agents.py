@@ -140,6 +140,7 @@ def test_from_nothing_to_verified_on_the_ladder(tmp_path, tdac):
     assert record(out)["status"] == "verified"
 
 
+@pytest.mark.slow
 def test_a_bad_choice_fails(serve, few, out):
     """The verdict is that of hidden worlds, whatever the agent hopes."""
 

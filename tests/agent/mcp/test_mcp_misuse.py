@@ -14,6 +14,7 @@ from mcp_agent import STILL, converse, record, words
 SECONDS = 90
 
 
+@pytest.mark.slow
 def test_requests_that_cannot_be_answered(serve, small_task, good_source):
     """Unknown tools, submissions and episodes, held-out starts, wrong arguments."""
 
@@ -45,6 +46,7 @@ def test_requests_that_cannot_be_answered(serve, small_task, good_source):
     assert listed["ended"] is None
 
 
+@pytest.mark.slow
 def test_the_same_file_is_not_judged_again(serve, small_task):
     """An agent that lost the answer may submit again."""
 
@@ -84,6 +86,7 @@ def test_a_spent_budget_on_a_set(serve, few):
     serve(few, conversation, episodes=10)
 
 
+@pytest.mark.slow
 def test_a_refused_file_costs_no_episode(serve, few):
     """Static and contract tests come first, and such a file cannot be chosen."""
 
@@ -181,7 +184,7 @@ def test_flags_that_are_refused(tdac, arguments, told):
     assert told in error
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["SIGINT", "SIGTERM", "end of stdin"])
 def test_the_end_of_a_server(tmp_path, how, no_traces, small_task):
     """At once, although a submission is being judged; stdout has the protocol only."""

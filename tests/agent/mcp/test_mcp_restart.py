@@ -52,6 +52,7 @@ def kill_when(server, true, request):
         anyio.run(whole)
 
 
+@pytest.mark.slow
 def test_killed_while_it_judges(running, tmp_path):
     """The submission in progress is judged at the next start, on the same worlds."""
     write_set(tmp_path / "few.yaml")

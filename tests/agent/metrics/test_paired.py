@@ -62,6 +62,7 @@ def test_seeds_widen_the_interval():
     assert widths["apart"] > 20 * widths["alike"]
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_mean():
     """In about 95 of 100 draws."""
     rng, inside = np.random.default_rng(5), 0

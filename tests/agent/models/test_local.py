@@ -65,6 +65,7 @@ def test_a_program_answers(program):
     assert model.paid
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("source", "reason"),
     [
@@ -182,6 +183,7 @@ def recorded(once_recorded, tmp_path):
     return shutil.copytree(once_recorded, tmp_path / "recorded")
 
 
+@pytest.mark.slow
 def test_a_run_is_replayed(policy_task, recorded, tmp_path, warm):
     """The same answers to the same questions: the same run, from the record alone."""
     out = tmp_path / "again"
@@ -339,6 +341,7 @@ def test_learner_and_optimizer_are_one_where_they_are_named_so(small_task, tmp_p
     shutil.rmtree(tmp_path / "mail")
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("url", "safe"),
     [

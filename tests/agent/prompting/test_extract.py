@@ -257,7 +257,7 @@ GARBLED = {
 }
 
 
-@pytest.mark.slow_after(4)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", GARBLED)
 def test_the_work_grows_with_the_length(parsed, name):
     """Four times the garbage is parsed at most about four times as much.

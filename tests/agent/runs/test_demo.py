@@ -51,7 +51,7 @@ def question(folder, reply):
     return (place / f"{reply['kind']}.prompt.md").read_text()
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("which", [0, -1], ids=["first", "last"])
 def test_a_recorded_candidate_fares_as_it_did(recorded, warm, which):
     """The tests of today fail the first one, and pass the last one, as they did."""

@@ -149,7 +149,7 @@ def under_way(path):
     return path.exists() and '"verify.start"' in path.read_text()
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_synth_leaves_a_readable_run(tmp_path, no_traces, number):
     """Exit 130, status `interrupted`, nothing left running."""

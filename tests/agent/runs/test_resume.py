@@ -57,6 +57,7 @@ def halted(once_halted, out):
     return shutil.copytree(once_halted, out)
 
 
+@pytest.mark.slow
 def test_what_is_on_record_is_not_done_again(policy_task, good_source, halted, warm):
     """Neither asked nor verified; tokens, time and the record go on."""
     before = load_run(halted)
@@ -100,6 +101,7 @@ def test_a_report_of_other_code_does_not_count(policy_task, good_source, halted,
     assert not json.loads(other.read_text())["verdict"]["passed"]
 
 
+@pytest.mark.slow
 def test_an_answer_that_is_damaged_is_asked_for_again(
     policy_task, good_source, halted, warm
 ):

@@ -57,11 +57,13 @@ def on_tiers(cases, on_every_tier):
     return [name for name in cases if (name in FATAL) == on_every_tier]
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", on_tiers(IMPORTS, True))
 def test_an_import_that_fails_on_each_tier(launch, tier, name):
     check_import(launch, tier, name)
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("name", on_tiers(IMPORTS, False))
 def test_an_import_that_fails(launch, name):
     check_import(launch, "auto", name)
@@ -107,6 +109,7 @@ CALLS = {
 }
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", on_tiers(CALLS, True))
 def test_a_call_that_fails_on_each_tier(launch, tier, name):
     check_call(launch, tier, name)
@@ -137,6 +140,7 @@ def test_cpu_time_is_limited(launch, tier):
         child.policy(OBS)
 
 
+@pytest.mark.slow_after(1)
 def test_cpu_time_counts_though_the_child_has_ended_itself(launch, tier):
     source = """
         import os, time
@@ -400,6 +404,7 @@ def test_descriptors_are_bounded(launch, tier):
         loaded(launch, tier, SCRATCH).call("open_many")
 
 
+@pytest.mark.slow_after(1)
 def test_closing_the_channel_is_noticed(launch, tier):
     child = loaded(
         launch,

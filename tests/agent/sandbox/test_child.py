@@ -220,6 +220,7 @@ class EndlessEnv:
         return OBS, 0.0, False, False, {}
 
 
+@pytest.mark.slow
 def test_the_time_of_run_episode_is_the_controllers_own(launch):
     child = launch(ENDLESS_LOOP)
     child.load()

@@ -107,6 +107,7 @@ def test_siblings_draw_different_random_numbers(family):
     assert first[1] != second[1]
 
 
+@pytest.mark.slow_after(1)
 def test_each_child_accounts_for_its_own_cpu_time(family):
     busy, idle = family(), family()
     busy.call("burn", (0.5,))

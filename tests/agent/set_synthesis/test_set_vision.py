@@ -39,6 +39,7 @@ def shown_in(request):
         return np.asarray(shown.convert("RGB")).astype(int)
 
 
+@pytest.mark.slow
 def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm):
     model = Script(code(BUMP), code(STILL), NO_RULES)
     given = {"episodes": 12, "feedback_episodes": 2, "seed": 3, "judge": warm}

@@ -173,6 +173,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     says(page, "The verified controller is another one, by the built-in template.")
 
 
+@pytest.mark.slow
 def test_two_runs_side_by_side(page, studio, plan):
     """Their figures in one table, and both reports."""
     run = studio.place / "runs/plan-1"
@@ -237,6 +238,7 @@ def test_a_world_is_driven_by_the_keyboard(page, studio):
     assert status.text.endswith(" s")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES)
 def test_nothing_is_cut_off(page, studio, size):
     resize(page, size)

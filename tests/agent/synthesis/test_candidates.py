@@ -102,6 +102,7 @@ def test_the_best_of_three_is_repaired(write, good_source, tmp_path):
         synthesize(load_task(tmp_path / "task"), model, out=run.folder, iterations=6)
 
 
+@pytest.mark.slow
 def test_one_of_three_passes_at_once(write, good_source):
     answers = {("generate", k, 0): code(STILL) for k in (1, 3)}
     answers[("generate", 2, 0)] = code(good_source)
@@ -114,6 +115,7 @@ def test_one_of_three_passes_at_once(write, good_source):
     assert (run.folder / "controller.py").read_text() == good_source
 
 
+@pytest.mark.slow
 def test_a_fault_loses_no_answer_of_the_others(write, good_source):
     """The resumed run asks only what has no answer."""
     answers = {("generate", k, 0): code(STILL) for k in (1, 3)}
@@ -188,6 +190,7 @@ def test_functions_run_at_the_same_time_and_the_first_error_is_raised():
     assert side_by_side([]) == []
 
 
+@pytest.mark.slow
 def test_the_command_takes_candidates(tdac, tmp_path):
     folder = write_small_task(tmp_path / "task", profile="policy")
     words = ("synth", "--task", folder, "--candidates", 3, "-K", 6)

@@ -57,6 +57,7 @@ def journal(folder, event):
     return [each for each in map(json.loads, lines) if each["event"] == event]
 
 
+@pytest.mark.slow
 def test_the_edit_alone_has_a_picture_of_the_failure(seen, task):
     out, model = seen
     assert model.asked() == [("generate", 1, 0), ("edit", 1, 1), ("edit", 1, 1)]
@@ -123,6 +124,7 @@ def test_a_replay_finds_the_same_questions(seen, task, tmp_path, warm):
         synthesize(task, out=tmp_path / "blind", **given)
 
 
+@pytest.mark.slow
 def test_a_resumed_run_has_the_same_picture(task, good_source, tmp_path, warm):
     """It is drawn again with the same bytes, and its answer is not asked for again."""
     given = {"out": tmp_path / "run", "seed": 4, "vision": True, "judge": warm}
@@ -175,6 +177,7 @@ def test_runs_with_and_without_pictures_are_different_runs(seen, task):
         synthesize(task, model, out=out, seed=4)
 
 
+@pytest.mark.slow
 def test_without_the_flag_a_run_is_as_it_always_was(
     seen, task, good_source, tmp_path, warm
 ):

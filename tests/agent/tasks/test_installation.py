@@ -77,7 +77,7 @@ def spoiled_by(kind, file):
         file.chmod(0o644 if kind == "for others to read" else 0o600)
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "kind", ["not a folder", "a link", "a pipe", "too short", "for others to read"]
 )
@@ -94,6 +94,7 @@ def test_no_place_for_a_secret_is_said(kind, tmp_path):
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("shown", exposure().packages + exposure().system[:1])
 def test_a_secret_is_kept_from_the_sandbox(shown):
     """A folder that controllers can read is no place for it: said, not made."""

@@ -212,6 +212,7 @@ def test_arguments_that_make_no_sense(task, tmp_path, warm):
         check_suite(task, suite=tmp_path / "nothing", judge=warm)
 
 
+@pytest.mark.slow
 def test_the_short_form(task, suite_of, warm):
     """A proof, or one clear line that says what is wrong."""
     proof = prove_suite(task, profile="policy", judge=warm)

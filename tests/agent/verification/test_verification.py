@@ -167,7 +167,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.slow_after(3)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_controllers_fail(small_task, quick, no_traces, name):
     """Each is reported as failed, soon and with its reason, and leaves no process."""

@@ -161,6 +161,7 @@ class TestDevices:
 
 
 class TestSteps:
+    @pytest.mark.slow_after(3)
     @pytest.mark.parametrize(
         ("call", "steps"),
         [

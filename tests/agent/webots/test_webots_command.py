@@ -223,6 +223,7 @@ def test_usage(tdac, words, said):
 STARTS = "from controller import Robot\nrobot = Robot()\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lines", "said"),
     [

@@ -55,6 +55,7 @@ def check():
         yield judged
 
 
+@pytest.mark.slow
 def test_tapes_pass_where_the_starts_are_known():
     """The attack works but for the secret of the installation."""
     case = next(case for case in CASES if case.name == "tapes_of_known_starts")
@@ -62,6 +63,7 @@ def test_tapes_pass_where_the_starts_are_known():
     assert report.passed
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("case", [c for c in CASES if c.name in ALWAYS], ids=str)
 def test_a_few_on_the_best_tier(case, check):
     """What is tried in each run of the tests."""
@@ -109,6 +111,7 @@ def impatient():
     signal.signal(signal.SIGALRM, before)
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize("offer", AT_ONCE, ids=str)
 def test_a_hostile_file_is_refused_in_one_line(offer, tdac, tmp_path, impatient):
     """With exit code 2 and no traceback, whatever is in it; nothing is written."""
@@ -122,6 +125,7 @@ def test_a_hostile_file_is_refused_in_one_line(offer, tdac, tmp_path, impatient)
     assert sorted(here.rglob("*")) == before
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "offer", [offer for offer in OFFERS if str(offer) in FEW], ids=str
 )

@@ -118,6 +118,7 @@ def test_an_edited_callee_in_another_module_takes_effect(copied_package):
     assert run(script, PYTHONPATH=copied_package) == ("True", "")
 
 
+@pytest.mark.slow
 def test_constants_of_kernels_stand_where_changes_are_noticed():
     """A file that is not looked at may have no number that is compiled in."""
     texts = {file: file.read_text() for file in PACKAGE.rglob("*.py")}
@@ -150,7 +151,7 @@ def folder_with(**variables):
     return run(script, **variables)
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "setting",
     [{"NUMBA_OPT": "0"}, {"NUMBA_CPU_NAME": "generic"}, {"NUMBA_DEBUGINFO": 1}],
@@ -169,6 +170,7 @@ def test_functions_of_others_keep_their_place(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_without_compiling_the_same_comes_out():
     """`NUMBA_DISABLE_JIT=1` runs the same kernels as plain Python, for debugging."""
     script = (

@@ -89,6 +89,7 @@ def _script(text):
     ).stdout
 
 
+@pytest.mark.slow
 def test_a_forked_process_has_threads_of_its_own():
     """Those of its parent are not there."""
     _script(
@@ -104,6 +105,7 @@ def test_a_forked_process_has_threads_of_its_own():
     )
 
 
+@pytest.mark.slow
 def test_where_no_thread_can_be_started_the_caller_s_does_all():
     """It is told once."""
     told = _script(

@@ -338,6 +338,7 @@ class TestEncoders:
         assert np.min(turned) < 0.8
 
 
+@pytest.mark.slow_after(6)
 @every_env
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
 @pytest.mark.parametrize("blocked", ["terminate", "block"])

@@ -447,6 +447,7 @@ def test_equal_seeds_give_equal_bits_in_separate_processes(world):
     assert runs[0] == runs[1]
 
 
+@pytest.mark.slow
 def test_importing_the_package_imports_no_physics():
     """Nor anything else that is heavy; making an env that pushes nothing neither."""
     source = """

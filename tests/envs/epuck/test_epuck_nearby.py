@@ -43,7 +43,7 @@ def poses(ground, count):
     )
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 @every_world
 def test_they_change_nothing(name, place):
     """Readings, distances and contacts are those with all parts, to the last bit."""

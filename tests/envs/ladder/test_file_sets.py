@@ -410,6 +410,7 @@ def test_public_maps(tmp_path):
     assert tasks.task("test", 0).shortest > 0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (REAL / "barn").is_dir(), reason="no worlds of BARN")
 def test_public_worlds_of_barn(tmp_path):
     """All are feasible for a disc as wide as the challenge's robot."""

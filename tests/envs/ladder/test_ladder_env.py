@@ -56,6 +56,7 @@ def test_levels():
     assert set(set_names()) == set(KEYS)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("level", LEVELS)
 def test_gymnasium_finds_nothing_wrong(level):
     with warnings.catch_warnings():
@@ -164,7 +165,7 @@ def test_a_pickled_environment_goes_on():
     assert all(same(a[0], b[0]) for a, b in zip(one, other, strict=True))
 
 
-@pytest.mark.slow_after(6)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @pytest.mark.parametrize("privileged", [False, True])

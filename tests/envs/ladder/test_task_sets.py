@@ -29,6 +29,7 @@ def test_the_easiest_is_first():
     assert set_names() == ("known", "unknown", "lost", "moving", "crowd", "epuck")
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", set_names())
 def test_a_world_follows_from_set_split_and_number(name):
     one, again = load_set(name), load_set(name)

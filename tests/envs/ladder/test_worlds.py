@@ -82,6 +82,7 @@ def geometry(world):
     return hashlib.sha256(np.packbits(world.cells).tobytes() + text).hexdigest()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", NAMES)
 def test_golden_worlds(name):
     """The first three worlds, and the first hundred as one hash of hashes."""
@@ -120,6 +121,7 @@ def test_worlds_are_equal_in_another_order_and_another_process():
     assert here == [text for part in again for text in part]
 
 
+@pytest.mark.slow_after(6)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("index", range(4))
 def test_worlds_fulfil_their_conditions(name, index):

@@ -82,6 +82,7 @@ def test_an_unknown_name_is_answered_with_the_closest():
         bundled_map("42")
 
 
+@pytest.mark.slow
 @EACH_MAP
 def test_the_script_reproduces_the_map(name, drawn):
     kept = bundled_map(name)

@@ -95,6 +95,7 @@ def test_the_body_looks_where_it_went():
     assert np.abs(beside[ahead < -2]).max() > np.abs(beside[ahead > 4]).max()
 
 
+@pytest.mark.slow_after(9)
 @pytest.mark.parametrize("number", range(0, len(PLANTS), 3))
 def test_any_failure_can_be_drawn(number):
     """Caption in ASCII, picture as large as map and column, equal when drawn again."""

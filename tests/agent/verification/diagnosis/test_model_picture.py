@@ -86,6 +86,7 @@ def test_an_episode_that_did_not_drive_is_not_drawn(failed):
     assert failure_picture(task, report, {}, 1024) is None
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", ["maze", "street", "epuck-maze"])
 def test_a_picture_fits_and_is_the_same_each_time(name, tmp_path, warm):
     """Its shorter side has three quarters of the longer one at least."""

@@ -36,12 +36,14 @@ def test_nine_in_ten_are_named_right():
     assert sum(named) >= 0.9 * len(named)
 
 
+@pytest.mark.slow_after(12)
 @pytest.mark.parametrize("number", range(len(PLANTS)), ids=lambda n: PLANTS[n].fault)
 def test_facts(number):
     """Cause, side, place, step, corner and words are those that were planted."""
     assert wrong_facts(PLANTS[number], found(number)) == [], found(number).text
 
 
+@pytest.mark.slow_after(7)
 @pytest.mark.parametrize("number", range(len(PLANTS)), ids=lambda n: PLANTS[n].fault)
 def test_paragraph(number):
     """One bounded line that says whose it is, with no odd figures in it."""

@@ -266,7 +266,7 @@ def test_a_process_begins_without_traces(fresh_probe):
     assert seen[-1] == "decimal 28"  # the report has not cut it
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", often(FIRST, ALWAYS))
 def test_a_verification_leaves_nothing_for_the_next(
     small_task, warm, fresh_probe, name

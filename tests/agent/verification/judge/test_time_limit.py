@@ -66,6 +66,7 @@ def caught_twice():
     endless()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("action", [endless, caught_twice])
 def test_the_main_thread_is_stopped_in_the_middle(action):
     """At the deadline, and again where the error is caught; nothing of it stays."""
@@ -109,6 +110,7 @@ def judged(small_task, good_source, tmp_path, monkeypatch):
     return judged
 
 
+@pytest.mark.slow
 def test_no_test_outlives_the_verification(judged):
     """Whatever a test does is ended, and it has failed for that reason."""
     failed = judged(SUITE, wall_seconds=1.0)

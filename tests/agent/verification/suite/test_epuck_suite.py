@@ -219,7 +219,7 @@ def test_the_good_one_passes(task, source, warm):
         assert report.provenance.unit == "m"
 
 
-@pytest.mark.slow_after(4)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_one_fails_where_it_is_wrong(checked, source, name):
     """Exactly the unit tests that are about it fail."""

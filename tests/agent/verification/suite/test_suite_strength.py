@@ -236,7 +236,7 @@ def test_a_wrong_controller_fails_its_test(failed, good_source, name):
     assert failed(spoiled(good_source, old, new)) == set(expected)
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", BROAD)
 def test_a_broadly_wrong_controller_fails(failed, good_source, name):
     """Its own test fails, whatever else does."""

@@ -74,6 +74,7 @@ def test_fails(rollout):
     assert report.provenance.suite == "map2d + mine"
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize(
     ("body", "found"),
     [
@@ -160,6 +161,7 @@ def test_it(): ...
     assert names == {"test_it"}
 
 
+@pytest.mark.slow
 def test_the_tasks_own_suite_is_found_beside_its_file(tmp_path, good_source):
     """`suite` in task.yaml is relative to that file, and is part of the verdict."""
     folder = write_small_task(tmp_path / "task", suite="mine")
@@ -202,7 +204,7 @@ def test_the_users_pytest_does_not_change_a_verdict(
     assert not verify(nothing, small_task, profile="policy", paper=True).passed
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "tests_run"), [("time.sleep(99)", "xyy"), ("while True: pass", "xy")]
 )
@@ -263,7 +265,7 @@ def test_an_episode_that_is_kept_waiting_is_run_again(small_task, tmp_path, quic
     assert os.times().elapsed - began >= 3.0
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "source",
     [b"while True:\n    pass\n", b"def policy(obs):\n    while True:\n        pass\n"],
@@ -355,6 +357,7 @@ def test_it(rollout):
 BROKEN_HOOK = "def pytest_runtest_logreport():\n    raise KeyError('a hook')\n"
 
 
+@pytest.mark.slow_after(3)
 @pytest.mark.parametrize(
     ("text", "conftest", "reason"),
     [
