@@ -59,7 +59,7 @@ results-rl: $(VENV)/.installed
 	$(BIN)/python -m benchmarks.ladder_trainings runs/results-rl --keep results/ladder/learned
 
 docs: $(VENV)/.docs-installed
-	$(BIN)/sphinx-build -W --keep-going -q -b html -c docs . build/site
+	$(BIN)/sphinx-build -W --keep-going -q -j auto -b html -c docs . build/site
 	@echo "built: build/site/index.html"
 
 linkcheck: $(VENV)/.docs-installed

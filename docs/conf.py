@@ -102,7 +102,8 @@ def _tables(lines: Iterator[str]) -> Iterator[str]:
                 yield f"   {'* - ' if number == 0 else '  - '}{cell}"
 
 
-def setup(app: Sphinx) -> None:
+def setup(app: Sphinx) -> dict[str, bool]:
     """Adds what this site needs."""
     app.add_directive("docstring", Docstring)
     app.connect("autodoc-process-docstring", as_rst, priority=400)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

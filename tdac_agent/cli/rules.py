@@ -46,6 +46,8 @@ def export(folders: list[Path], out: Path) -> int:
     books = [load_rules(folder) for folder in folders]
     rules = shared_rules(books)
     number = sum(len(book.in_force) for book in books)
+    if not number:
+        raise RunError("no rule to export: none is in force at the end of a run given")
     if not rules:
         raise RunError(
             f"no rule to export: of {number} in force, none is about the environment "
@@ -55,8 +57,13 @@ def export(folders: list[Path], out: Path) -> int:
     names = [name for run in runs for name in run.models or (run.optimizer,)]
     authors = ", ".join(dict.fromkeys(names))
     heading = f"Learnt on {tasks} by {authors}."
+    text = written(rules, heading)
     try:
-        write_atomic(out, written(rules, heading))
+        if out.is_file() and out.read_text(encoding="utf-8") != text:
+            raise RunError(
+                f"{out} exists and has other rules: delete it, or give another --out"
+            )
+        write_atomic(out, text)
     except OSError as error:
         raise RunError(f"cannot write {out}: {error.strerror}") from error
     Console().print(

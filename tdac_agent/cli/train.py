@@ -54,10 +54,10 @@ def run(
         trust: Whether to load its checkpoint even if it is from elsewhere.
         as_json: Whether to print JSON.
     """
+    check_extra()
     console = Console(stderr=as_json)
     with console.status("preparing the tasks …"):
         plan, folder = _plan_and_folder(given, steps, out, resume)
-        check_extra()
     console.print(_heading(plan, folder), soft_wrap=True, highlight=False)
     columns = (
         TextColumn("{task.completed:,.0f} steps"),

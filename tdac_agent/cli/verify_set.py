@@ -17,6 +17,7 @@ from rich.table import Table
 from tdac_agent.builtin.level import controller_of
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
+from tdac_agent.cli.pulse import Pulse
 from tdac_agent.cli.robust_view import error_rates, rate_text
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.set_flags import SetFlags
@@ -75,8 +76,11 @@ def run(
         "", total=flags.worlds or most_worlds(tasks, flags.split or "test"), successes=0
     )
 
+    pulse = Pulse(is_terminal=console.is_terminal)
+
     def watch(episodes: int, successes: int) -> None:
         bar.update(row, completed=episodes, successes=successes, refresh=True)
+        pulse(f"{tasks.name}: the goal reached in {successes} of {episodes} worlds …")
 
     with WarmJudge(child_pool) as judge, bar:
         report = verify_on_set(

@@ -18,14 +18,14 @@ from inspect_ai.scorer import Scorer
 
 from tdac_agent.inspect_tasks.names import registered
 from tdac_agent.inspect_tasks.scoring import driven, verified
-from tdac_agent.inspect_tasks.solvers import builtin, repair
+from tdac_agent.inspect_tasks.solvers import repair, tdac_builtin
 from tdac_agent.problems.problem import LevelProblem, problem_of
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.registry import own_environments
 from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.task_sets import load_set
 
-__all__ = ["builtin", "driven", "repair", "verified"]
+__all__ = ["driven", "repair", "tdac_builtin", "verified"]
 WORLDS = 20
 """Worlds on which an answer for a level drives."""
 

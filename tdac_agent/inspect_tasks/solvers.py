@@ -61,8 +61,8 @@ async def _told(state: TaskState, turn: int) -> str | None:
     return None if judged.passed else REPAIR.format(feedback=judged.feedback)
 
 
-@solver(name=registered("builtin"))
-def builtin() -> Solver:
+@solver(name=registered("tdac_builtin"))
+def tdac_builtin() -> Solver:
     """Answers with tdac's own controller and asks no model, to try an installation."""
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001

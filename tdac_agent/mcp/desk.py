@@ -233,7 +233,7 @@ class Desk:
             submissions=[
                 SubmissionLine(
                     submission=each.number,
-                    verified=each.judged.verified,
+                    verified=each.judged.verified or self._is_result(each),
                     can_be_chosen=not each.judged.unfit and not self.run.finished,
                     summary=each.judged.summary,
                 )
@@ -244,6 +244,10 @@ class Desk:
             chosen=self.chosen,
             ended=self._ending() if self.run.finished else None,
         )
+
+    def _is_result(self, submission: Submission) -> bool:
+        """Whether it is the verified result of the run."""
+        return self.run.verified and submission.number == self.chosen
 
     def choose(self, number: int) -> ChooseAnswer:
         """Fixes the controller, gives the verdict, and ends the run.

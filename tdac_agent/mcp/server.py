@@ -30,9 +30,16 @@ Context = ServerRequestContext[dict[str, Any]]
 T = TypeVar("T")
 BETWEEN_STEPS = 1.0
 """Least time between two notifications of progress, s."""
+PATIENCE = 20.0
+"""Time that a request for information waits for what an earlier server left, s."""
 INSTRUCTIONS = (
     "Write a robot controller: call read_task first, then submit controllers until one "
     "is good enough, then choose it."
+)
+
+UNFINISHED = (
+    "an earlier server was ended while it judged; that is being finished first, which "
+    "may take minutes: ask again in a minute"
 )
 
 
@@ -50,7 +57,7 @@ class Counter:
         self._desk = desk
         self._thread = ThreadPoolExecutor(1, "tdac-mcp")
         # What an earlier server left unfinished comes first.
-        self._thread.submit(_answered, desk.catch_up)
+        self._caught_up = self._thread.submit(_answered, desk.catch_up)
 
     def server(self) -> Server[dict[str, Any]]:
         """The server, for any transport."""
@@ -88,6 +95,11 @@ class Counter:
             arguments = tool.arguments.model_validate(parameters.arguments or {})
         except ValidationError as error:
             return problem(f"{tool.name}: {one_line_reason(error)}")
+        if tool.reads:
+            left = asyncio.wrap_future(self._caught_up)
+            done, _ = await asyncio.wait([left], timeout=PATIENCE)
+            if not done:
+                return problem(UNFINISHED)
         client, on_step = _client_of(context), _reporter(context)
 
         def work() -> CallToolResult:

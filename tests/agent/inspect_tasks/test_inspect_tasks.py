@@ -255,7 +255,7 @@ def test_the_command_line_finds_the_tasks_of_a_clone_and_of_a_wheel(tmp_path):
         work = tmp_path / kind
         work.mkdir()
         words = ["-m", "inspect_ai", "eval", "tdac_agent/tdac_maze", "--model"]
-        words += ["mockllm/model", "--solver", "tdac_agent/builtin"]
+        words += ["mockllm/model", "--solver", "tdac_agent/tdac_builtin"]
         said = call([*words, "--log-dir", "logs"], work, python)
         assert "tdac_maze" in said
         log = log_in(work / "logs")

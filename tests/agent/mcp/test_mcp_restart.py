@@ -52,6 +52,36 @@ def kill_when(server, true, request):
         anyio.run(whole)
 
 
+async def submissions(agent):
+    """The list, once what an earlier server left has been judged."""
+    while (result := await agent.call("submissions")).is_error:
+        assert "ask again" in result.content[0].text
+        await anyio.sleep(0.2)
+    return result.structured_content
+
+
+def test_a_request_is_not_kept_waiting_for_what_was_left(
+    serve, small_task, out, monkeypatch
+):
+    """It is told why there is no answer yet; the next ones are answered."""
+
+    async def first(agent):
+        return await agent.submit(STILL)
+
+    serve(small_task, first)
+    left = out / "iterations/k02/j0/controller.py"
+    left.parent.mkdir(parents=True)
+    left.write_text(f"import time\n\ntime.sleep(3)\n{STILL}")
+    monkeypatch.setattr("tdac_agent.mcp.server.PATIENCE", 0.01)
+
+    async def later(agent):
+        return await agent.error("submissions"), await submissions(agent)
+
+    told, listed = serve(small_task, later)
+    assert "an earlier server was ended while it judged" in told
+    assert [each["submission"] for each in listed["submissions"]] == [1, 2]
+
+
 @pytest.mark.slow
 def test_killed_while_it_judges(running, tmp_path):
     """The submission in progress is judged at the next start, on the same worlds."""
@@ -71,7 +101,7 @@ def test_killed_while_it_judges(running, tmp_path):
     assert record(out)["status"] == "running"
 
     async def later(agent):
-        listed = (await agent.call("submissions")).structured_content
+        listed = await submissions(agent)
         third = await agent.submit(STILL)
         return listed, third
 
@@ -134,6 +164,7 @@ def test_a_finished_run_answers_from_its_record(serve, small_task, good_source, 
         return (await agent.call("submissions")).structured_content
 
     listed = serve(small_task, later)
+    assert [each["verified"] for each in listed["submissions"]] == [False, True]
     assert listed["ended"].endswith("submission 2 was chosen and is verified")
     assert (out / "run.json").read_bytes() == before
 

@@ -59,6 +59,9 @@ def test_what_was_learnt_on_one_task_is_given_to_the_next(
     assert (code_, err) == (0, "")
     assert f"2 of 6 rules in force; to use them: tdac synth --rules {file}" in said
     text = file.read_text()
+    file.write_text(f"{text}- [code] Mine.\n")
+    code_, _, err = tdac("rules", "export", learnt, "--out", file)
+    assert (code_, "has other rules" in err, "Mine" in file.read_text()) == (2, 1, 1)
     assert "- [code] Return plain floats.\n" in text
     assert "Learnt on small by script." in text
     assert "gap" not in text
