@@ -62,6 +62,7 @@ def test_what_was_learnt_on_one_task_is_given_to_the_next(
     file.write_text(f"{text}- [code] Mine.\n")
     code_, _, err = tdac("rules", "export", learnt, "--out", file)
     assert (code_, "has other rules" in err, "Mine" in file.read_text()) == (2, 1, 1)
+    file.write_text(text)
     assert "- [code] Return plain floats.\n" in text
     assert "Learnt on small by script." in text
     assert "gap" not in text
