@@ -119,6 +119,8 @@ def _judged(report: Report) -> Judged:
     summary = f"{verdict.passed_tests} of {verdict.expected} tests passed"
     if not passed:
         summary = f"{len(report.failures)} of {verdict.expected} tests failed"
+        if verdict.passed_tests == 0:
+            summary += f", the first because {report.failures[0].message}"
     return Judged(
         passed,
         summary,
