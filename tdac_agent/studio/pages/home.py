@@ -31,6 +31,9 @@ from tdac_envs.grid.plan import path_length
 MOST_BYTES = 64 << 20
 FIRST = "map: maze"
 LEAST_RADIUS, RADIUS_STEP = 1.0, 0.5
+ELSEWHERE = 0.5
+"""By how much half of a passage must be less than the widest radius, px, if that gets
+through elsewhere: it is measured between walls, the radius from pixel to pixel."""
 # A file that is dropped beside the box would replace the page.
 DROP = """<script>
 addEventListener("dragover", (event) => event.preventDefault());
@@ -301,7 +304,7 @@ class Choosing:
             if turn != self._turn:
                 return
             self._checked = checked
-            self._tell(*_sentence(checked, board))
+            self._tell(*sentence_of(checked, board))
             self._show_picture(checked.picture or board.png)
         stuck = self._checked is not None and self._checked.task is None
         fitting = fitting_radius(draft, self._checked) if stuck else None
@@ -380,7 +383,7 @@ def fitting_radius(draft: Draft, checked: Checked | None) -> float | None:
     return fitting if LEAST_RADIUS <= fitting < draft.radius else None
 
 
-def _sentence(checked: Checked, board: Board) -> tuple[str, bool]:
+def sentence_of(checked: Checked, board: Board) -> tuple[str, bool]:
     """What was found, and whether it is good."""
     if checked.task is None:
         return checked.problem, False
@@ -389,9 +392,21 @@ def _sentence(checked: Checked, board: Board) -> tuple[str, bool]:
         f"A path of {path_length(checked.path):.4g} {board.unit}; the goal is reached "
         f"within {reach:.3g} {board.unit} (disc)"
     )
-    if checked.narrowest is not None:
-        text += (
-            f"; its narrowest place is {checked.clearance:.3g} {board.unit} from an "
-            f"obstacle (ring)"
-        )
-    return f"{text}.", True
+    return f"{text}.{_about_passage(checked, board.unit)}", True
+
+
+def _about_passage(checked: Checked, unit: str) -> str:
+    """How wide the narrowest passage of the path is, and for which robots."""
+    narrowest, widest = checked.narrowest, checked.widest
+    if narrowest is None:
+        return ""
+    if narrowest.at != "path":
+        away = narrowest.width / 2.0
+        text = f"It is narrowest at the {narrowest.at}, {away:.3g} {unit} from a wall"
+    else:
+        text = f"Its narrowest passage (bar) is {narrowest.width:.3g} {unit} wide"
+    if widest is None:
+        return f" {text}."
+    if narrowest.width / 2.0 > widest - ELSEWHERE:
+        return f" {text}: room for a radius of {widest:g} {unit}."
+    return f" {text}; another path has room for a radius of {widest:g} {unit}."

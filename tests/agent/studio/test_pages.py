@@ -114,6 +114,8 @@ def open_plan(browser, plan):
 def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     """By clicks alone; the page shows the command, and the candidate drives."""
     open_plan(page, plan)
+    says(page, "narrowest passage (bar) is 70 px wide: room for a radius of")
+    assert page.find_elements(By.CSS_SELECTOR, ".board svg path.gap")
     assert number(page, "start x").get_attribute("value") == "60"
     assert abs(float(number(page, "heading, rad").get_attribute("value"))) < 0.05
     assert "tdac synth --map .studio/files/plan.png --start 60 150" in text_of(page)

@@ -10,6 +10,8 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
@@ -23,7 +25,7 @@ from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
 from tdac_agent.studio.jobs import job_of, jobs, start
-from tdac_agent.studio.pages.home import fitting_radius
+from tdac_agent.studio.pages.home import fitting_radius, sentence_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run import about_given, is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
@@ -56,9 +58,7 @@ def test_a_draft_is_the_task_of_its_command(kind, source, tmp_path):
     checked = check(draft, board, tmp_path)
     assert checked.problem == ""
     assert flags_of(draft.words()).load().sha256() == checked.task.sha256()
-    # The body passes the narrowest place of its path, by less than anywhere else.
-    body = board.radius or BODY_RADIUS
-    assert 0.95 * body < checked.clearance < 2.0 * body
+    assert checked.narrowest.width > 2.0 * (board.radius or BODY_RADIUS)
 
 
 @pytest.mark.parametrize("kind", ["map", "world"])
@@ -82,6 +82,49 @@ def test_what_cannot_be_driven(tmp_path):
     assert check(replace(draft, radius=wide.widest - 0.5), board, tmp_path).task
     outside = check(replace(draft, goal=(5.0, 5.0)), board, tmp_path)
     assert "outside of the closed wall" in outside.problem
+
+
+@pytest.mark.parametrize("source", ["maze", "rooms", "street"])
+def test_the_narrowest_passage_limits_the_robot(source, tmp_path):
+    """On maps with one way, it and the widest robot that gets through agree."""
+    board = board_of("map", source)
+    checked = check(Draft.of(board, source), board, tmp_path)
+    narrowest = checked.narrowest
+    assert narrowest.at == "path"
+    assert math.dist(*narrowest.ends) == pytest.approx(narrowest.width, rel=1e-3)
+    # Radii are tested from pixel to pixel, passages between walls.
+    assert 0.0 <= narrowest.width / 2.0 - checked.widest < 1.0
+
+
+def test_a_path_through_the_narrower_of_two_doors(tmp_path):
+    """The passage is that of the path, though wider robots find another one."""
+    plan = np.full((300, 400), 255, np.uint8)
+    plan[:8] = plan[-8:] = plan[:, :8] = plan[:, -8:] = 0
+    plan[:, 196:204] = 0
+    plan[50:90, 190:210] = 255
+    plan[170:250, 190:210] = 255
+    cv2.imwrite(str(tmp_path / "plan.png"), plan)
+    board = board_of("map", str(tmp_path / "plan.png"))
+    draft = Draft("map", "plan.png", (60.0, 70.0), (340.0, 70.0), 0.0, 15.0)
+    narrow = check(draft, board, tmp_path)
+    assert narrow.narrowest.width == pytest.approx(40.0, abs=0.1)
+    assert sorted(y for _, y in narrow.narrowest.ends) == [49.5, 89.5]
+    assert narrow.widest == pytest.approx(39.4, abs=0.6)
+    assert "(bar) is 40 px wide; another path has room" in sentence_of(narrow, board)[0]
+    wide = check(replace(draft, radius=25.0), board, tmp_path)
+    assert wide.narrowest.width == pytest.approx(80.0, abs=0.1)
+    assert "(bar) is 80 px wide: room for a radius of" in sentence_of(wide, board)[0]
+    near = check(replace(draft, start=(25.0, 210.0), goal=(60.0, 210.0)), board, tmp_path)
+    assert near.narrowest.at == "start"
+    assert near.narrowest.width == pytest.approx(2 * 17.5, abs=0.1)
+    assert "narrowest at the start, 17.5 px from a wall" in sentence_of(near, board)[0]
+
+
+def test_a_passage_of_a_world(tmp_path):
+    """The bundled corridor has passages of 0.2 m beside its boxes."""
+    board = board_of("world", "corridor")
+    checked = check(Draft.of(board, "corridor"), board, tmp_path)
+    assert checked.narrowest.width == pytest.approx(0.2, abs=1e-3)
 
 
 def wait_for(job):
