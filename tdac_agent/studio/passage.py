@@ -153,8 +153,8 @@ def _nearest_on_sides(
     begins, ends = np.delete(path[:-1], leg, 0), np.delete(path[1:], leg, 0)
     side = _cross(path[leg + 1] - path[leg], walls - point)
     found = []
-    for own in (walls[side > 0], walls[side < 0]):
-        own = own[np.argsort(np.hypot(*(own - point).T))]
+    for here in (side > 0, side < 0):
+        own = walls[here][np.argsort(np.hypot(*(walls[here] - point).T))]
         seen = np.flatnonzero(~_crosses(point, own, begins, ends))
         if not seen.size:
             return None

@@ -13,7 +13,7 @@ from nicegui import ui
 
 from tdac_agent.loopback import listen
 from tdac_agent.studio.gate import Gate
-from tdac_agent.studio.pages import compare, files, home, run, shelf, worlds
+from tdac_agent.studio.pages import bench, compare, files, home, run, shelf, worlds
 
 MOST_MESSAGES = 100
 """Messages kept for a page that lost its connection, so that memory stays bounded."""
@@ -49,7 +49,7 @@ def serve(
 def _application(place: Path) -> fastapi.FastAPI:
     application = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     files.add(application, place)
-    for page in (compare, home, run, shelf, worlds):
+    for page in (bench, compare, home, run, shelf, worlds):
         page.add(place)
     ui.run_with(
         application,

@@ -29,15 +29,22 @@ iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
   height: 82vh; background: white; }
 .status { border-radius: 999px; padding: .1em .7em; font-weight: 600;
   background: #e4e2da; }
-.status.verified, .status.selected, .status.trained { background: #cfe9dc; }
-.status.running { background: #d6e4f5; } .status.not-verified { background: #f4d9d2; }
+.status.verified, .status.selected, .status.trained, .status.finished {
+  background: #cfe9dc; }
+.status.running { background: #d6e4f5; }
+.status.not-verified, .status.not-finished { background: #f4d9d2; }
 td a { color: #1d5fae; }
 pre.output { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .8rem;
   max-height: 16rem; overflow: auto; width: 100%; margin: 0; }
 """
 PATIENCE = 120.0
 """Seconds that a browser may need to show a page."""
-LINKS = (("New controller", "/"), ("Runs", "/runs"), ("Worlds", "/worlds"))
+LINKS = {
+    "New controller": "/",
+    "Runs": "/runs",
+    "Worlds": "/worlds",
+    "Benches": "/benches",
+}
 
 
 @contextmanager
@@ -46,8 +53,8 @@ def framed(title: str) -> Generator[None]:
     ui.add_css(STYLE)
     ui.page_title(f"{title} – tdac studio")
     with ui.header().classes("items-center gap-4 py-2"):
-        ui.label("tdac studio").classes("text-lg font-bold")
-        for name, address in LINKS:
+        ui.label("tdac studio").classes("text-lg font-bold max-sm:hidden")
+        for name, address in LINKS.items():
             ui.link(name, address).classes("text-white no-underline")
     with ui.column().classes("w-full gap-3 px-1"):
         yield
@@ -108,7 +115,16 @@ def status_badge(status: str) -> None:
 
 def report_frame(at: str, version: str) -> None:
     """The report of a run in one of its states."""
+    _frame(f"{address_of('/report', at)}&version={version}#play", f"Report on {at}")
+
+
+def file_frame(at: str, version: str, title: str) -> None:
+    """A page that was written to the folder, in one of its states."""
+    _frame(f"{address_of('/file', at)}&version={version}", title)
+
+
+def _frame(address: str, title: str) -> None:
+    """A page in a frame without any rights."""
     ui.element("iframe").classes("report").props(
-        f'src="{address_of("/report", at)}&version={version}#play" '
-        f'sandbox="allow-scripts" title="Report on {at}"'
+        f'src="{address}" sandbox="allow-scripts" title="{title}"'
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,20 @@ from urllib.parse import quote
 
 from nicegui import events, ui
 
+from tdac_agent.bench.bench import RESULTS
 from tdac_agent.campaign.drive import CONFIG_FILE
 from tdac_agent.library.listing import folders_of, row_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
 from tdac_agent.studio.jobs import jobs
-from tdac_agent.studio.pages.layout import address_of, framed, shown_first
+from tdac_agent.studio.pages.layout import (
+    address_of,
+    framed,
+    report_frame,
+    shown_first,
+    within,
+)
+from tdac_agent.studio.sources import folders_with
 from tdac_envs.core.intake import read_zip
 
 MOST_ROWS = 2_000
@@ -44,6 +53,16 @@ def add(place: Path) -> None:
             found.clear()
             with found:
                 _show_table(rows)
+
+    @ui.page("/campaign")
+    async def campaign(at: str = "") -> None:
+        with framed(at or "Campaign"):
+            folder = within(place, at)
+            if folder is None or not (folder / CONFIG_FILE).is_file():
+                ui.label(f"There is no campaign {at!r} here.").classes("problem")
+                return
+            ui.label(at).classes("text-xl font-bold")
+            report_frame(at, str(time.time_ns()))
 
 
 def rows_in(place: Path) -> list[dict[str, Any]]:
@@ -125,21 +144,15 @@ def _show_table(rows: list[dict[str, Any]]) -> None:
 
 def _show_others(place: Path) -> None:
     """Campaigns and benches, and commands that still run."""
-    campaigns = [path.parent for path in place.glob(f"*/{CONFIG_FILE}")]
-    campaigns += [path.parent for path in place.glob(f"*/*/{CONFIG_FILE}")]
-    benches = [path.parent for path in place.glob("*/bench.json")]
-    benches += [path.parent for path in place.glob("*/*/bench.json")]
-    for title, folders, page in (
-        ("Campaigns", campaigns, "/report"),
-        ("Benches", benches, "/file"),
+    for title, file, page in (
+        ("Campaigns", CONFIG_FILE, "/campaign"),
+        ("Benches", RESULTS, "/bench"),
     ):
-        if not folders:
-            continue
-        ui.label(title).classes("text-lg font-bold")
-        for folder in sorted(folders):
-            at = str(folder.relative_to(place))
-            target = at if page == "/report" else f"{at}/bench.html"
-            ui.link(at, address_of(page, target), new_tab=True)
+        found = folders_with(place, file)
+        if found:
+            ui.label(title).classes("text-lg font-bold")
+        for at in found:
+            ui.link(at, address_of(page, at))
     running = [job for job in jobs(place) if job.running]
     if running:
         ui.label("At work").classes("text-lg font-bold")

@@ -137,7 +137,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
 def test_no_request_leaves_this_machine(browser, page, studio):
     """Nor does a page of it load anything from elsewhere."""
     names = "return performance.getEntriesByType('resource').map((e) => e.name)"
-    for path in ("/", "/runs", "/worlds"):
+    for path in ("/", "/runs", "/worlds", "/benches"):
         browser.get(studio.base + path)
         says(browser, "tdac studio")
         time.sleep(1)
@@ -226,6 +226,51 @@ def test_the_keyboard_alone(page, plan):
     wait(page, lambda b: "/run?" in b.current_url)
 
 
+def test_the_form_of_a_bench_shows_its_command(page, studio):
+    """It starts nothing without worlds; a bench is a page with the studio's links."""
+    page.get(f"{studio.base}/benches")
+    says(page, "tdac bench builtin follow-the-gap --set unknown --split test -n 20")
+    field = number(page, "worlds of each set")
+    field.send_keys(Keys.BACKSPACE, Keys.BACKSPACE)
+    says(page, "Choose entrants, task sets and the number of worlds.")
+    path = "//button[.//span[normalize-space()='Start the bench']]"
+    assert not page.find_element(By.XPATH, path).is_enabled()
+    made = studio.place / "runs" / "bench-made"
+    made.mkdir(parents=True)
+    (made / "bench.json").write_text("{}")
+    (made / "bench.html").write_text("<h1>Who is better</h1>")
+    page.get(f"{studio.base}/runs")
+    wait(page, lambda b: b.find_element(By.LINK_TEXT, "runs/bench-made")).click()
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
+    assert page.find_element(By.CSS_SELECTOR, "header a[href='/runs']").is_displayed()
+    page.switch_to.frame(page.find_element(By.CSS_SELECTOR, "iframe.report"))
+    says(page, "Who is better")
+    page.switch_to.default_content()
+    shutil.rmtree(made)
+
+
+@pytest.mark.slow
+def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
+    page.get(f"{studio.base}/benches")
+    field = number(page, "worlds of each set")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("2")
+    says(page, "--split test -n 2")
+    press(page, "Start the bench")
+    says(page, "of 2 drives ended")
+    address = page.current_url
+    page.get(f"{studio.base}/benches")
+    wait(page, lambda b: b.find_element(By.LINK_TEXT, "runs/bench-1"))
+    page.get(address)
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
+    frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
+    page.switch_to.frame(frame)
+    says(page, "2 entrants on unknown")
+    page.switch_to.default_content()
+    found = json.loads((studio.place / "runs/bench-1/bench.json").read_text())
+    assert found["entrants"] == ["builtin", "follow-the-gap"]
+
+
 def test_a_world_is_driven_by_the_keyboard(page, studio):
     """Straight ahead, the robot of this world meets a wall within seconds."""
     page.get(f"{studio.base}/worlds?level=unknown")
@@ -244,7 +289,7 @@ def test_a_world_is_driven_by_the_keyboard(page, studio):
 @pytest.mark.parametrize("size", SIZES)
 def test_nothing_is_cut_off(page, studio, size):
     resize(page, size)
-    for path in ("/", "/runs", "/worlds"):
+    for path in ("/", "/runs", "/worlds", "/benches"):
         page.get(studio.base + path)
         says(page, "tdac studio")
         time.sleep(1)

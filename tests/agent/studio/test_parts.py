@@ -24,7 +24,8 @@ from tdac_agent.studio.board import board_of, names_of
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.jobs import job_of, jobs, start
+from tdac_agent.studio.jobs import Job, job_of, jobs, start
+from tdac_agent.studio.pages.bench import named_entrants, progress_of
 from tdac_agent.studio.pages.home import fitting_radius, sentence_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run import about_given, is_from_elsewhere
@@ -114,7 +115,9 @@ def test_a_path_through_the_narrower_of_two_doors(tmp_path):
     wide = check(replace(draft, radius=25.0), board, tmp_path)
     assert wide.narrowest.width == pytest.approx(80.0, abs=0.1)
     assert "(bar) is 80 px wide: room for a radius of" in sentence_of(wide, board)[0]
-    near = check(replace(draft, start=(25.0, 210.0), goal=(60.0, 210.0)), board, tmp_path)
+    near = check(
+        replace(draft, start=(25.0, 210.0), goal=(60.0, 210.0)), board, tmp_path
+    )
     assert near.narrowest.at == "start"
     assert near.narrowest.width == pytest.approx(2 * 17.5, abs=0.1)
     assert "narrowest at the start, 17.5 px from a wall" in sentence_of(near, board)[0]
@@ -150,6 +153,36 @@ def test_a_job_is_found_again(tmp_path):
     (other.folder.with_name("99999")).mkdir()
     (other.folder.with_name("99999") / "job.json").write_text("{")
     assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
+
+
+def test_files_of_one_name_are_told_apart():
+    """Two entrants of a bench cannot have the same name."""
+    files = ["runs/a/controller.py", "x/runs/a/controller.py", "mine.py", "x/mine.py"]
+    words = named_entrants(["builtin", *files, "policies/ppo/policy.zip"])
+    assert words == [
+        "builtin",
+        "a=runs/a/controller.py",
+        "a-2=x/runs/a/controller.py",
+        "mine.py",
+        "mine.py-2=x/mine.py",
+        "ppo=policies/ppo/policy.zip",
+    ]
+
+
+def test_a_bench_tells_how_far_it_is(tmp_path):
+    words = ("bench", "builtin", "dwa", "--set", "known,lost", "-n", "10")
+    job = Job(tmp_path, words, "2026-01-01T00:00:00+00:00", 0, "", "bench-1")
+    assert progress_of(job, tmp_path)[0] == 0.0
+    for name, file in (
+        ("known/a", "set.json"),
+        ("known/b", "unfinished/episodes.jsonl"),
+    ):
+        path = tmp_path / "driven" / name / file
+        path.parent.mkdir(parents=True)
+        path.write_text("{}\n" * 5)
+    share, text = progress_of(job, tmp_path)
+    assert share == pytest.approx(1.5 / 4)
+    assert text.startswith("1 of 4 drives ended, the next one is at world 5 of 10 (")
 
 
 def packed(**files):
