@@ -7,6 +7,7 @@ import math
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import quote
 
 from nicegui import events, ui
 
@@ -87,8 +88,9 @@ class Choosing:
                 self._reading = ui.label().classes("note text-sm")
                 self._notes = ui.column().classes("gap-0")
         await shown_first()
-        await self._open(source)
-        await self._take(task)
+        if self._turn == 0:  # nobody was faster than the page
+            await self._open(source)
+            await self._take(task)
 
     def _build_source(self, source: str) -> None:
         ui.label("1. Map or world").classes("text-lg font-bold")
@@ -313,6 +315,7 @@ class Choosing:
         if fitting is not None:
             self._fit.text = f"Use a radius of {fitting:g} px"
         self._image.content = overlay(board, draft, self._checked)
+        ui.navigate.history.replace(address_with(draft))
         self._show_radius(draft)
         self._refresh_command()
 
@@ -364,6 +367,15 @@ class Choosing:
             ui.notify(f"cannot start: {error.strerror}", type="negative")
             return
         ui.navigate.to(address_of("/run", folder))
+
+
+def address_with(draft: Draft) -> str:
+    """Address of the page with a draft, which loads the page with it again."""
+    address = f"/?source={quote(f'{draft.kind}: {draft.source}')}"
+    values = *(draft.start or ()), draft.heading, *(draft.goal or ()), draft.radius
+    if len(values) < 6 or None in values:
+        return address
+    return f"{address}&task={','.join(f'{value:.6g}' for value in values)}"
 
 
 def _kind(kind: str) -> Kind:

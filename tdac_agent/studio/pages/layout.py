@@ -34,6 +34,9 @@ iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
 .status.running { background: #d6e4f5; }
 .status.not-verified, .status.not-finished { background: #f4d9d2; }
 td a { color: #1d5fae; }
+#lost:not([hidden]) { position: fixed; inset: auto 0 0 0; z-index: 9999;
+  padding: .8em 1.2em; background: #a3280f; color: white; overflow-wrap: anywhere; }
+#popup { display: none; } /* NiceGUI's own word about it */
 pre.output { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .8rem;
   max-height: 16rem; overflow: auto; width: 100%; margin: 0; }
 """

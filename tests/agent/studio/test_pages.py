@@ -11,6 +11,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
+from studio_process import Studio
 
 SECONDS = 60
 SIZES = {"desktop": (1440, 900), "phone": (390, 844)}
@@ -304,12 +305,44 @@ def test_a_killed_server_kills_no_run(browser, page, studio, plan):
     press(page, "Write and verify a controller")
     wait(page, lambda b: "/run?" in b.current_url)
     at = page.current_url.partition("?at=")[2]
+    base = studio.base
     studio.kill()
+    says(page, "The studio has ended, or cannot be reached. Start it again")
+    says(page, str(studio.place))
     studio.start()
-    browser.get_log("browser")  # the connection was lost
-    browser.get(studio.address)
-    wait(browser, lambda b: "token" not in b.current_url)
-    browser.get(f"{studio.base}/run?at={at}")
-    wait(browser, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
-    browser.get(f"{studio.base}/runs")
+    assert studio.base == base  # though it was not told which port to take
+    # The page goes on by itself.
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    assert page.current_url == f"{base}/run?at={at}"
+    wait(page, lambda b: not b.find_element(By.ID, "lost").is_displayed())
+    browser.get(f"{base}/runs")
     says(browser, at)
+    browser.get_log("browser")  # the connection was lost
+
+
+@pytest.mark.slow
+def test_a_page_says_that_another_studio_has_its_port(browser, page, studio, tmp_path):
+    """Its cookie is good for its own folder alone."""
+    browser.get(f"{studio.base}/runs")
+    says(browser, "A run from elsewhere")
+    studio.kill()
+    other = Studio(tmp_path, int(studio.base.rpartition(":")[2]))
+    other.start()
+    says(browser, "open the address that it printed")
+    browser.get(other.address)
+    wait(browser, lambda b: "token" not in b.current_url and b.title.startswith("New"))
+    other.kill()
+    studio.start()
+    browser.get(studio.address)
+    wait(browser, lambda b: "token" not in b.current_url and b.title.startswith("New"))
+    browser.get_log("browser")  # the connection was lost
+
+
+def test_an_address_has_the_chosen_task(page, plan):
+    """Loading the page again loses no click."""
+    open_plan(page, plan)
+    wait(page, lambda b: "task=60,150," in b.current_url)
+    page.refresh()
+    says(page, "A path of")
+    assert number(page, "start x").get_attribute("value") == "60"
+    assert number(page, "goal y").get_attribute("value") == "60"
