@@ -34,6 +34,21 @@ iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
 .status.running { background: #d6e4f5; }
 .status.not-verified, .status.not-finished { background: #f4d9d2; }
 td a { color: #1d5fae; }
+.compared { width: 100%; border-collapse: collapse; background: white;
+  font-size: .9rem; }
+.compared td, .compared th { text-align: left; vertical-align: top; padding: .3em .6em;
+  border-bottom: 1px solid #e4e2da; overflow-wrap: anywhere; width: 35%; }
+.compared td:first-child, .compared th:first-child { width: 1.6em; font-weight: 700;
+  color: #a3280f; padding-right: 0; }
+.compared td:nth-child(2) { color: #5d6068; width: auto; }
+.compared .differs { background: #fbf0da; } .compared .differs td { font-weight: 600; }
+.diff { background: white; border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
+  margin: 0; padding: .6em 0; overflow: auto; max-height: 36rem; font-size: .8rem; }
+.diff > * { display: block; padding: 0 .8em; width: max-content; min-width: 100%;
+  text-decoration: none; }
+.diff ins { background: #e3f5ec; color: #075e3d; }
+.diff del { background: #fcebe4; color: #9a2c05; }
+.diff b { color: #6a61b8; background: #f2f1fa; font-weight: 400; }
 #lost:not([hidden]) { position: fixed; inset: auto 0 0 0; z-index: 9999;
   padding: .8em 1.2em; background: #a3280f; color: white; overflow-wrap: anywhere; }
 #popup { display: none; } /* NiceGUI's own word about it */

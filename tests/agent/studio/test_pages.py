@@ -13,6 +13,8 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 from studio_process import Studio
 
+from tdac_agent.runs.replay import DEMO
+
 SECONDS = 60
 SIZES = {"desktop": (1440, 900), "phone": (390, 844)}
 # A controller that drives straight on, into a wall.
@@ -346,3 +348,27 @@ def test_an_address_has_the_chosen_task(page, plan):
     says(page, "A path of")
     assert number(page, "start x").get_attribute("value") == "60"
     assert number(page, "goal y").get_attribute("value") == "60"
+
+
+def test_two_runs_are_compared(page, studio):
+    """What differs is marked, and the controllers' lines are beside each other."""
+    for name, source in (("one", "A = 1\n<b>B</b>\n"), ("other", "A = 2\n<b>B</b>\n")):
+        folder = studio.place / "runs" / f"compared-{name}"
+        shutil.copytree(DEMO, folder)
+        (folder / "controller.py").write_text(source)
+    record = folder / "run.json"
+    run = json.loads(record.read_text())
+    record.write_text(json.dumps({**run, "seconds": 12345.0}))
+    at = "one=runs/compared-one&other=runs/compared-other"
+    page.get(f"{studio.base}/compare?{at}")
+    says(page, "settings are the same")
+    rows = page.find_elements(By.CSS_SELECTOR, ".compared tr.differs")
+    assert [row.text.split()[:2] for row in rows] == [["≠", "time"]]
+    diff = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "pre.diff"))
+    assert diff.find_element(By.TAG_NAME, "del").text == "-A = 1"
+    assert diff.find_element(By.TAG_NAME, "ins").text == "+A = 2"
+    assert "<b>B</b>" in diff.text  # a controller is data
+    page.get(f"{studio.base}/compare?one=runs/compared-one&other=runs/compared-one")
+    says(page, "Choose two different runs.")
+    for name in ("one", "other"):
+        shutil.rmtree(studio.place / "runs" / f"compared-{name}")

@@ -21,6 +21,12 @@ from tdac_agent.cli.flags import TaskFlags
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.studio.board import board_of, names_of
+from tdac_agent.studio.comparison import (
+    difference,
+    figures_of,
+    lines_of,
+    settings_of,
+)
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
@@ -287,3 +293,32 @@ def test_a_question_with_a_picture_is_recognised(tmp_path):
     asked = "Repair it. The picture `002.picture.png` shows more."
     assert asked_for(tmp_path, asked) == KINDS["edit"]
     assert asked_for(tmp_path, f"{asked} Please.") == "an answer"
+
+
+def test_what_differs_between_two_runs(tmp_path):
+    """Figures, settings of the loop and of the task, and lines of the controllers."""
+    one, other = tmp_path / "one", tmp_path / "other"
+    for folder, radius in ((one, 15.0), (other, 19.0)):
+        shutil.copytree(DEMO, folder)
+        (folder / "task.yaml").write_text(f"name: maze\nrobot: {{radius: {radius}}}\n")
+        (folder / "controller.py").write_text(f"import math\n\nRADIUS = {radius}\n")
+    run = load_run(other)
+    changed = run.model_copy(update={"patience": run.patience + 1, "seconds": 1e4})
+    (other / "run.json").write_text(changed.model_dump_json())
+
+    def differing(values_of):
+        lines = lines_of(values_of(one), values_of(other))
+        return {line.name: (line.one, line.other) for line in lines if line.differs}
+
+    assert differing(figures_of) == {"time": (f"{run.seconds:.1f} s", "10000.0 s")}
+    repairs = str(run.patience), str(run.patience + 1)
+    radii = "15.0", "19.0"
+    assert differing(settings_of) == {
+        "most repairs of each": repairs,
+        "task: robot: radius": radii,
+    }
+    lines = difference(one, other).splitlines()
+    assert lines[3:] == [" import math", " ", "-RADIUS = 15.0", "+RADIUS = 19.0"]
+    assert difference(one, one) == ""
+    (other / "controller.py").unlink()
+    assert difference(one, other) is None
