@@ -30,6 +30,7 @@ from tdac_envs.core.errors import PolarityError, TdacError
 from tdac_envs.grid.plan import path_length
 
 MOST_BYTES = 64 << 20
+ACCEPTED = "image, map.yaml + image, .map, .npy, .wbt"
 FIRST = "map: maze"
 LEAST_RADIUS, RADIUS_STEP = 1.0, 0.5
 ELSEWHERE = 0.5
@@ -75,12 +76,12 @@ class Choosing:
 
     async def show(self, source: str, task: str) -> None:
         """Builds the page."""
-        with ui.row().classes("w-full gap-6 items-start"):
-            with ui.column().classes("w-full lg:w-[26rem] gap-3"):
+        with ui.element("div").classes("choosing"):
+            with ui.column().classes("min-w-0 gap-3"):
                 self._build_source(source)
                 self._build_task()
                 self._build_start()
-            with ui.column().classes("beside grow min-w-[18rem] lg:max-w-[64%] gap-2"):
+            with ui.column().classes("beside min-w-0 gap-2"):
                 self._image = ui.interactive_image(
                     on_mouse=self._clicked, cross="#d55e00"
                 ).classes("board")
@@ -104,26 +105,25 @@ class Choosing:
             with_input=True,
             on_change=lambda event: self._open(event.value),
         ).classes("w-full")
-        self._upload = (
-            ui.upload(
-                label="or drop a file here: image, map.yaml + image, .map, .npy, .wbt",
-                multiple=True,
-                auto_upload=True,
-                max_file_size=MOST_BYTES,
-                on_upload=self._uploaded,
-                on_rejected=lambda: ui.notify(
-                    f"expected {', '.join(OWN)}, of at most {MOST_BYTES >> 20} MB",
-                    type="warning",
-                ),
-            )
-            .classes("w-full")
-            .props('accept="{}"'.format(",".join(OWN)))
-        )
-        self._polarity = ui.toggle(
-            {"": "detect", "dark": "obstacles are dark", "light": "are light"},
-            value="",
-            on_change=lambda: self._open(self._source.value),
-        ).props("no-caps dense")
+        self._upload = ui.upload(
+            label="Drop a file here, or click: image, map.yaml + image, .map, .npy, "
+            ".wbt",
+            multiple=True,
+            auto_upload=True,
+            max_file_size=MOST_BYTES,
+            on_upload=self._uploaded,
+            on_rejected=lambda: ui.notify(
+                f"expected {', '.join(OWN)}, of at most {MOST_BYTES >> 20} MB",
+                type="warning",
+            ),
+        ).props('flat accept="{}"'.format(",".join(OWN)))
+        with ui.row().classes("items-center gap-2") as self._read:
+            ui.label("obstacles")
+            self._polarity = ui.toggle(
+                {"": "detect", "dark": "are dark", "light": "are light"},
+                value="",
+                on_change=lambda: self._open(self._source.value),
+            ).props("no-caps dense")
 
     def _build_task(self) -> None:
         ui.label("2. Start and goal").classes("text-lg font-bold")
@@ -187,7 +187,7 @@ class Choosing:
         with self._notes:
             for note in board.notes:
                 ui.label(note).classes("note text-sm")
-        self._sized.visible = self._polarity.visible = board.kind == "map"
+        self._sized.visible = self._read.visible = board.kind == "map"
         self._radius.value = self._draft.radius or 15
         self._mode.value = "start"
         self._show_numbers(self._draft)

@@ -21,8 +21,15 @@ code.command { display: block; background: #eceae3; padding: .6em .8em;
   font-size: .85rem; width: 100%; }
 .board { width: 100%; border: 1px solid #d4d2c8; border-radius: 6px; overflow: hidden; }
 .board img { width: 100%; cursor: crosshair; }
-@media (min-width: 1024px) { .beside { position: sticky; top: 4rem; } }
-@media (max-width: 1023px) { .beside { order: -1; } }
+.choosing { display: grid; gap: 1.5rem; width: 100%; }
+@media (min-width: 1024px) {
+  .choosing { grid-template-columns: 26rem minmax(0, 1fr); }
+  .beside { position: sticky; top: 4rem; align-self: start; }
+}
+@media (max-width: 1023px) {
+  .choosing { grid-template-columns: minmax(0, 1fr); }
+  .beside { order: -1; }
+}
 .world { width: min(100%, 78vh); }
 .problem { color: #a3280f; } .fine { color: #12694a; } .note { color: #5d6068; }
 iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
@@ -33,6 +40,17 @@ iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
   background: #cfe9dc; }
 .status.running { background: #d6e4f5; }
 .status.not-verified, .status.not-finished { background: #f4d9d2; }
+.q-uploader { width: 100%; max-width: 32rem; border: 2px dashed #bdbab0;
+  border-radius: 8px; background: none; }
+.q-uploader:hover, .q-uploader:focus-within { border-color: #1d5fae; }
+.q-uploader__header { background: none; color: #3d4048; border-radius: 0; }
+.q-uploader__header-content { position: relative; }
+.q-uploader__title { font-size: .9rem; font-weight: 500; line-height: 1.4;
+  white-space: normal; }
+.q-uploader__subtitle, .q-uploader__list { display: none; }
+/* A click anywhere opens the choice of a file. */
+.q-uploader .q-btn, .q-uploader .q-btn .q-btn__content { position: static; }
+.q-uploader__input { inset: 0; width: 100%; height: 100%; }
 td a { color: #1d5fae; }
 .compared { width: 100%; border-collapse: collapse; background: white;
   font-size: .9rem; }
@@ -85,13 +103,14 @@ async def shown_first() -> None:
 
 def shown_command(text: str) -> ui.label:
     """A command as it would be typed, with a button to copy it."""
-    with ui.row().classes("w-full items-center no-wrap gap-2"):
+    with ui.row().classes("w-full items-center no-wrap gap-2") as row:
         code = ui.element("code").classes("command")
         with code:
             label = ui.label(text)
         ui.button(icon="content_copy", on_click=lambda: copied(label.text)).props(
             "flat dense aria-label='Copy the command'"
         )
+    row.bind_visibility_from(label, "text", bool)
     return label
 
 

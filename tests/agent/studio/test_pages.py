@@ -16,7 +16,7 @@ from studio_process import Studio
 from tdac_agent.runs.replay import DEMO
 
 SECONDS = 60
-SIZES = {"desktop": (1440, 900), "phone": (390, 844)}
+SIZES = {"desktop": (1440, 900), "laptop": (1180, 800), "phone": (390, 844)}
 # A controller that drives straight on, into a wall.
 BLIND = """
 def policy(obs):
@@ -74,7 +74,7 @@ def choose(browser, text):
     browser.execute_script("arguments[0].click()", browser.find_element(By.XPATH, path))
 
 
-def upload(browser, file, label="or drop a file"):
+def upload(browser, file, label="Drop a file here"):
     path = f"//div[contains(@class,'q-uploader')][contains(., '{label}')]//input"
     wait(browser, lambda b: b.find_elements(By.XPATH, path))[0].send_keys(str(file))
 
@@ -166,7 +166,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     open_plan(page, plan)
     choose(page, "a controller of my own")
     says(page, "Drop the controller first.")
-    upload(page, tmp_path / "blind.py", "drop controller.py here")
+    upload(page, tmp_path / "blind.py", "Drop controller.py here")
     says(page, "--from .studio/files/blind.py")
     press(page, "Write and verify a controller")
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
@@ -286,6 +286,33 @@ def test_a_world_is_driven_by_the_keyboard(page, studio):
     wait(page, lambda b: "contact" in status.text)
     ActionChains(page).key_up(Keys.ARROW_UP, body).perform()
     assert status.text.endswith(" s")
+
+
+def test_a_phone_shows_all_columns_of_a_run(page, studio):
+    """As a card, with the name of each; the map is beside its controls where it can."""
+    shutil.copytree(DEMO, studio.place / "runs" / "on-a-phone")
+    resize(page, "phone")
+    page.get(f"{studio.base}/runs")
+    cells = "//tr[contains(., 'on-a-phone')]/td"
+    wait(page, lambda b: b.find_elements(By.XPATH, cells))
+    assert page.execute_script(OVERFLOW) <= 0
+    found = page.find_elements(By.XPATH, cells)
+    values = [cell.text for cell in found[1:]]
+    assert values[:4] == ["runs/on-a-phone", "maze", "manual:maze2", "verified"]
+    label = "return getComputedStyle(arguments[0], '::before').content"
+    labels = [page.execute_script(label, cell).strip('"') for cell in found[2:]]
+    assert labels == ["task", "writer", "status", "progress", "cost", "started"]
+    for cell in found:
+        assert 0 <= cell.rect["x"] <= cell.rect["x"] + cell.rect["width"] <= 390
+    shutil.rmtree(studio.place / "runs" / "on-a-phone")
+    resize(page, "laptop")
+    page.get(studio.base)
+    says(page, "A path of")
+    image = page.find_element(By.CSS_SELECTOR, ".board")
+    controls = page.find_element(By.CSS_SELECTOR, ".q-uploader")
+    assert image.rect["y"] < controls.rect["y"]
+    assert image.rect["x"] > controls.rect["x"] + controls.rect["width"]
+    assert image.rect["width"] > 600
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ from tdac_agent.studio.jobs import Job, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
 from tdac_agent.studio.pages.home import fitting_radius, sentence_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
-from tdac_agent.studio.pages.run import about_given, is_from_elsewhere
+from tdac_agent.studio.pages.run import about_given, in_words, is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
@@ -322,3 +322,10 @@ def test_what_differs_between_two_runs(tmp_path):
     assert difference(one, one) == ""
     (other / "controller.py").unlink()
     assert difference(one, other) is None
+
+
+def test_letters_are_in_words():
+    """What the command prints in a line is explained above the report."""
+    line = in_words("✘ k=12 j=3  8 failed: test_progress")
+    assert line == "✘ iteration 12, repair 3  8 failed: test_progress"
+    assert in_words("k=1 j=0  neutral parameters") == "iteration 1  neutral parameters"
