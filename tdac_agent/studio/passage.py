@@ -18,8 +18,8 @@ Point = tuple[float, float]
 Points = NDArray[np.float64]
 BETWEEN = 0.002
 """Distance between two points of a wall of a world, m."""
-SAMPLES = 12
-"""Samples of a path on the length of a body radius."""
+SAMPLES, LEAST_STEP = 12, 0.5
+"""Samples of a path on the length of a body radius, but at least half a px apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +47,14 @@ def passage_on(nominal: Any, path: Points) -> Passage | None:
     """
     if isinstance(nominal, EPuckTask):
         walls = outlines_of(nominal.ground.solid, BETWEEN)
-        radius = nominal.body_radius
+        radius, least = nominal.body_radius, BETWEEN
     elif isinstance(nominal, Map2DTask):
-        walls, radius = corners_of(nominal.terrain.grid.cells), nominal.robot.radius
+        walls = corners_of(nominal.terrain.grid.cells)
+        radius, least = nominal.robot.radius, LEAST_STEP
     else:
         return None
-    return narrowest_passage(path, walls, radius / SAMPLES) if len(path) > 1 else None
+    step = max(radius / SAMPLES, least)
+    return narrowest_passage(path, walls, step) if len(path) > 1 else None
 
 
 def narrowest_passage(path: Points, walls: Points, step: float) -> Passage:
@@ -71,7 +73,7 @@ def narrowest_passage(path: Points, walls: Points, step: float) -> Passage:
     best = min(_at_end(tree, path[0], "start"), _at_end(tree, path[-1], "goal"),
                key=lambda end: end.width)  # fmt: skip
     points, legs = _sampled(path, step)
-    near, _ = tree.query(points)
+    near = np.asarray(tree.query(points)[0])
     for i in np.argsort(near).tolist():
         if 2.0 * near[i] >= best.width:
             break
@@ -97,7 +99,7 @@ def corners_of(cells: BoolGrid) -> Points:
         [padded[:-1, :-1], padded[:-1, 1:], padded[1:, :-1], padded[1:, 1:]]
     )
     rows, columns = np.nonzero(around.any(axis=0) & ~around.all(axis=0))
-    return np.column_stack([columns, rows]) - 0.5
+    return np.column_stack([columns, rows]).astype(np.float64) - 0.5
 
 
 def outlines_of(solid: Prisms, between: float) -> Points:

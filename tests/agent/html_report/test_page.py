@@ -196,7 +196,7 @@ def test_a_run_that_was_killed(copied):
     shown = " ".join("".join(Outline(make_page(copied).html.decode()).shown).split())
     assert "killed" in shown[:200]
     assert "iteration 1, repair 1 verification not finished" in shown
-    assert "Each column is an iteration (k on the command line)" in shown
+    assert "Each number is an iteration (k on the command line)" in shown
     assert "tdac synth --resume run" in shown
 
 
