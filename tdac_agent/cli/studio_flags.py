@@ -15,7 +15,12 @@ app = typer.Typer()
 def studio(
     port: Annotated[
         int,
-        number_flag("--port", min=0, max=65535, help="Port; 0 for a free one."),
+        number_flag(
+            "--port",
+            min=0,
+            max=65535,
+            help="Port; 0 for the last one of this folder, if it is free.",
+        ),
     ] = 0,
     open_it: Annotated[
         bool, typer.Option("--open", help="Open the page in your browser.")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.html_report.names import candidate_name
 from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.runs.history import CandidateHistory, Told
 from tdac_agent.tasks.setting import Nominal
@@ -46,7 +47,7 @@ def animations(told: Told, task: Task, scene: TaskPicture) -> list[dict[str, Any
     return [
         {
             "candidate": f"{one.k}.{one.j}",
-            "label": f"k={one.k} j={one.j}",
+            "label": candidate_name(one.k, one.j),
             "name": episode.name,
             **encoded(task.nominal, scene, trajectory, episode.outcome, most),
         }

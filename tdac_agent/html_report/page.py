@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.code import count_changes, highlighted, shown_diff
+from tdac_agent.html_report.names import candidate_name
 from tdac_agent.html_report.overview import format_seconds, overview_of
 from tdac_agent.html_report.scene import TaskPicture, scene_of
 from tdac_agent.html_report.section import (
@@ -157,6 +158,7 @@ def _environment() -> jinja2.Environment:
     )
     environment.filters |= {
         "broken": grouped_failures,
+        "called": candidate_name,
         "changes": count_changes,
         "diff": shown_diff,
         "duration": format_seconds,

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.studio.board import Board, Kind, Place
+from tdac_agent.studio.passage import Passage, passage_on
 from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.core.errors import TdacError
-from tdac_envs.epuck.task import EPuckTask
-from tdac_envs.grid.grid import clearance_at
 from tdac_envs.map2d.task import Map2DTask
 
 DIGITS = {"px": 1, "m": 3}
@@ -101,17 +100,16 @@ class Checked:
         task: The task, if it can.
         problem: Why not.
         path: Shortest path, shape (n, 2).
-        narrowest: The place on it that is nearest to an obstacle.
-        clearance: Distance from there to the obstacle.
-        widest: Largest body radius that gets through, px; None if it is not known.
+        narrowest: Its narrowest passage.
+        widest: Largest body radius that gets through on any path, px; None if it is not
+            known.
         picture: The map as it was read for this task.
     """
 
     task: Task | None
     problem: str = ""
     path: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    narrowest: Place | None = None
-    clearance: float = 0.0
+    narrowest: Passage | None = None
     widest: float | None = None
     picture: bytes | None = None
 
@@ -133,11 +131,11 @@ def check(draft: Draft, board: Board, place: Path) -> Checked:
         return Checked(None, " ".join(str(error).split()), widest=widest)
     nominal = task.nominal
     path = np.asarray(nominal.shortest_path(nominal.start), np.float64)
-    narrowest, clearance = _narrowest(nominal, path)
+    narrowest = passage_on(nominal, path)
     picture = None
     if board.laid_over is not None and isinstance(nominal, Map2DTask):
         picture = board.laid_over(nominal.terrain.grid.cells)
-    return Checked(task, "", path, narrowest, clearance, widest, picture)
+    return Checked(task, "", path, narrowest, widest, picture)
 
 
 def snapped(draft: Draft, place: Path) -> Draft:
@@ -154,31 +152,6 @@ def snapped(draft: Draft, place: Path) -> Draft:
         start=(float(start[0]), float(start[1])),
         goal=(float(goal[0]), float(goal[1])),
     )
-
-
-def _narrowest(nominal: Any, path: np.ndarray) -> tuple[Place | None, float]:
-    """The place of a path that is nearest to an obstacle, and how near it is."""
-    if len(path) < 2:
-        return None, 0.0
-    dense = _dense(path, nominal.full_step)
-    if isinstance(nominal, EPuckTask):
-        gaps = np.array([nominal.ground.gap(x, y) for x, y in dense])
-    elif isinstance(nominal, Map2DTask):
-        cells, limit = nominal.terrain.grid.cells, 4.0 * nominal.robot.radius
-        gaps = np.array([clearance_at(cells, x, y, limit) for x, y in dense])
-    else:
-        return None, 0.0
-    at = int(gaps.argmin())
-    return (float(dense[at, 0]), float(dense[at, 1])), float(gaps[at])
-
-
-def _dense(path: np.ndarray, step: float) -> np.ndarray:
-    """A path with points at most a step apart."""
-    legs = np.hypot(*np.diff(path, axis=0).T)
-    along = np.concatenate([[0.0], np.cumsum(legs)])
-    count = max(2, math.ceil(along[-1] / max(step, 1e-6)) + 1)
-    places = np.linspace(0.0, along[-1], count)
-    return np.column_stack([np.interp(places, along, path[:, k]) for k in (0, 1)])
 
 
 def _rounded(place: Place, unit: str) -> Place:

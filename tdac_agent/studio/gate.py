@@ -4,12 +4,18 @@ A page of another site, or another user of this machine, can reach a port of the
 loopback interface. So each request needs a cookie that no script can read and no
 other site can send; the host must be this machine, and what changes something must
 come from a page of the studio.
+
+The token is new at each start. The cookie follows from the secret of the installation,
+the folder, the port and the time at which it was given: after a restart on the same
+port, open pages go on.
 """
 
 from __future__ import annotations
 
 import secrets
+import time
 from http.cookies import CookieError, SimpleCookie
+from pathlib import Path
 from urllib.parse import parse_qs
 
 from tdac_agent.loopback import (
@@ -22,6 +28,7 @@ from tdac_agent.loopback import (
     equal,
     headers_of,
 )
+from tdac_agent.tasks.installation import keyed
 
 # A new document loads the page, so that the cookie is sent whatever page had the link.
 _ENTRANCE = (
@@ -29,9 +36,11 @@ _ENTRANCE = (
     '<meta http-equiv="refresh" content="0; url=/"><a href="/">tdac studio</a>'
 )
 _REFUSED = (
-    "Open the address that `tdac studio` printed: this browser has not been let in, "
-    "or the studio has been started again."
+    "Open the address that `tdac studio` printed: it has not let this browser in, or "
+    "not within the last week, or it is the studio of another folder than before."
 )
+LASTING = 7 * 24 * 3600
+"""For how long a cookie is accepted, s."""
 
 
 class Gate:
@@ -40,14 +49,15 @@ class Gate:
     Args:
         app: The application.
         port: Port on which it is reached.
+        place: Folder of the studio. The cookie of another one is not accepted.
 
     Attributes:
         token: The secret that opens a session, in the address that is printed.
     """
 
-    def __init__(self, app: App, port: int) -> None:
+    def __init__(self, app: App, port: int, place: Path) -> None:
         self.token = secrets.token_urlsafe(24)
-        self._app, self._session = app, secrets.token_urlsafe(24)
+        self._app, self._about = app, f"studio|{port}|{place}"
         # Cookies are shared by all ports of a host.
         self._cookie = f"tdac-studio-{port}"
         self._here = Here(port)
@@ -80,7 +90,16 @@ class Gate:
             found = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
         except CookieError:
             return False
-        return found is not None and equal(found.value, self._session)
+        if found is None:
+            return False
+        given = found.value.partition(".")[0]
+        issued = int(given) if given.isascii() and given.isdecimal() else 0
+        is_recent = 0 <= time.time() - issued < LASTING
+        return is_recent and equal(found.value, self._session(issued))
+
+    def _session(self, issued: int) -> str:
+        """The content of a cookie that is given at a time, in seconds since 1970."""
+        return f"{issued}.{keyed(f'{self._about}|{issued}'.encode()).hex()}"
 
     def _has_token(self, scope: Scope) -> bool:
         query = parse_qs(scope["query_string"].decode("latin-1"))
@@ -93,5 +112,6 @@ class Gate:
         )
 
     async def _let_in(self, send: Send) -> None:
-        cookie = f"{self._cookie}={self._session}; HttpOnly; SameSite=Strict; Path=/"
+        content = f"{self._cookie}={self._session(int(time.time()))}"
+        cookie = f"{content}; Max-Age={LASTING}; HttpOnly; SameSite=Strict; Path=/"
         await answer(send, 200, _ENTRANCE, "text/html", ("set-cookie", cookie))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
 import webbrowser
 from collections.abc import Callable
 from contextlib import closing
@@ -12,9 +14,23 @@ import uvicorn
 from nicegui import ui
 
 from tdac_agent.loopback import listen
+from tdac_agent.storage.files import write_atomic
 from tdac_agent.studio.gate import Gate
-from tdac_agent.studio.pages import compare, files, home, run, shelf, worlds
+from tdac_agent.studio.jobs import STATE
+from tdac_agent.studio.pages import (
+    bench,
+    compare,
+    files,
+    home,
+    lost,
+    run,
+    shelf,
+    worlds,
+)
+from tdac_envs.core.intake import read_file
 
+PORT = "port"
+"""File in `.studio` with the port of the last start."""
 MOST_MESSAGES = 100
 """Messages kept for a page that lost its connection, so that memory stays bounded."""
 
@@ -26,16 +42,17 @@ def serve(
 
     Args:
         place: Folder whose files and runs it shows, and in which commands run.
-        port: Port on 127.0.0.1; 0 for a free one.
+        port: Port on 127.0.0.1; 0 for the last one of the folder, if it is free.
         announce: Called with the address once the port is open.
         open_it: Whether to open the address in the user's browser.
 
     Raises:
         OSError: The port cannot be opened.
     """
-    with closing(listen(port)) as opened:
+    place = place.resolve()
+    with closing(opened_port(place, port)) as opened:
         port = opened.getsockname()[1]
-        gate = Gate(_application(place.resolve()), port)
+        gate = Gate(_application(place), port, place)
         address = f"http://127.0.0.1:{port}/?token={gate.token}"
         config = uvicorn.Config(
             gate, log_level="critical", access_log=False, ws_max_size=32 << 20
@@ -46,10 +63,43 @@ def serve(
         uvicorn.Server(config).run(sockets=[opened])
 
 
+def opened_port(place: Path, port: int) -> socket.socket:
+    """Opens a port, and notes it for the next start: bookmarks and open pages have it.
+
+    Args:
+        place: Folder of the studio.
+        port: The port; 0 for the last one of the folder, or else any that is free.
+
+    Raises:
+        OSError: The port cannot be opened.
+    """
+    note = place / STATE / PORT
+    try:
+        opened = listen(port or _noted(note))
+    except OSError:
+        if port:
+            raise
+        opened = listen(0)
+    with contextlib.suppress(OSError):  # a folder that cannot be written can be shown
+        note.parent.mkdir(exist_ok=True)
+        write_atomic(note, f"{opened.getsockname()[1]}\n")
+    return opened
+
+
+def _noted(note: Path) -> int:
+    """The port in a file; 0 if there is none."""
+    try:
+        port = int(read_file(note, 16))
+    except (OSError, ValueError):
+        return 0
+    return port if 1024 <= port < 65536 else 0
+
+
 def _application(place: Path) -> fastapi.FastAPI:
     application = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     files.add(application, place)
-    for page in (compare, home, run, shelf, worlds):
+    lost.add(application, place)
+    for page in (bench, compare, home, run, shelf, worlds):
         page.add(place)
     ui.run_with(
         application,

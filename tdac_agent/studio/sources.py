@@ -39,6 +39,17 @@ def source_of(place: Path, path: Path) -> str | None:
     return f"{kind}: {path.relative_to(place)}"
 
 
+def folders_with(place: Path, file: str) -> list[str]:
+    """Folders with a file, such as that of a bench, in or below a folder.
+
+    Args:
+        place: Folder of the studio.
+        file: Name of the file.
+    """
+    found = {path.parent for at in ("*/", "*/*/") for path in place.glob(at + file)}
+    return sorted(str(folder.relative_to(place)) for folder in found)
+
+
 def _image_of(path: Path) -> bool:
     """Whether a YAML file is that of a ROS map whose image is there."""
     try:

@@ -1,28 +1,33 @@
-"""Two runs side by side."""
+"""Two runs side by side, with what differs between them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import asyncio
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from nicegui import ui
 
-from tdac_agent.library.listing import row_of
-from tdac_agent.models.budget import format_usd
+from tdac_agent.errors import RunError
+from tdac_agent.html_report.code import count_changes, shown_diff
 from tdac_agent.runs.run_record import RUN_FILE
-from tdac_agent.studio.pages.layout import address_of, framed, report_frame, within
+from tdac_agent.studio.comparison import (
+    Line,
+    difference,
+    figures_of,
+    lines_of,
+    settings_of,
+)
+from tdac_agent.studio.pages.layout import (
+    address_of,
+    framed,
+    report_frame,
+    shown_first,
+    within,
+)
 
-FIGURES: dict[str, Callable[[dict[str, Any]], str]] = {
-    "status": lambda row: str(row["status"]),
-    "task": lambda row: str(row.get("task", "")),
-    "writer": lambda row: str(row.get("learner", "")),
-    "iterations": lambda row: f"{row.get('k', '–')} of {row.get('iterations', '–')}",
-    "time": lambda row: f"{row.get('seconds') or 0.0:.0f} s",
-    "tokens": lambda row: f"{row.get('tokens_in', 0) + row.get('tokens_out', 0):,}",
-    "cost": lambda row: "–" if row.get("cost") is None else format_usd(row["cost"]),
-}
-"""Figures of runs beside each other, from the rows of the list."""
+MOST_LINES = 3000
+"""Lines of a diff that are shown."""
 
 
 def add(place: Path) -> None:
@@ -38,23 +43,65 @@ def add(place: Path) -> None:
                     ui.label(f"There is no run {at!r} here.").classes("problem")
                     return
                 runs[at] = folder
-            _show_figures(runs)
-            with ui.row().classes("w-full gap-3"):
-                for at, folder in runs.items():
-                    with ui.column().classes("w-full lg:w-[49%] gap-1"):
-                        ui.link(at, address_of("/run", at)).classes("font-bold")
-                        report_frame(at, str((folder / RUN_FILE).stat().st_mtime_ns))
+            if len(runs) < 2:
+                ui.label("Choose two different runs.").classes("problem")
+                return
+            ui.label("Two runs").classes("text-xl font-bold")
+            await shown_first()
+            await _show(list(runs), list(runs.values()))
 
 
-def _show_figures(runs: dict[str, Path]) -> None:
-    """A table with the figures of runs, a column for each."""
-    rows = {at: row_of(folder) for at, folder in runs.items()}
-    names = ["", *rows]
-    columns = [
-        {"name": name, "label": name, "field": name, "align": "left"} for name in names
-    ]
-    lines = [
-        {"": label, **{at: told(row) for at, row in rows.items()}}
-        for label, told in FIGURES.items()
-    ]
-    ui.table(columns=columns, rows=lines).classes("w-full").props("dense flat")
+async def _show(names: Sequence[str], folders: Sequence[Path]) -> None:
+    try:
+        figures = lines_of(*map(figures_of, folders))
+        settings = lines_of(*map(settings_of, folders))
+    except RunError as error:
+        ui.label(str(error)).classes("problem")
+        return
+    _show_table(names, figures)
+    different = [line for line in settings if line.differs]
+    same = [line for line in settings if not line.differs]
+    ui.label("Settings").classes("text-lg font-bold")
+    if different:
+        _show_table(names, different)
+    with ui.expansion(f"{len(same)} settings are the same").classes("w-full"):
+        _show_table(names, same)
+    ui.label("Controllers").classes("text-lg font-bold")
+    await _show_difference(names, folders)
+    ui.label("Reports").classes("text-lg font-bold")
+    with ui.element("div").classes("w-full grid grid-cols-1 lg:grid-cols-2 gap-3"):
+        for at, folder in zip(names, folders, strict=True):
+            with ui.column().classes("gap-1 min-w-0"):
+                ui.link(at, address_of("/run", at)).classes("font-bold")
+                report_frame(at, str((folder / RUN_FILE).stat().st_mtime_ns))
+
+
+def _show_table(names: Sequence[str], lines: Sequence[Line]) -> None:
+    """A table with a column for each run; what differs is marked."""
+    with ui.element("table").classes("compared"):
+        with ui.element("tr"):
+            for name in ("", "", *names):
+                with ui.element("th"):
+                    ui.label(name)
+        for line in lines:
+            with ui.element("tr").classes("differs" if line.differs else ""):
+                mark = "≠" if line.differs else ""
+                for text in (mark, line.name, line.one, line.other):
+                    with ui.element("td"):
+                        ui.label(text)
+
+
+async def _show_difference(names: Sequence[str], folders: Sequence[Path]) -> None:
+    """What the second controller has in place of the first one's lines."""
+    diff = await asyncio.to_thread(difference, *folders)
+    if diff is None:
+        ui.label("One of the runs has no controller.").classes("note")
+    elif not diff:
+        ui.label("The controllers are the same.").classes("note")
+    else:
+        added, removed = count_changes(diff)
+        ui.label(
+            f"{removed} lines are in {names[0]} alone (−), {added} in {names[1]} "
+            "alone (+)."
+        ).classes("note")
+        ui.html(shown_diff(diff, MOST_LINES), tag="pre").classes("diff")

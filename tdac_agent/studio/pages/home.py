@@ -7,6 +7,7 @@ import math
 import shlex
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import quote
 
 from nicegui import events, ui
 
@@ -29,8 +30,12 @@ from tdac_envs.core.errors import PolarityError, TdacError
 from tdac_envs.grid.plan import path_length
 
 MOST_BYTES = 64 << 20
+ACCEPTED = "image, map.yaml + image, .map, .npy, .wbt"
 FIRST = "map: maze"
 LEAST_RADIUS, RADIUS_STEP = 1.0, 0.5
+ELSEWHERE = 0.5
+"""By how much half of a passage must be less than the widest radius, px, if that gets
+through elsewhere: it is measured between walls, the radius from pixel to pixel."""
 # A file that is dropped beside the box would replace the page.
 DROP = """<script>
 addEventListener("dragover", (event) => event.preventDefault());
@@ -71,12 +76,12 @@ class Choosing:
 
     async def show(self, source: str, task: str) -> None:
         """Builds the page."""
-        with ui.row().classes("w-full gap-6 items-start"):
-            with ui.column().classes("w-full lg:w-[26rem] gap-3"):
+        with ui.element("div").classes("choosing"):
+            with ui.column().classes("min-w-0 gap-3"):
                 self._build_source(source)
                 self._build_task()
                 self._build_start()
-            with ui.column().classes("beside grow min-w-[18rem] lg:max-w-[64%] gap-2"):
+            with ui.column().classes("beside min-w-0 gap-2"):
                 self._image = ui.interactive_image(
                     on_mouse=self._clicked, cross="#d55e00"
                 ).classes("board")
@@ -84,8 +89,9 @@ class Choosing:
                 self._reading = ui.label().classes("note text-sm")
                 self._notes = ui.column().classes("gap-0")
         await shown_first()
-        await self._open(source)
-        await self._take(task)
+        if self._turn == 0:  # nobody was faster than the page
+            await self._open(source)
+            await self._take(task)
 
     def _build_source(self, source: str) -> None:
         ui.label("1. Map or world").classes("text-lg font-bold")
@@ -99,26 +105,25 @@ class Choosing:
             with_input=True,
             on_change=lambda event: self._open(event.value),
         ).classes("w-full")
-        self._upload = (
-            ui.upload(
-                label="or drop a file here: image, map.yaml + image, .map, .npy, .wbt",
-                multiple=True,
-                auto_upload=True,
-                max_file_size=MOST_BYTES,
-                on_upload=self._uploaded,
-                on_rejected=lambda: ui.notify(
-                    f"expected {', '.join(OWN)}, of at most {MOST_BYTES >> 20} MB",
-                    type="warning",
-                ),
-            )
-            .classes("w-full")
-            .props('accept="{}"'.format(",".join(OWN)))
-        )
-        self._polarity = ui.toggle(
-            {"": "detect", "dark": "obstacles are dark", "light": "are light"},
-            value="",
-            on_change=lambda: self._open(self._source.value),
-        ).props("no-caps dense")
+        self._upload = ui.upload(
+            label="Drop a file here, or click: image, map.yaml + image, .map, .npy, "
+            ".wbt",
+            multiple=True,
+            auto_upload=True,
+            max_file_size=MOST_BYTES,
+            on_upload=self._uploaded,
+            on_rejected=lambda: ui.notify(
+                f"expected {', '.join(OWN)}, of at most {MOST_BYTES >> 20} MB",
+                type="warning",
+            ),
+        ).props('flat accept="{}"'.format(",".join(OWN)))
+        with ui.row().classes("items-center gap-2") as self._read:
+            ui.label("obstacles")
+            self._polarity = ui.toggle(
+                {"": "detect", "dark": "are dark", "light": "are light"},
+                value="",
+                on_change=lambda: self._open(self._source.value),
+            ).props("no-caps dense")
 
     def _build_task(self) -> None:
         ui.label("2. Start and goal").classes("text-lg font-bold")
@@ -182,7 +187,7 @@ class Choosing:
         with self._notes:
             for note in board.notes:
                 ui.label(note).classes("note text-sm")
-        self._sized.visible = self._polarity.visible = board.kind == "map"
+        self._sized.visible = self._read.visible = board.kind == "map"
         self._radius.value = self._draft.radius or 15
         self._mode.value = "start"
         self._show_numbers(self._draft)
@@ -301,7 +306,7 @@ class Choosing:
             if turn != self._turn:
                 return
             self._checked = checked
-            self._tell(*_sentence(checked, board))
+            self._tell(*sentence_of(checked, board))
             self._show_picture(checked.picture or board.png)
         stuck = self._checked is not None and self._checked.task is None
         fitting = fitting_radius(draft, self._checked) if stuck else None
@@ -310,6 +315,7 @@ class Choosing:
         if fitting is not None:
             self._fit.text = f"Use a radius of {fitting:g} px"
         self._image.content = overlay(board, draft, self._checked)
+        ui.navigate.history.replace(address_with(draft))
         self._show_radius(draft)
         self._refresh_command()
 
@@ -363,6 +369,15 @@ class Choosing:
         ui.navigate.to(address_of("/run", folder))
 
 
+def address_with(draft: Draft) -> str:
+    """Address of the page with a draft, which loads the page with it again."""
+    address = f"/?source={quote(f'{draft.kind}: {draft.source}')}"
+    values = *(draft.start or ()), draft.heading, *(draft.goal or ()), draft.radius
+    if len(values) < 6 or None in values:
+        return address
+    return f"{address}&task={','.join(f'{value:.6g}' for value in values)}"
+
+
 def _kind(kind: str) -> Kind:
     return "world" if kind == "world" else "map"
 
@@ -380,7 +395,7 @@ def fitting_radius(draft: Draft, checked: Checked | None) -> float | None:
     return fitting if LEAST_RADIUS <= fitting < draft.radius else None
 
 
-def _sentence(checked: Checked, board: Board) -> tuple[str, bool]:
+def sentence_of(checked: Checked, board: Board) -> tuple[str, bool]:
     """What was found, and whether it is good."""
     if checked.task is None:
         return checked.problem, False
@@ -389,9 +404,21 @@ def _sentence(checked: Checked, board: Board) -> tuple[str, bool]:
         f"A path of {path_length(checked.path):.4g} {board.unit}; the goal is reached "
         f"within {reach:.3g} {board.unit} (disc)"
     )
-    if checked.narrowest is not None:
-        text += (
-            f"; its narrowest place is {checked.clearance:.3g} {board.unit} from an "
-            f"obstacle (ring)"
-        )
-    return f"{text}.", True
+    return f"{text}.{_about_passage(checked, board.unit)}", True
+
+
+def _about_passage(checked: Checked, unit: str) -> str:
+    """How wide the narrowest passage of the path is, and for which robots."""
+    narrowest, widest = checked.narrowest, checked.widest
+    if narrowest is None:
+        return ""
+    if narrowest.at != "path":
+        away = narrowest.width / 2.0
+        text = f"It is narrowest at the {narrowest.at}, {away:.3g} {unit} from a wall"
+    else:
+        text = f"Its narrowest passage (bar) is {narrowest.width:.3g} {unit} wide"
+    if widest is None:
+        return f" {text}."
+    if narrowest.width / 2.0 > widest - ELSEWHERE:
+        return f" {text}: room for a radius of {widest:g} {unit}."
+    return f" {text}; another path has room for a radius of {widest:g} {unit}."

@@ -21,23 +21,66 @@ code.command { display: block; background: #eceae3; padding: .6em .8em;
   font-size: .85rem; width: 100%; }
 .board { width: 100%; border: 1px solid #d4d2c8; border-radius: 6px; overflow: hidden; }
 .board img { width: 100%; cursor: crosshair; }
-@media (min-width: 1024px) { .beside { position: sticky; top: 4rem; } }
-@media (max-width: 1023px) { .beside { order: -1; } }
+.choosing { display: grid; gap: 1.5rem; width: 100%; }
+@media (min-width: 1024px) {
+  .choosing { grid-template-columns: 26rem minmax(0, 1fr); }
+  .beside { position: sticky; top: 4rem; align-self: start; }
+}
+@media (max-width: 1023px) {
+  .choosing { grid-template-columns: minmax(0, 1fr); }
+  .beside { order: -1; }
+}
 .world { width: min(100%, 78vh); }
 .problem { color: #a3280f; } .fine { color: #12694a; } .note { color: #5d6068; }
 iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
   height: 82vh; background: white; }
 .status { border-radius: 999px; padding: .1em .7em; font-weight: 600;
   background: #e4e2da; }
-.status.verified, .status.selected, .status.trained { background: #cfe9dc; }
-.status.running { background: #d6e4f5; } .status.not-verified { background: #f4d9d2; }
+.status.verified, .status.selected, .status.trained, .status.finished {
+  background: #cfe9dc; }
+.status.running { background: #d6e4f5; }
+.status.not-verified, .status.not-finished { background: #f4d9d2; }
+.q-uploader { width: 100%; max-width: 32rem; border: 2px dashed #bdbab0;
+  border-radius: 8px; background: none; }
+.q-uploader:hover, .q-uploader:focus-within { border-color: #1d5fae; }
+.q-uploader__header { background: none; color: #3d4048; border-radius: 0; }
+.q-uploader__header-content { position: relative; }
+.q-uploader__title { font-size: .9rem; font-weight: 500; line-height: 1.4;
+  white-space: normal; }
+.q-uploader__subtitle, .q-uploader__list { display: none; }
+/* A click anywhere opens the choice of a file. */
+.q-uploader .q-btn, .q-uploader .q-btn .q-btn__content { position: static; }
+.q-uploader__input { inset: 0; width: 100%; height: 100%; }
 td a { color: #1d5fae; }
+.compared { width: 100%; border-collapse: collapse; background: white;
+  font-size: .9rem; }
+.compared td, .compared th { text-align: left; vertical-align: top; padding: .3em .6em;
+  border-bottom: 1px solid #e4e2da; overflow-wrap: anywhere; width: 35%; }
+.compared td:first-child, .compared th:first-child { width: 1.6em; font-weight: 700;
+  color: #a3280f; padding-right: 0; }
+.compared td:nth-child(2) { color: #5d6068; width: auto; }
+.compared .differs { background: #fbf0da; } .compared .differs td { font-weight: 600; }
+.diff { background: white; border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
+  margin: 0; padding: .6em 0; overflow: auto; max-height: 36rem; font-size: .8rem; }
+.diff > * { display: block; padding: 0 .8em; width: max-content; min-width: 100%;
+  text-decoration: none; }
+.diff ins { background: #e3f5ec; color: #075e3d; }
+.diff del { background: #fcebe4; color: #9a2c05; }
+.diff b { color: #6a61b8; background: #f2f1fa; font-weight: 400; }
+#lost:not([hidden]) { position: fixed; inset: auto 0 0 0; z-index: 9999;
+  padding: .8em 1.2em; background: #a3280f; color: white; overflow-wrap: anywhere; }
+#popup { display: none; } /* NiceGUI's own word about it */
 pre.output { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .8rem;
   max-height: 16rem; overflow: auto; width: 100%; margin: 0; }
 """
 PATIENCE = 120.0
 """Seconds that a browser may need to show a page."""
-LINKS = (("New controller", "/"), ("Runs", "/runs"), ("Worlds", "/worlds"))
+LINKS = {
+    "New controller": "/",
+    "Runs": "/runs",
+    "Worlds": "/worlds",
+    "Benches": "/benches",
+}
 
 
 @contextmanager
@@ -46,8 +89,8 @@ def framed(title: str) -> Generator[None]:
     ui.add_css(STYLE)
     ui.page_title(f"{title} – tdac studio")
     with ui.header().classes("items-center gap-4 py-2"):
-        ui.label("tdac studio").classes("text-lg font-bold")
-        for name, address in LINKS:
+        ui.label("tdac studio").classes("text-lg font-bold max-sm:hidden")
+        for name, address in LINKS.items():
             ui.link(name, address).classes("text-white no-underline")
     with ui.column().classes("w-full gap-3 px-1"):
         yield
@@ -60,13 +103,14 @@ async def shown_first() -> None:
 
 def shown_command(text: str) -> ui.label:
     """A command as it would be typed, with a button to copy it."""
-    with ui.row().classes("w-full items-center no-wrap gap-2"):
+    with ui.row().classes("w-full items-center no-wrap gap-2") as row:
         code = ui.element("code").classes("command")
         with code:
             label = ui.label(text)
         ui.button(icon="content_copy", on_click=lambda: copied(label.text)).props(
             "flat dense aria-label='Copy the command'"
         )
+    row.bind_visibility_from(label, "text", bool)
     return label
 
 
@@ -108,7 +152,16 @@ def status_badge(status: str) -> None:
 
 def report_frame(at: str, version: str) -> None:
     """The report of a run in one of its states."""
+    _frame(f"{address_of('/report', at)}&version={version}#play", f"Report on {at}")
+
+
+def file_frame(at: str, version: str, title: str) -> None:
+    """A page that was written to the folder, in one of its states."""
+    _frame(f"{address_of('/file', at)}&version={version}", title)
+
+
+def _frame(address: str, title: str) -> None:
+    """A page in a frame without any rights."""
     ui.element("iframe").classes("report").props(
-        f'src="{address_of("/report", at)}&version={version}#play" '
-        f'sandbox="allow-scripts" title="Report on {at}"'
+        f'src="{address}" sandbox="allow-scripts" title="{title}"'
     )

@@ -9,9 +9,12 @@ import numpy as np
 
 from tdac_agent.studio.board import Board
 from tdac_agent.studio.draft import Checked, Draft
+from tdac_agent.studio.passage import Passage
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 PATH, ROBOT, GOAL, NARROW = "#5848c6", "#5848c6", "#12694a", "#d55e00"
+BAR = 4.0
+"""Half length of the bars at the ends of a passage, in widths of a thin line."""
 
 
 def overlay(board: Board, draft: Draft, checked: Checked | None) -> str:
@@ -21,9 +24,7 @@ def overlay(board: Board, draft: Draft, checked: Checked | None) -> str:
     if checked is not None and len(checked.path) > 1:
         parts.append(_polyline(board, checked.path, thick))
     if checked is not None and checked.narrowest is not None:
-        ((x, y),) = board.at([checked.narrowest]).tolist()
-        radius = max(2.0 * checked.clearance * board.scale, 8 * thick)
-        parts.append(_circle(x, y, radius, "none", NARROW, 2 * thick))
+        parts.append(_gap(board, checked.narrowest, thick))
     if draft.goal is not None:
         ((x, y),) = board.at([draft.goal]).tolist()
         size = 5 * thick
@@ -56,6 +57,24 @@ def _robot(
         f'<line x1="{x:.1f}" y1="{y:.1f}" x2="{end[0]:.1f}" y2="{end[1]:.1f}" '
         f'stroke="{ROBOT}" stroke-width="{1.6 * thick:.2f}" stroke-linecap="round"/>',
     ]
+
+
+def _gap(board: Board, narrowest: Passage, thick: float) -> str:
+    """A passage: a line between its ends, with a bar across each end."""
+    (x, y), (to_x, to_y) = board.at(narrowest.ends).tolist()
+    far = math.hypot(to_x - x, to_y - y) or 1.0
+    over, down = ((to_y - y) / far, (x - to_x) / far)
+    lines = [(x, y, to_x, to_y)]
+    for at_x, at_y in ((x, y), (to_x, to_y)):
+        more_x, more_y = BAR * thick * over, BAR * thick * down
+        lines.append((at_x - more_x, at_y - more_y, at_x + more_x, at_y + more_y))
+    path = " ".join(f"M{a:.1f},{b:.1f}L{c:.1f},{d:.1f}" for a, b, c, d in lines)
+    # A light edge tells it from walls and from the path.
+    return "".join(
+        f'<path d="{path}" class="gap" fill="none" stroke="{colour}" '
+        f'stroke-width="{width * thick:.2f}" stroke-linecap="round"/>'
+        for colour, width in (("white", 3.4), (NARROW, 1.8))
+    )
 
 
 def _polyline(board: Board, path: Any, thick: float) -> str:

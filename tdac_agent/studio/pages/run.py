@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import shlex
 from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
+from tdac_agent.html_report.names import candidate_name
 from tdac_agent.library.listing import row_of
 from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
 from tdac_agent.runs.run_record import RUN_FILE, load_run
@@ -27,6 +29,7 @@ from tdac_agent.studio.pages.robustness import Robustness
 from tdac_envs.core.errors import TdacError
 
 ELSEWHERE = "This run was not begun here: its verdict is what its files say."
+LETTERS = "k: the iteration; j: the repair of its candidate, 0 for the first version."
 SECONDS = 1.0
 """Between two looks at the folder."""
 
@@ -82,8 +85,10 @@ class Watching:
         self._report = ui.column().classes("w-full")
         self._robust = Robustness(self._place, self._at)
         printed = ui.expansion("What the command printed").classes("w-full")
-        with printed, ui.element("pre").classes("output"):
-            self._output = ui.label()
+        with printed:
+            ui.label(LETTERS).classes("note text-sm")
+            with ui.element("pre").classes("output"):
+                self._output = ui.label()
         await shown_first()
         await self._look()
         ui.timer(SECONDS, self._look)
@@ -146,7 +151,7 @@ class Watching:
         if running and job is not None:
             text += f" ({job.seconds:.0f} s)"
             last = output.strip().splitlines()[-1:]
-            text += f": {last[0].strip()}" if last else ""
+            text += f": {in_words(last[0].strip())}" if last else ""
         self._now.text = text
         judged = job_of(self._place, self._verdict_about)
         self._verdict.visible = judged is not None
@@ -239,6 +244,15 @@ def _progress(row: dict[str, Any], running: bool) -> str:
     if row.get("reason"):
         text += f"; {row['reason']}"
     return text
+
+
+def in_words(line: str) -> str:
+    """A printed line with `iteration 2, repair 1` for `k=2 j=1`."""
+    return re.sub(r"\bk=(\d+) j=(\d+)", lambda found: _called(*found.groups()), line)
+
+
+def _called(k: str, j: str) -> str:
+    return candidate_name(int(k), int(j))
 
 
 def about_given(folder: Path) -> str:

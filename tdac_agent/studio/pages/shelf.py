@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -10,22 +11,46 @@ from urllib.parse import quote
 
 from nicegui import events, ui
 
+from tdac_agent.bench.bench import RESULTS
 from tdac_agent.campaign.drive import CONFIG_FILE
 from tdac_agent.library.listing import folders_of, row_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
 from tdac_agent.studio.jobs import jobs
-from tdac_agent.studio.pages.layout import address_of, framed, shown_first
+from tdac_agent.studio.pages.layout import (
+    address_of,
+    framed,
+    report_frame,
+    shown_first,
+    within,
+)
+from tdac_agent.studio.sources import folders_with
 from tdac_envs.core.intake import read_zip
 
+NONE = "–"
 MOST_ROWS = 2_000
 MOST_UPLOAD = 256 << 20
 MOST_UNPACKED = 1 << 30
 _known: dict[Path, tuple[tuple[int, ...], dict[str, Any]]] = {}
 COLUMNS = [
     {"name": name, "label": name, "field": name, "align": "left", "sortable": True}
-    for name in ("run", "task", "writer", "status", "k", "cost", "started")
+    for name in ("run", "task", "writer", "status", "progress", "cost", "started")
 ]
+# On a narrow page each run is a card, so that no column is hidden.
+CARDS = """
+.runs tbody tr { display: grid; grid-template-columns: 2.6rem 1fr 1fr; padding: .5rem;
+  border-bottom: 1px solid #e4e2da; }
+.runs thead { display: none; }
+.runs tbody td { border: none; height: auto; padding: .15rem .3rem;
+  white-space: normal; overflow-wrap: anywhere; }
+.runs tbody td:nth-child(1) { grid-row: 1 / 5; }
+.runs tbody td:nth-child(2) { grid-column: 2 / 4; font-weight: 600; }
+.runs tbody td:nth-child(n+3)::before { position: static; display: block;
+  background: none; font-size: .75rem; color: #5d6068; }
+""" + "".join(
+    f'.runs tbody td:nth-child({number})::before {{ content: "{column["label"]}"; }}\n'
+    for number, column in enumerate(COLUMNS[1:], 3)
+)
 
 
 def add(place: Path) -> None:
@@ -34,6 +59,7 @@ def add(place: Path) -> None:
     @ui.page("/runs")
     async def page() -> None:
         with framed("Runs"):
+            ui.add_css(f"@media (max-width: 699px) {{ {CARDS} }}")
             found = ui.column().classes("w-full")
             with found:
                 ui.label("reading the folder …").classes("note")
@@ -44,6 +70,16 @@ def add(place: Path) -> None:
             found.clear()
             with found:
                 _show_table(rows)
+
+    @ui.page("/campaign")
+    async def campaign(at: str = "") -> None:
+        with framed(at or "Campaign"):
+            folder = within(place, at)
+            if folder is None or not (folder / CONFIG_FILE).is_file():
+                ui.label(f"There is no campaign {at!r} here.").classes("problem")
+                return
+            ui.label(at).classes("text-xl font-bold")
+            report_frame(at, str(time.time_ns()))
 
 
 def rows_in(place: Path) -> list[dict[str, Any]]:
@@ -70,16 +106,16 @@ def _row(folder: Path) -> dict[str, Any]:
 
 def _cells(place: Path, row: dict[str, Any]) -> dict[str, Any]:
     run = str(Path(row["run"]).resolve().relative_to(place))
-    k = f"{row['k']}/{row['iterations']}" if "k" in row else ""
+    iteration = f"iteration {row['k']} of {row['iterations']}" if "k" in row else NONE
     cost = row.get("cost")
     return {
         "run": run,
         "address": address_of("/run", run) if "steps" not in row else "",
-        "task": str(row.get("task", "")),
-        "writer": row.get("learner", ""),
+        "task": str(row.get("task", NONE)),
+        "writer": row.get("learner", NONE),
         "status": row["status"],
-        "k": k or (f"{row['steps']:,} steps" if "steps" in row else ""),
-        "cost": format_usd(cost) if cost else "",
+        "progress": f"{row['steps']:,} steps" if "steps" in row else iteration,
+        "cost": format_usd(cost) if cost else NONE,
         "started": _when(row.get("started", "")),
     }
 
@@ -101,7 +137,12 @@ def _show_table(rows: list[dict[str, Any]]) -> None:
         row_key="run",
         selection="multiple",
         pagination={"rowsPerPage": 25},
-    ).classes("w-full")
+    ).classes("w-full runs")
+    table.add_slot(
+        "body-cell-status",
+        '<q-td :props="props"><span :class="`status ${props.value.replaceAll(\' \', '
+        "'-')}`\">{{ props.value }}</span></q-td>",
+    )
     table.add_slot(
         "body-cell-run",
         '<q-td :props="props"><a v-if="props.row.address" :href="props.row.address">'
@@ -120,26 +161,22 @@ def _show_table(rows: list[dict[str, Any]]) -> None:
             else:
                 ui.notify("select two runs", type="info")
 
-        ui.button("Two side by side", on_click=compare).props("flat no-caps")
+        ui.button("Compare two", icon="compare_arrows", on_click=compare).props(
+            "outline no-caps"
+        )
 
 
 def _show_others(place: Path) -> None:
     """Campaigns and benches, and commands that still run."""
-    campaigns = [path.parent for path in place.glob(f"*/{CONFIG_FILE}")]
-    campaigns += [path.parent for path in place.glob(f"*/*/{CONFIG_FILE}")]
-    benches = [path.parent for path in place.glob("*/bench.json")]
-    benches += [path.parent for path in place.glob("*/*/bench.json")]
-    for title, folders, page in (
-        ("Campaigns", campaigns, "/report"),
-        ("Benches", benches, "/file"),
+    for title, file, page in (
+        ("Campaigns", CONFIG_FILE, "/campaign"),
+        ("Benches", RESULTS, "/bench"),
     ):
-        if not folders:
-            continue
-        ui.label(title).classes("text-lg font-bold")
-        for folder in sorted(folders):
-            at = str(folder.relative_to(place))
-            target = at if page == "/report" else f"{at}/bench.html"
-            ui.link(at, address_of(page, target), new_tab=True)
+        found = folders_with(place, file)
+        if found:
+            ui.label(title).classes("text-lg font-bold")
+        for at in found:
+            ui.link(at, address_of(page, at))
     running = [job for job in jobs(place) if job.running]
     if running:
         ui.label("At work").classes("text-lg font-bold")
@@ -161,13 +198,13 @@ def _show_upload(place: Path) -> None:
 
     ui.label("A run from elsewhere").classes("text-lg font-bold")
     ui.label(
-        "Drop a run folder as a .zip. It is shown as data: nothing in it runs unless "
-        "you continue it and agree to what it asks for."
+        "A run folder as a .zip file is shown as data: nothing in it runs unless you "
+        "continue it and agree to what it asks for."
     ).classes("note")
     ui.upload(
-        label="run folder as .zip", auto_upload=True, max_file_size=MOST_UPLOAD,
-        on_upload=uploaded,
-    ).props("accept=.zip")  # fmt: skip
+        label="Drop a .zip here, or click", auto_upload=True,
+        max_file_size=MOST_UPLOAD, on_upload=uploaded,
+    ).props("flat accept=.zip")  # fmt: skip
 
 
 def unpack(data: bytes, name: str, parent: Path) -> Path:

@@ -114,7 +114,9 @@ class Looking:
             ).classes("w-64")
             ui.button("Watch", on_click=self._watch)
         self._command = shown_command("")
-        self._films = ui.row().classes("w-full no-wrap gap-3")
+        self._films = ui.element("div").classes(
+            "w-full grid grid-cols-1 sm:grid-cols-2 gap-3"
+        )
 
     async def _open(self) -> None:
         """Shows the chosen world, unless it is shown already."""
@@ -234,7 +236,7 @@ class Looking:
             words = ["play", who, *world, "--video", film]
             job = start(self._place, words, film)
             self._command.text = job.command
-            with self._films, ui.column().classes("w-1/2 gap-1"):
+            with self._films, ui.column().classes("min-w-0 gap-1"):
                 show_film(self._place, film, who)
 
 

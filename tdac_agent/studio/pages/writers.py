@@ -52,9 +52,9 @@ class Writers:
             ).classes("w-32")
         with ui.column().classes("w-full") as self._own:
             ui.upload(
-                label="drop controller.py here", auto_upload=True,
+                label="Drop controller.py here, or click", auto_upload=True,
                 max_file_size=200_000, on_upload=self._uploaded,
-            ).props("accept=.py")  # fmt: skip
+            ).props("flat accept=.py")  # fmt: skip
         self._short = ui.checkbox(
             "ask for policy(obs) alone, not for the paper's whole file",
             on_change=self._update,

@@ -107,7 +107,7 @@ def test_the_player(opened):
     drag = "arguments[0].value = 20; arguments[0].dispatchEvent(new Event('input'))"
     opened.execute_script(drag, find(opened, f"{player} .scrub"))
     assert find(opened, f"{player} .clock").text.startswith("step 20 of ")
-    Select(find(opened, f"{player} .candidate")).select_by_visible_text("k=1 j=0")
+    Select(find(opened, f"{player} .candidate")).select_by_visible_text("iteration 1")
     names = Select(find(opened, f"{player} .episode")).options
     assert [name.text for name in names] == ["nominal: collision"]
     assert "– collision" in find(opened, f"{player} .clock").text
@@ -126,7 +126,10 @@ def test_ways_through_the_page(opened):
     assert all(part.get_attribute("open") for part in parts)
     click(opened, "#run-1 button.all")
     assert not any(part.get_attribute("open") for part in parts)
-    click(opened, '#run-2 button.watch[aria-label="Watch jitter 2 of k=1 j=1"]')
+    click(
+        opened,
+        '#run-2 button.watch[aria-label="Watch jitter 2 of iteration 1, repair 1"]',
+    )
     chosen = Select(find(opened, "#run-2 .episode")).first_selected_option.text
     assert chosen == "jitter 2: reached"
     until(opened, lambda _: "reached" in find(opened, "#run-2 .clock").text)
@@ -138,7 +141,7 @@ def test_movers(browser, moving, tmp_path):
     file.write_bytes(make_page(moving).html)
     browser.get_log("browser")  # of the page before
     browser.get(file.as_uri())
-    Select(find(browser, ".player .candidate")).select_by_visible_text("k=1 j=0")
+    Select(find(browser, ".player .candidate")).select_by_visible_text("iteration 1")
     steps = int(find(browser, ".player .scrub").get_attribute("max"))
     drag = (
         "arguments[0].value = arguments[1];"

@@ -184,7 +184,7 @@ def test_a_torn_file(copied, name, told):
     shown = " ".join("".join(Outline(text).shown).split()) + text.replace('"', "")
     assert told.partition(": reached")[0] in shown
     assert "41 of 41" in shown or "tests passed" in shown
-    assert "k=1 j=0" in shown
+    assert "iteration 1" in shown
 
 
 def test_a_run_that_was_killed(copied):
@@ -195,7 +195,8 @@ def test_a_run_that_was_killed(copied):
     (copied / "iterations" / "k01" / "j1" / "report.json").unlink()
     shown = " ".join("".join(Outline(make_page(copied).html.decode()).shown).split())
     assert "killed" in shown[:200]
-    assert "k=1 j=1 verification not finished" in shown
+    assert "iteration 1, repair 1 verification not finished" in shown
+    assert "Each number is an iteration (k on the command line)" in shown
     assert "tdac synth --resume run" in shown
 
 

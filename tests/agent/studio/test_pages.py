@@ -11,9 +11,12 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
+from studio_process import Studio
+
+from tdac_agent.runs.replay import DEMO
 
 SECONDS = 60
-SIZES = {"desktop": (1440, 900), "phone": (390, 844)}
+SIZES = {"desktop": (1440, 900), "laptop": (1180, 800), "phone": (390, 844)}
 # A controller that drives straight on, into a wall.
 BLIND = """
 def policy(obs):
@@ -71,7 +74,7 @@ def choose(browser, text):
     browser.execute_script("arguments[0].click()", browser.find_element(By.XPATH, path))
 
 
-def upload(browser, file, label="or drop a file"):
+def upload(browser, file, label="Drop a file here"):
     path = f"//div[contains(@class,'q-uploader')][contains(., '{label}')]//input"
     wait(browser, lambda b: b.find_elements(By.XPATH, path))[0].send_keys(str(file))
 
@@ -114,6 +117,8 @@ def open_plan(browser, plan):
 def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     """By clicks alone; the page shows the command, and the candidate drives."""
     open_plan(page, plan)
+    says(page, "narrowest passage (bar) is 70 px wide: room for a radius of")
+    assert page.find_elements(By.CSS_SELECTOR, ".board svg path.gap")
     assert number(page, "start x").get_attribute("value") == "60"
     assert abs(float(number(page, "heading, rad").get_attribute("value"))) < 0.05
     assert "tdac synth --map .studio/files/plan.png --start 60 150" in text_of(page)
@@ -135,7 +140,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
 def test_no_request_leaves_this_machine(browser, page, studio):
     """Nor does a page of it load anything from elsewhere."""
     names = "return performance.getEntriesByType('resource').map((e) => e.name)"
-    for path in ("/", "/runs", "/worlds"):
+    for path in ("/", "/runs", "/worlds", "/benches"):
         browser.get(studio.base + path)
         says(browser, "tdac studio")
         time.sleep(1)
@@ -161,7 +166,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     open_plan(page, plan)
     choose(page, "a controller of my own")
     says(page, "Drop the controller first.")
-    upload(page, tmp_path / "blind.py", "drop controller.py here")
+    upload(page, tmp_path / "blind.py", "Drop controller.py here")
     says(page, "--from .studio/files/blind.py")
     press(page, "Write and verify a controller")
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
@@ -224,6 +229,51 @@ def test_the_keyboard_alone(page, plan):
     wait(page, lambda b: "/run?" in b.current_url)
 
 
+def test_the_form_of_a_bench_shows_its_command(page, studio):
+    """It starts nothing without worlds; a bench is a page with the studio's links."""
+    page.get(f"{studio.base}/benches")
+    says(page, "tdac bench builtin follow-the-gap --set unknown --split test -n 20")
+    field = number(page, "worlds of each set")
+    field.send_keys(Keys.BACKSPACE, Keys.BACKSPACE)
+    says(page, "Choose entrants, task sets and the number of worlds.")
+    path = "//button[.//span[normalize-space()='Start the bench']]"
+    assert not page.find_element(By.XPATH, path).is_enabled()
+    made = studio.place / "runs" / "bench-made"
+    made.mkdir(parents=True)
+    (made / "bench.json").write_text("{}")
+    (made / "bench.html").write_text("<h1>Who is better</h1>")
+    page.get(f"{studio.base}/runs")
+    wait(page, lambda b: b.find_element(By.LINK_TEXT, "runs/bench-made")).click()
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
+    assert page.find_element(By.CSS_SELECTOR, "header a[href='/runs']").is_displayed()
+    page.switch_to.frame(page.find_element(By.CSS_SELECTOR, "iframe.report"))
+    says(page, "Who is better")
+    page.switch_to.default_content()
+    shutil.rmtree(made)
+
+
+@pytest.mark.slow
+def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
+    page.get(f"{studio.base}/benches")
+    field = number(page, "worlds of each set")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("2")
+    says(page, "--split test -n 2")
+    press(page, "Start the bench")
+    says(page, "of 2 drives ended")
+    address = page.current_url
+    page.get(f"{studio.base}/benches")
+    wait(page, lambda b: b.find_element(By.LINK_TEXT, "runs/bench-1"))
+    page.get(address)
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
+    frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
+    page.switch_to.frame(frame)
+    says(page, "2 entrants on unknown")
+    page.switch_to.default_content()
+    found = json.loads((studio.place / "runs/bench-1/bench.json").read_text())
+    assert found["entrants"] == ["builtin", "follow-the-gap"]
+
+
 def test_a_world_is_driven_by_the_keyboard(page, studio):
     """Straight ahead, the robot of this world meets a wall within seconds."""
     page.get(f"{studio.base}/worlds?level=unknown")
@@ -238,11 +288,38 @@ def test_a_world_is_driven_by_the_keyboard(page, studio):
     assert status.text.endswith(" s")
 
 
+def test_a_phone_shows_all_columns_of_a_run(page, studio):
+    """As a card, with the name of each; the map is beside its controls where it can."""
+    shutil.copytree(DEMO, studio.place / "runs" / "on-a-phone")
+    resize(page, "phone")
+    page.get(f"{studio.base}/runs")
+    cells = "//tr[contains(., 'on-a-phone')]/td"
+    wait(page, lambda b: b.find_elements(By.XPATH, cells))
+    assert page.execute_script(OVERFLOW) <= 0
+    found = page.find_elements(By.XPATH, cells)
+    values = [cell.text for cell in found[1:]]
+    assert values[:4] == ["runs/on-a-phone", "maze", "manual:maze2", "verified"]
+    label = "return getComputedStyle(arguments[0], '::before').content"
+    labels = [page.execute_script(label, cell).strip('"') for cell in found[2:]]
+    assert labels == ["task", "writer", "status", "progress", "cost", "started"]
+    for cell in found:
+        assert 0 <= cell.rect["x"] <= cell.rect["x"] + cell.rect["width"] <= 390
+    shutil.rmtree(studio.place / "runs" / "on-a-phone")
+    resize(page, "laptop")
+    page.get(studio.base)
+    says(page, "A path of")
+    image = page.find_element(By.CSS_SELECTOR, ".board")
+    controls = page.find_element(By.CSS_SELECTOR, ".q-uploader")
+    assert image.rect["y"] < controls.rect["y"]
+    assert image.rect["x"] > controls.rect["x"] + controls.rect["width"]
+    assert image.rect["width"] > 600
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES)
 def test_nothing_is_cut_off(page, studio, size):
     resize(page, size)
-    for path in ("/", "/runs", "/worlds"):
+    for path in ("/", "/runs", "/worlds", "/benches"):
         page.get(studio.base + path)
         says(page, "tdac studio")
         time.sleep(1)
@@ -257,12 +334,68 @@ def test_a_killed_server_kills_no_run(browser, page, studio, plan):
     press(page, "Write and verify a controller")
     wait(page, lambda b: "/run?" in b.current_url)
     at = page.current_url.partition("?at=")[2]
+    base = studio.base
     studio.kill()
+    says(page, "The studio has ended, or cannot be reached. Start it again")
+    says(page, str(studio.place))
     studio.start()
-    browser.get_log("browser")  # the connection was lost
-    browser.get(studio.address)
-    wait(browser, lambda b: "token" not in b.current_url)
-    browser.get(f"{studio.base}/run?at={at}")
-    wait(browser, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
-    browser.get(f"{studio.base}/runs")
+    assert studio.base == base  # though it was not told which port to take
+    # The page goes on by itself.
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    assert page.current_url == f"{base}/run?at={at}"
+    wait(page, lambda b: not b.find_element(By.ID, "lost").is_displayed())
+    browser.get(f"{base}/runs")
     says(browser, at)
+    browser.get_log("browser")  # the connection was lost
+
+
+@pytest.mark.slow
+def test_a_page_says_that_another_studio_has_its_port(browser, page, studio, tmp_path):
+    """Its cookie is good for its own folder alone."""
+    browser.get(f"{studio.base}/runs")
+    says(browser, "A run from elsewhere")
+    studio.kill()
+    other = Studio(tmp_path, int(studio.base.rpartition(":")[2]))
+    other.start()
+    says(browser, "open the address that it printed")
+    browser.get(other.address)
+    wait(browser, lambda b: "token" not in b.current_url and b.title.startswith("New"))
+    other.kill()
+    studio.start()
+    browser.get(studio.address)
+    wait(browser, lambda b: "token" not in b.current_url and b.title.startswith("New"))
+    browser.get_log("browser")  # the connection was lost
+
+
+def test_an_address_has_the_chosen_task(page, plan):
+    """Loading the page again loses no click."""
+    open_plan(page, plan)
+    wait(page, lambda b: "task=60,150," in b.current_url)
+    page.refresh()
+    says(page, "A path of")
+    assert number(page, "start x").get_attribute("value") == "60"
+    assert number(page, "goal y").get_attribute("value") == "60"
+
+
+def test_two_runs_are_compared(page, studio):
+    """What differs is marked, and the controllers' lines are beside each other."""
+    for name, source in (("one", "A = 1\n<b>B</b>\n"), ("other", "A = 2\n<b>B</b>\n")):
+        folder = studio.place / "runs" / f"compared-{name}"
+        shutil.copytree(DEMO, folder)
+        (folder / "controller.py").write_text(source)
+    record = folder / "run.json"
+    run = json.loads(record.read_text())
+    record.write_text(json.dumps({**run, "seconds": 12345.0}))
+    at = "one=runs/compared-one&other=runs/compared-other"
+    page.get(f"{studio.base}/compare?{at}")
+    says(page, "settings are the same")
+    rows = page.find_elements(By.CSS_SELECTOR, ".compared tr.differs")
+    assert [row.text.split()[:2] for row in rows] == [["≠", "time"]]
+    diff = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "pre.diff"))
+    assert diff.find_element(By.TAG_NAME, "del").text == "-A = 1"
+    assert diff.find_element(By.TAG_NAME, "ins").text == "+A = 2"
+    assert "<b>B</b>" in diff.text  # a controller is data
+    page.get(f"{studio.base}/compare?one=runs/compared-one&other=runs/compared-one")
+    says(page, "Choose two different runs.")
+    for name in ("one", "other"):
+        shutil.rmtree(studio.place / "runs" / f"compared-{name}")

@@ -10,6 +10,8 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
@@ -19,13 +21,20 @@ from tdac_agent.cli.flags import TaskFlags
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.studio.board import board_of, names_of
+from tdac_agent.studio.comparison import (
+    difference,
+    figures_of,
+    lines_of,
+    settings_of,
+)
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.jobs import job_of, jobs, start
-from tdac_agent.studio.pages.home import fitting_radius
+from tdac_agent.studio.jobs import Job, job_of, jobs, start
+from tdac_agent.studio.pages.bench import named_entrants, progress_of
+from tdac_agent.studio.pages.home import fitting_radius, sentence_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
-from tdac_agent.studio.pages.run import about_given, is_from_elsewhere
+from tdac_agent.studio.pages.run import about_given, in_words, is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
@@ -56,9 +65,7 @@ def test_a_draft_is_the_task_of_its_command(kind, source, tmp_path):
     checked = check(draft, board, tmp_path)
     assert checked.problem == ""
     assert flags_of(draft.words()).load().sha256() == checked.task.sha256()
-    # The body passes the narrowest place of its path, by less than anywhere else.
-    body = board.radius or BODY_RADIUS
-    assert 0.95 * body < checked.clearance < 2.0 * body
+    assert checked.narrowest.width > 2.0 * (board.radius or BODY_RADIUS)
 
 
 @pytest.mark.parametrize("kind", ["map", "world"])
@@ -84,6 +91,51 @@ def test_what_cannot_be_driven(tmp_path):
     assert "outside of the closed wall" in outside.problem
 
 
+@pytest.mark.parametrize("source", ["maze", "rooms", "street"])
+def test_the_narrowest_passage_limits_the_robot(source, tmp_path):
+    """On maps with one way, it and the widest robot that gets through agree."""
+    board = board_of("map", source)
+    checked = check(Draft.of(board, source), board, tmp_path)
+    narrowest = checked.narrowest
+    assert narrowest.at == "path"
+    assert math.dist(*narrowest.ends) == pytest.approx(narrowest.width, rel=1e-3)
+    # Radii are tested from pixel to pixel, passages between walls.
+    assert 0.0 <= narrowest.width / 2.0 - checked.widest < 1.0
+
+
+def test_a_path_through_the_narrower_of_two_doors(tmp_path):
+    """The passage is that of the path, though wider robots find another one."""
+    plan = np.full((300, 400), 255, np.uint8)
+    plan[:8] = plan[-8:] = plan[:, :8] = plan[:, -8:] = 0
+    plan[:, 196:204] = 0
+    plan[50:90, 190:210] = 255
+    plan[170:250, 190:210] = 255
+    cv2.imwrite(str(tmp_path / "plan.png"), plan)
+    board = board_of("map", str(tmp_path / "plan.png"))
+    draft = Draft("map", "plan.png", (60.0, 70.0), (340.0, 70.0), 0.0, 15.0)
+    narrow = check(draft, board, tmp_path)
+    assert narrow.narrowest.width == pytest.approx(40.0, abs=0.1)
+    assert sorted(y for _, y in narrow.narrowest.ends) == [49.5, 89.5]
+    assert narrow.widest == pytest.approx(39.4, abs=0.6)
+    assert "(bar) is 40 px wide; another path has room" in sentence_of(narrow, board)[0]
+    wide = check(replace(draft, radius=25.0), board, tmp_path)
+    assert wide.narrowest.width == pytest.approx(80.0, abs=0.1)
+    assert "(bar) is 80 px wide: room for a radius of" in sentence_of(wide, board)[0]
+    near = check(
+        replace(draft, start=(25.0, 210.0), goal=(60.0, 210.0)), board, tmp_path
+    )
+    assert near.narrowest.at == "start"
+    assert near.narrowest.width == pytest.approx(2 * 17.5, abs=0.1)
+    assert "narrowest at the start, 17.5 px from a wall" in sentence_of(near, board)[0]
+
+
+def test_a_passage_of_a_world(tmp_path):
+    """The bundled corridor has passages of 0.2 m beside its boxes."""
+    board = board_of("world", "corridor")
+    checked = check(Draft.of(board, "corridor"), board, tmp_path)
+    assert checked.narrowest.width == pytest.approx(0.2, abs=1e-3)
+
+
 def wait_for(job):
     end = time.monotonic() + SECONDS
     while job.running and time.monotonic() < end:
@@ -107,6 +159,36 @@ def test_a_job_is_found_again(tmp_path):
     (other.folder.with_name("99999")).mkdir()
     (other.folder.with_name("99999") / "job.json").write_text("{")
     assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
+
+
+def test_files_of_one_name_are_told_apart():
+    """Two entrants of a bench cannot have the same name."""
+    files = ["runs/a/controller.py", "x/runs/a/controller.py", "mine.py", "x/mine.py"]
+    words = named_entrants(["builtin", *files, "policies/ppo/policy.zip"])
+    assert words == [
+        "builtin",
+        "a=runs/a/controller.py",
+        "a-2=x/runs/a/controller.py",
+        "mine.py",
+        "mine.py-2=x/mine.py",
+        "ppo=policies/ppo/policy.zip",
+    ]
+
+
+def test_a_bench_tells_how_far_it_is(tmp_path):
+    words = ("bench", "builtin", "dwa", "--set", "known,lost", "-n", "10")
+    job = Job(tmp_path, words, "2026-01-01T00:00:00+00:00", 0, "", "bench-1")
+    assert progress_of(job, tmp_path)[0] == 0.0
+    for name, file in (
+        ("known/a", "set.json"),
+        ("known/b", "unfinished/episodes.jsonl"),
+    ):
+        path = tmp_path / "driven" / name / file
+        path.parent.mkdir(parents=True)
+        path.write_text("{}\n" * 5)
+    share, text = progress_of(job, tmp_path)
+    assert share == pytest.approx(1.5 / 4)
+    assert text.startswith("1 of 4 drives ended, the next one is at world 5 of 10 (")
 
 
 def packed(**files):
@@ -211,3 +293,39 @@ def test_a_question_with_a_picture_is_recognised(tmp_path):
     asked = "Repair it. The picture `002.picture.png` shows more."
     assert asked_for(tmp_path, asked) == KINDS["edit"]
     assert asked_for(tmp_path, f"{asked} Please.") == "an answer"
+
+
+def test_what_differs_between_two_runs(tmp_path):
+    """Figures, settings of the loop and of the task, and lines of the controllers."""
+    one, other = tmp_path / "one", tmp_path / "other"
+    for folder, radius in ((one, 15.0), (other, 19.0)):
+        shutil.copytree(DEMO, folder)
+        (folder / "task.yaml").write_text(f"name: maze\nrobot: {{radius: {radius}}}\n")
+        (folder / "controller.py").write_text(f"import math\n\nRADIUS = {radius}\n")
+    run = load_run(other)
+    changed = run.model_copy(update={"patience": run.patience + 1, "seconds": 1e4})
+    (other / "run.json").write_text(changed.model_dump_json())
+
+    def differing(values_of):
+        lines = lines_of(values_of(one), values_of(other))
+        return {line.name: (line.one, line.other) for line in lines if line.differs}
+
+    assert differing(figures_of) == {"time": (f"{run.seconds:.1f} s", "10000.0 s")}
+    repairs = str(run.patience), str(run.patience + 1)
+    radii = "15.0", "19.0"
+    assert differing(settings_of) == {
+        "most repairs of each": repairs,
+        "task: robot: radius": radii,
+    }
+    lines = difference(one, other).splitlines()
+    assert lines[3:] == [" import math", " ", "-RADIUS = 15.0", "+RADIUS = 19.0"]
+    assert difference(one, one) == ""
+    (other / "controller.py").unlink()
+    assert difference(one, other) is None
+
+
+def test_letters_are_in_words():
+    """What the command prints in a line is explained above the report."""
+    line = in_words("✘ k=12 j=3  8 failed: test_progress")
+    assert line == "✘ iteration 12, repair 3  8 failed: test_progress"
+    assert in_words("k=1 j=0  neutral parameters") == "iteration 1  neutral parameters"

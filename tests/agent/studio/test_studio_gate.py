@@ -2,9 +2,15 @@
 
 import http.client
 import re
+import time
 from urllib.parse import urlsplit
 
 import pytest
+
+pytest.importorskip("nicegui", reason="needs tdac[studio]")
+
+from tdac_agent.studio.gate import LASTING, Gate
+from tdac_agent.studio.serve import opened_port
 
 
 @pytest.fixture
@@ -90,3 +96,41 @@ def test_files_outside_of_the_folder(studio, ask, cookie):
     status, headers, _ = ask("/file?at=own.png", Cookie=cookie)
     assert status == 200
     assert headers["Content-Security-Policy"] == "sandbox allow-scripts"
+
+
+def test_a_cookie_is_good_for_a_week_and_for_one_folder(tmp_path, monkeypatch):
+    """Also after a restart: the gate of another process accepts it."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    gate = Gate(None, 8501, tmp_path)
+    now = int(time.time())
+
+    def gets_in(content, port=8501, place=tmp_path):
+        headers = {"cookie": f"tdac-studio-{port}={content}"}
+        return Gate(None, port, place)._has_session(headers)
+
+    assert gets_in(gate._session(now))
+    assert gets_in(gate._session(now - LASTING + 60))
+    assert not gets_in(gate._session(now - LASTING - 60))
+    assert not gets_in(gate._session(now + 60))
+    assert not gets_in(gate._session(now), port=8502)
+    assert not gets_in(gate._session(now), place=tmp_path / "other")
+    mac = gate._session(now).partition(".")[2]
+    for forged in ("", ".", mac, f"{now}", f"{now}.", f"{now - 1}.{mac}", f"x.{mac}"):
+        assert not gets_in(forged), forged
+
+
+def test_a_folder_has_the_port_of_the_last_start(tmp_path):
+    """Unless another program has taken it, or the note is no port."""
+    with opened_port(tmp_path, 0) as first:
+        port = first.getsockname()[1]
+        with opened_port(tmp_path, 0) as second:  # another studio in the same folder
+            other = second.getsockname()[1]
+            assert other != port
+            with pytest.raises(OSError, match="in use"):
+                opened_port(tmp_path, port)
+    with opened_port(tmp_path, 0) as again:
+        assert again.getsockname()[1] == other
+    for wrong in ("", "80", "70000", "-1", "x" * 100):
+        (tmp_path / ".studio" / "port").write_text(wrong)
+        with opened_port(tmp_path, 0) as free:
+            assert free.getsockname()[1] >= 1024

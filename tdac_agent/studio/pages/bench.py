@@ -1,0 +1,257 @@
+"""Benches: start one, see how far it is, and look at its results."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from nicegui import ui
+
+from tdac_agent.bench.arena import DRIVEN
+from tdac_agent.bench.bench import RESULTS, SPLITS
+from tdac_agent.bench.page import PAGE
+from tdac_agent.bench.privileged import PRIVILEGED
+from tdac_agent.bench.rivals import rival_names
+from tdac_agent.evaluation.entrants import BUILTIN
+from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE, UNFINISHED
+from tdac_agent.evaluation.salt import SEALED
+from tdac_agent.evaluation.set_verify import MOST_EPISODES
+from tdac_agent.library.listing import next_folder
+from tdac_agent.studio.jobs import Job, job_of, jobs, start
+from tdac_agent.studio.pages.layout import (
+    address_of,
+    file_frame,
+    framed,
+    shown_command,
+    shown_first,
+    status_badge,
+    within,
+)
+from tdac_agent.studio.pages.worlds import policies_in
+from tdac_agent.studio.sources import folders_with
+from tdac_envs.ladder.set_file import shipped_names
+
+WORLDS = 20
+SECONDS = 1.0
+"""Between two looks at the folder."""
+HIDDEN = (
+    "Hidden worlds are drawn now and revealed at the end, and the ledger counts this "
+    "evaluation of each file."
+)
+
+
+def add(place: Path) -> None:
+    """Adds the pages."""
+
+    @ui.page("/benches")
+    async def benches() -> None:
+        with framed("Benches"):
+            Starting(place).show()
+            _show_benches(place)
+
+    @ui.page("/bench")
+    async def bench(at: str = "") -> None:
+        with framed(at or "Bench"):
+            folder = within(place, at)
+            if folder is None or not at or not _is_bench(place, at, folder):
+                ui.label(f"There is no bench {at!r} in this folder.").classes("problem")
+                return
+            await Watching(place, at, folder).show()
+
+
+class Starting:
+    """The form that starts a bench.
+
+    Args:
+        place: Folder of the studio.
+    """
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+
+    def show(self) -> None:
+        """Builds the form."""
+        ui.label("New bench").classes("text-lg font-bold")
+        ui.label(
+            "Controllers, classical planners and learned policies drive on the same "
+            "worlds, and are compared."
+        ).classes("note")
+        options = [BUILTIN, *rival_names(), PRIVILEGED, *policies_in(self._place)]
+        with ui.row().classes("w-full items-end gap-4"):
+            self._entrants = _choice(options, [BUILTIN, "follow-the-gap"], "entrants")
+            self._sets = _choice(list(shipped_names()), ["unknown"], "task sets")
+            self._split = ui.select(list(SPLITS), value="test", label="split").classes(
+                "w-28"
+            )
+            self._worlds = ui.number(
+                "worlds of each set", value=WORLDS, min=1, max=MOST_EPISODES,
+                precision=0,
+            ).classes("w-36")  # fmt: skip
+        self._note = ui.label().classes("text-sm note")
+        self._command = shown_command("")
+        self._go = ui.button("Start the bench", on_click=self._begin)
+        for each in (self._entrants, self._sets, self._split, self._worlds):
+            each.on_value_change(self._refresh)
+        self._refresh()
+
+    def _words(self) -> list[str]:
+        """The words of the command line, without the folder."""
+        sets = ["--set", ",".join(self._sets.value)]
+        count = str(int(self._worlds.value or 0))
+        split = ["--split", self._split.value]
+        return [
+            "bench",
+            *named_entrants(self._entrants.value),
+            *sets,
+            *split,
+            "-n",
+            count,
+        ]
+
+    def _refresh(self) -> None:
+        ready = self._entrants.value and self._sets.value and self._worlds.value
+        self._go.set_enabled(bool(ready))
+        self._command.text = shlex.join(["tdac", *self._words()]) if ready else ""
+        self._note.text = HIDDEN if self._split.value == "hidden" else ""
+        if not ready:
+            self._note.text = "Choose entrants, task sets and the number of worlds."
+
+    def _begin(self) -> None:
+        """Starts the bench, and opens its page."""
+        folder = str(next_folder("bench", self._place))
+        start(self._place, [*self._words(), "--out", folder], folder)
+        ui.navigate.to(address_of("/bench", folder))
+
+
+class Watching:
+    """The page of one bench.
+
+    Args:
+        place: Folder of the studio.
+        at: The bench, relative to it.
+        folder: Its folder.
+    """
+
+    def __init__(self, place: Path, at: str, folder: Path) -> None:
+        self._place, self._at, self._folder = place, at, folder
+        self._shown = ""
+
+    async def show(self) -> None:
+        """Builds the page, and keeps it up to date."""
+        with ui.row().classes("w-full items-center gap-3"):
+            ui.label(self._at).classes("text-xl font-bold")
+            self._badge = ui.row()
+            self._now = ui.label().classes("note").props("role=status")
+        self._bar = ui.linear_progress(0.0, show_value=False).props("rounded")
+        self._command = shown_command("")
+        with ui.row().classes("gap-2"):
+            self._stop = ui.button("Stop", icon="stop", on_click=self._interrupt)
+            self._resume = ui.button(
+                "Continue", icon="play_arrow", on_click=self._go_on
+            )
+        self._results = ui.column().classes("w-full")
+        with ui.element("pre").classes("output") as self._printed:
+            self._output = ui.label()
+        await shown_first()
+        self._look()
+        ui.timer(SECONDS, self._look)
+
+    def _look(self) -> None:
+        """Shows what has changed."""
+        job = job_of(self._place, self._at)
+        running = job is not None and job.running
+        page = self._folder / PAGE
+        done = page.is_file() and not running
+        status = "running" if running else "finished" if done else "not finished"
+        self._badge.clear()
+        with self._badge:
+            status_badge(status)
+        self._command.text = (
+            job.command if job is not None else f"tdac bench show {self._at}"
+        )
+        self._stop.visible = self._bar.visible = running
+        self._resume.visible = job is not None and not running and not done
+        self._printed.visible = not done
+        self._output.text = job.output() if job is not None else ""
+        self._now.text = ""
+        if job is not None and running:
+            self._bar.value, self._now.text = progress_of(job, self._folder)
+        version = str(page.stat().st_mtime_ns) if done else ""
+        if version != self._shown:
+            self._shown = version
+            self._results.clear()
+            if done:
+                with self._results:
+                    file_frame(f"{self._at}/{PAGE}", version, f"Bench {self._at}")
+
+    def _interrupt(self) -> None:
+        job = job_of(self._place, self._at)
+        if job is not None:
+            job.stop()
+
+    def _go_on(self) -> None:
+        """Starts the same command again: it goes on with the next episode."""
+        job = job_of(self._place, self._at)
+        if job is not None:
+            start(self._place, job.words, self._at)
+
+
+def named_entrants(chosen: Sequence[str]) -> list[str]:
+    """Entrants as words of the command line: files of the same name get other names."""
+    words, names = [], set[str]()
+    for each in chosen:
+        path = Path(each)
+        own = path.parent.name if path.stem in ("controller", "policy") else path.name
+        name, number = own, 1
+        while name in names:
+            number += 1
+            name = f"{own}-{number}"
+        names.add(name)
+        words.append(each if name == path.name else f"{name}={each}")
+    return words
+
+
+def progress_of(job: Job, folder: Path) -> tuple[float, str]:
+    """The share of a bench that has been driven, from 0 to 1, and a line about it.
+
+    Args:
+        job: The running command.
+        folder: Folder of the bench.
+    """
+    command = list(job.words)
+    at = command.index("--set")
+    worlds = int(command[command.index("-n") + 1])
+    drives = (at - 1) * len(command[at + 1].split(","))
+    ended, now = 0, 0
+    for kept in (DRIVEN, SEALED):
+        ended += len(list(folder.glob(f"{kept}/*/*/{REPORT_FILE}")))
+        for rows in folder.glob(f"{kept}/*/*/{UNFINISHED}/{ROWS_FILE}"):
+            now += len(rows.read_bytes().splitlines())
+    text = f"{ended} of {drives} drives ended"
+    text += f", the next one is at world {now} of {worlds}" if ended < drives else ""
+    share = (ended + min(now / worlds, 1.0)) / drives
+    return min(share, 1.0), f"{text} ({job.seconds:.0f} s)"
+
+
+def _choice(options: list[str], value: list[str], label: str) -> ui.select:
+    chosen = ui.select(options, value=value, label=label, multiple=True)
+    return chosen.props("use-chips").classes("w-full sm:w-80")
+
+
+def _is_bench(place: Path, at: str, folder: Path) -> bool:
+    return (folder / PAGE).is_file() or job_of(place, at) is not None
+
+
+def _show_benches(place: Path) -> None:
+    """Links to the benches of the folder."""
+    begun = {job.about: job for job in jobs(place) if job.words[:1] == ("bench",)}
+    names = {*folders_with(place, RESULTS), *begun}
+    if not names:
+        return
+    ui.label("Benches of this folder").classes("text-lg font-bold")
+    for name in sorted(names):
+        with ui.row().classes("items-center gap-3"):
+            ui.link(name, address_of("/bench", name))
+            if name in begun and begun[name].running:
+                status_badge("running")
