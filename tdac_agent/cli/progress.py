@@ -85,6 +85,12 @@ class Progress:
             self._spinner.update(text=f"{at}  testing controller.py in the sandbox")
         elif kind == "verify.end":
             self._print_attempt(at, record)
+        elif kind == "drive.step":
+            so_far = f"{record['reached']} of {record['done']} goals reached"
+            self._spinner.update(text=f"{at}  disturbed episodes: {so_far}")
+        elif kind == "drive.end" and record["what"] == "comparison":
+            result = f"{record['reached']} of {record['episodes']} goals reached"
+            self.say(f"  {at}", f"other disturbed episodes: {result}", "dim")
 
     def doing(self, text: str) -> None:
         """Shows the current activity."""
@@ -117,7 +123,9 @@ class Progress:
             self.say(f"  {at}", escape(said), "dim")
 
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
-        if record["passed"]:
+        if record["parent"] is not None:
+            self.say_varied(at, record)
+        elif record["passed"]:
             self.say(f"✔ {at}", "all tests passed", "green")
         elif not record["valid"]:
             why = "; ".join(record["notes"][-1:])
@@ -128,6 +136,11 @@ class Progress:
             failed = record["failed_tests"]
             names = escape(list_tests(failed, 3))
             self.say(f"[red]✘ {at}[/]", f"[red]{len(failed)} failed:[/] {names}")
+
+    def say_varied(self, at: str, record: dict[str, Any]) -> None:
+        """Prints what came of a variation of a candidate."""
+        said = escape("; ".join(record["notes"][-1:]))
+        self.say(f"~ {at}", said, "" if record["valid"] else "yellow")
 
     def say(self, place: str, text: str, style: str = "") -> None:
         """Prints a line in two columns, so that wrapped text stays below the text."""

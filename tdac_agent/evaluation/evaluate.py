@@ -32,7 +32,7 @@ from tdac_agent.evaluation.finished import (
     finished_evaluation,
 )
 from tdac_agent.evaluation.overlay import Overlay, draw_overlay
-from tdac_agent.evaluation.seeded_run import run_seeds
+from tdac_agent.verification.seeded_run import run_seeds
 from tdac_agent.evaluation.unfinished import folder_of, open_store
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic

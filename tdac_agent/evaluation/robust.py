@@ -12,7 +12,7 @@ from tdac_agent.evaluation.robust_report import (
     RobustReport,
     summarise,
 )
-from tdac_agent.evaluation.seeded_run import run_seeds
+from tdac_agent.verification.seeded_run import run_seeds
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.disturbance import Disturbance

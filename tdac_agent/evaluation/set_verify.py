@@ -22,7 +22,7 @@ from tdac_agent.evaluation.kept_sets import (
     unfinished,
 )
 from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, on_record
-from tdac_agent.evaluation.seeded_run import run_job
+from tdac_agent.verification.seeded_run import run_job
 from tdac_agent.evaluation.set_report import (
     SetProvenance,
     SetReport,
