@@ -86,9 +86,10 @@ def _attempts(run: Run) -> Table:
     table.add_column("k", justify="right")
     table.add_column("j", justify="right")
     table.add_column("result")
-    table.add_column("failed tests")
+    varied = any(attempt.parent is not None for attempt in run.attempts)
+    table.add_column("failed tests" + (", or how it drives" if varied else ""))
     table.caption = "k: iteration; j: attempt to repair its candidate (0: the first)"
-    if any(attempt.parent is not None for attempt in run.attempts):
+    if varied:
         table.caption += f"; k above {run.iterations}: a variation"
     table.caption_justify = "left"
     for attempt in run.attempts:

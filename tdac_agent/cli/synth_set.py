@@ -24,7 +24,7 @@ from tdac_agent.library.listing import next_folder
 from tdac_agent.models.choice import check_name
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
-from tdac_agent.runs.improvement_record import NOT_SHOWN
+from tdac_agent.runs.improvement_record import NOT_SHOWN, is_shown
 from tdac_agent.runs.resume import check_own, existing_run
 from tdac_agent.runs.run_record import Run
 from tdac_agent.runs.selection_record import CandidateFigures, Improvement, Selection
@@ -51,10 +51,11 @@ class SetProgress(Progress):
             case "drive.step":
                 so_far = f"{record['reached']} of {record['done']} worlds reached"
                 self.doing(f"{_driven(record)}: {so_far}")
-            case "drive.end" if record["what"] in FINAL:
-                result = f"{record['reached']} of {record['driven']} reached"
-                worlds = f"{record['what']} worlds"
-                self.say(f"  {_at(record)}", f"{worlds}: {result}", "dim")
+            case "drive.end":
+                if record["what"] in FINAL:
+                    result = f"{record['reached']} of {record['driven']} reached"
+                    worlds = f"{record['what']} worlds"
+                    self.say(f"  {_at(record)}", f"{worlds}: {result}", "dim")
             case "hidden.start":
                 self.doing("driving on hidden worlds")
             case _:
@@ -256,7 +257,7 @@ def _improvement(found: Improvement) -> str:
     assert found.after is not None
     assert found.low is not None
     assert found.high is not None
-    told = "" if found.low > 0.0 else f"; {NOT_SHOWN}"
+    told = "" if is_shown(found.low, found.p) else f"; {NOT_SHOWN}"
     return (
         f"improving: {about}; time score {found.before:.3f} ({base}) -> "
         f"{found.after:.3f} on {found.worlds} other worlds: "

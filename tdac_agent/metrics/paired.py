@@ -103,12 +103,15 @@ class Change:
         after: Mean after it.
         low: Lower end of the difference, at the confidence `LEVEL`.
         high: Upper end of the difference.
+        p: Two-sided p-value of the hypothesis that there is none; see
+            `Bootstrap.p_value`.
     """
 
     before: float
     after: float
     low: float
     high: float
+    p: float
 
 
 def paired_change(before: Sequence[float], after: Sequence[float]) -> Change:
@@ -116,8 +119,9 @@ def paired_change(before: Sequence[float], after: Sequence[float]) -> Change:
     scores = {"before": before, "after": after}
     found = bootstrap({name: np.array([each]) for name, each in scores.items()})
     one, other = found["before"], found["after"]
-    change = other.minus(one).estimate()
-    return Change(one.mean, other.mean, change.low, change.high)
+    change = other.minus(one)
+    ends = change.estimate()
+    return Change(one.mean, other.mean, ends.low, ends.high, change.p_value())
 
 
 def over_sets(parts: Sequence[Bootstrap]) -> Bootstrap:

@@ -13,7 +13,20 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 IMPROVEMENT_FILE = "improvement.json"
 NOT_SHOWN = "no improvement is shown"
-"""What is said if no interval of a difference lies above 0."""
+"""What is said if no difference is shown."""
+MOST_P = 0.05
+"""Most p-value of a difference that is shown, beside an interval above 0: with few
+episodes, the interval is too narrow."""
+
+
+def is_shown(low: float, p: float | None) -> bool:
+    """Whether a difference is shown to be an improvement.
+
+    Args:
+        low: Lower end of its interval.
+        p: Its p-value; None if it is not on record.
+    """
+    return low > 0.0 and (p is None or p <= MOST_P)
 
 
 class _Record(PrintableRecord):
@@ -48,6 +61,14 @@ class PairedChange(_Record):
     after: float = Field(description="Of the selected one.")
     low: float = Field(description="Lower end of the difference.")
     high: float = Field(description="Upper end of the difference.")
+    p: float = Field(
+        description="p-value of no difference; not below what so few episodes can show."
+    )
+
+    @property
+    def shown(self) -> bool:
+        """Whether an improvement is shown."""
+        return is_shown(self.low, self.p)
 
     @property
     def told(self) -> str:
@@ -100,7 +121,7 @@ class TaskImprovement(_Record):
         )
         if self.robustness is None or self.time is None:
             return f"{about}; none was selected instead of {first}"
-        shown = max(self.robustness.low, self.time.low) > 0.0
+        shown = self.robustness.shown or self.time.shown
         return (
             f"{about}; {selected} was selected instead of {first}; in "
             f"{self.episodes} other disturbed episodes: goals reached "
