@@ -11,6 +11,7 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.metrics.paired import paired_change
 from tdac_agent.models.picture import LARGEST_SIDE
+from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.feedback import feedback_of
 from tdac_agent.runs.improvement_record import (
     IMPROVEMENT_FILE,
@@ -228,7 +229,11 @@ def improve_verified(
     run = recorder.run
     trials = DisturbedTrials(recorder, tests, task_shares(run.improve))
     explorer = TaskExplorer(trials, most_variations(run.improve, on_set=False))
-    begun, stopped = list(founders[:FOUNDERS]), ""
+    begun: list[TaskCandidate] = []
+    for each in founders:
+        if not any(same_code(each.source, one.source) for one in begun):
+            begun.append(each)
+    begun, stopped = begun[:FOUNDERS], ""
     search = ImprovingSearch(dialogue, explorer, begun)
     try:
         search.run(tuple(begun))

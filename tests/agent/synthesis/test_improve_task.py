@@ -193,6 +193,19 @@ def test_without_a_better_one_the_first_stays(write, fragile, good_source, tmp_p
 
 
 @pytest.mark.slow
+def test_all_verified_candidates_of_a_group_found_the_archive(
+    write, fragile, good_source
+):
+    """The run is still compared with its first one."""
+    answers = (fragile, good_source, fragile, *[STILL] * 4)
+    run = write(Script(*map(code, answers)), candidates=3)
+    found = read_improvement(run.folder)
+    assert [(each.k, each.parent) for each in found.members] == [(1, None), (2, None)]
+    assert (found.first, found.selected, run.tau) == ((1, 0), (2, 0), 1)
+    assert (run.folder / "controller.py").read_text() == good_source
+
+
+@pytest.mark.slow
 def test_the_end_of_the_budget_ends_the_search_alone(write, good_source):
     """The verified controller stays verified."""
     model = Script(code(good_source))
