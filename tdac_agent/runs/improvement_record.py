@@ -90,7 +90,7 @@ class TaskImprovement(_Record):
     block: int = Field(description="Their number, the same for all candidates.")
     improve: int = Field(description="Limit of disturbed episodes.")
     used: int
-    asked: int = Field(description="Number of variations that were asked for.")
+    asked: int = Field(description="Number of variations that were answered.")
     members: tuple[MemberFigures, ...] = Field(description="Oldest first.")
     first: tuple[int, int] = Field(description="(k, j) of the first verified one.")
     k: int = Field(description="Iteration of the selected candidate.")

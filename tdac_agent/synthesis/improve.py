@@ -61,7 +61,7 @@ class Explorer(Protocol[C]):
         """Whether another variation may be asked for.
 
         Args:
-            asked: Number of variations that were asked for.
+            asked: Number of variations that were answered.
         """
 
     def made(self, k: int, source: str, folder: Path) -> C:
@@ -92,6 +92,7 @@ class ImprovingSearch(Generic[C]):
 
     Attributes:
         archive: The members so far.
+        asked: Number of variations that were answered.
     """
 
     def __init__(
@@ -100,6 +101,7 @@ class ImprovingSearch(Generic[C]):
         run = explorer.recorder.run
         assert run.seed is not None
         self.archive: Archive[C] = Archive()
+        self.asked = 0
         self._dialogue, self._explorer = dialogue, explorer
         self._known = known
         self._random = np.random.default_rng([run.seed, run.index])
@@ -118,16 +120,15 @@ class ImprovingSearch(Generic[C]):
             explored = self._explorer.explore(candidate)
             if explored.figures is not None:
                 self.archive.members.append(Member(candidate, explored.figures))
-        asked, stale = 0, 0
-        while stale < MOST_STALE and self._explorer.goes_on(asked):
-            asked += 1
+        stale = 0
+        while stale < MOST_STALE and self._explorer.goes_on(self.asked):
             parent = self.archive.parent(self._random)
-            stale = 0 if self._varied(asked, parent) else stale + 1
+            stale = 0 if self._varied(parent) else stale + 1
 
-    def _varied(self, number: int, parent: Member[C]) -> bool:
+    def _varied(self, parent: Member[C]) -> bool:
         """Asks for a variation, and drives it; returns whether a new one drove."""
         run = self._explorer.recorder.run
-        k = run.iterations + number
+        k = run.iterations + self.asked + 1
         answer = self._dialogue.improve(
             k,
             parent.candidate.source,
@@ -135,6 +136,7 @@ class ImprovingSearch(Generic[C]):
             self._explorer.aim,
             self._explorer.picture(parent.candidate) if run.vision else None,
         )
+        self.asked += 1
         return self._tried(k, parent, answer)
 
     def _text(self, parent: Member[C]) -> str:

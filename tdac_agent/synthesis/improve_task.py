@@ -21,7 +21,7 @@ from tdac_agent.runs.improvement_record import (
 )
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.archive import Member
 from tdac_agent.synthesis.calls import OutOfBudget
 from tdac_agent.synthesis.candidates import Tests, verify_candidate
 from tdac_agent.synthesis.dialogue import Dialogue
@@ -121,12 +121,10 @@ class TaskExplorer:
     Attributes:
         trials: Drives candidates.
         most: Most variations that are asked for.
-        asked: Number of variations that were asked for.
     """
 
     trials: DisturbedTrials
     most: int
-    asked: int = 0
     aim: str = (
         "Raise the number of goals that it reaches in disturbed episodes that nobody "
         "has seen yet, and then its mean time score. It must still pass all tests."
@@ -139,7 +137,6 @@ class TaskExplorer:
 
     def goes_on(self, asked: int) -> bool:
         """See `Explorer`."""
-        self.asked = asked
         return asked < self.most and self.trials.can_explore
 
     def made(self, k: int, source: str, folder: Path) -> TaskCandidate:
@@ -239,7 +236,7 @@ def improve_verified(
         search.run(tuple(begun))
     except OutOfBudget as error:
         stopped = str(error)
-    found = _compared(explorer, search.archive, stopped)
+    found = _compared(trials, search, stopped)
     write_atomic(run.folder / IMPROVEMENT_FILE, found.model_dump_json(indent=2) + "\n")
     facts = found.model_dump(mode="json", exclude={"members", "stopped"})
     recorder.event("select.end", **facts)
@@ -247,11 +244,12 @@ def improve_verified(
 
 
 def _compared(
-    explorer: TaskExplorer, archive: Archive[TaskCandidate], stopped: str
+    trials: DisturbedTrials, search: ImprovingSearch[TaskCandidate], stopped: str
 ) -> TaskImprovement:
     """The record of a search; the selected candidate drives beside the first one."""
-    trials, first = explorer.trials, archive.members[0].candidate
-    chosen, changes = archive.best().candidate, dict[str, PairedChange]()
+    archive = search.archive
+    first, chosen = archive.members[0].candidate, archive.best().candidate
+    changes = dict[str, PairedChange]()
     if chosen is not first:
         before, after = trials.compare(first), trials.compare(chosen)
         pairs = {
@@ -271,7 +269,7 @@ def _compared(
         block=trials.shares.block,
         improve=trials.recorder.run.improve,
         used=trials.used,
-        asked=explorer.asked,
+        asked=search.asked,
         members=tuple(map(_figures, archive.members)),
         first=(first.k, first.j),
         k=chosen.k,

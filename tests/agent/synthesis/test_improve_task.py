@@ -10,12 +10,14 @@ from script import STILL, Script, code
 from small import write_small_task
 
 from tdac_agent.errors import RunError
+from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.html_report.page import make_page
 from tdac_agent.library.listing import row_of
 from tdac_agent.metrics import frames_of
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
 from tdac_agent.runs.run_record import load_run
+from tdac_agent.synthesis.disturbed import DisturbedEpisodes
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.workload import (
     LEAST_IMPROVE,
@@ -174,8 +176,10 @@ def test_models_that_see_get_a_picture_of_a_failed_episode(write, fragile, good_
 
 
 @pytest.mark.slow
-def test_without_a_better_one_the_first_stays(write, fragile, good_source, tmp_path):
-    """And it is delivered before the search begins."""
+def test_without_a_better_one_the_first_stays(
+    write, task, fragile, good_source, tmp_path, warm
+):
+    """It is delivered before the search begins, and has driven as in `--robust`."""
     model = Script(*map(code, (good_source, fragile, *[STILL] * 4)))
     seen = []
 
@@ -190,6 +194,15 @@ def test_without_a_better_one_the_first_stays(write, fragile, good_source, tmp_p
     assert found.selected == found.first == (1, 0)
     assert (found.episodes, found.used, found.time) == (0, 8, None)
     assert found.told.endswith("none was selected instead of k=1 j=0")
+    robust = verify_robust(
+        run.controller, task, 4, first_seed=found.first_seed, judge=warm
+    )
+    own = run.folder / "iterations/k01/j0/improve/disturbed.json"
+    driven = DisturbedEpisodes.model_validate_json(own.read_text()).episodes
+    for episode in robust.worst:
+        (same,) = (each for each in driven if each.seed == episode.seed)
+        assert (same.steps, same.d_min) == (episode.steps, episode.d_min)
+    assert len(robust.worst) == found.block == 4
 
 
 @pytest.mark.slow
