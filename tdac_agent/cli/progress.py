@@ -131,7 +131,7 @@ class Progress:
             self.say(f"  {at}", f"other disturbed episodes: {reached}", "dim")
 
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
-        if record["parent"] is not None:
+        if record.get("parent") is not None:
             self.say_varied(at, record)
         elif record["passed"]:
             self.say(f"✔ {at}", "all tests passed", "green")

@@ -79,8 +79,8 @@ def synth(
         Optional[int],  # noqa: UP045
         number_flag(
             min=32,
-            help="Further simulated episodes: vary what works, and select the best of "
-            "all.",
+            help="Further simulated episodes, disturbed ones on a task: vary what "
+            "works, and select the best of all.",
         ),
     ] = None,
     suite: Suite = None,
@@ -181,7 +181,7 @@ def synth(
         ),
     ] = False,
 ) -> None:
-    """Write, test and repair a controller until it is verified; then improve it."""
+    """Write, test and repair a controller until it is verified."""
     with begun():
         from tdac_agent.cli import synth as command
     from tdac_agent.cli.synth_set_flags import SynthSetFlags
