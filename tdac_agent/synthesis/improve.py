@@ -104,6 +104,7 @@ class ImprovingSearch(Generic[C]):
         self.asked = 0
         self._dialogue, self._explorer = dialogue, explorer
         self._known = known
+        self._results: list[tuple[C, Explored]] = []
         self._random = np.random.default_rng([run.seed, run.index])
 
     def run(self, founders: Sequence[C]) -> None:
@@ -117,7 +118,7 @@ class ImprovingSearch(Generic[C]):
             Fault: A model does not answer.
         """
         for candidate in founders:
-            explored = self._explorer.explore(candidate)
+            explored = self._explored(candidate)
             if explored.figures is not None:
                 self.archive.members.append(Member(candidate, explored.figures))
         stale = 0
@@ -170,11 +171,13 @@ class ImprovingSearch(Generic[C]):
         same = [each for each in self._known if same_code(source, each.source)]
         if same:
             said = f"same code as k={same[0].k} j={same[0].j}"
-            self._record(k, parent, (*notes, said), unchanged=True)
+            found = (known for one, known in self._results if one is same[0])
+            earlier = next(found, None)
+            self._record(k, parent, (*notes, said), earlier, unchanged=True)
             return False
         candidate = self._explorer.made(k, source, folder)
         self._known.append(candidate)
-        explored = self._explorer.explore(candidate)
+        explored = self._explored(candidate)
         said = explored.said
         if explored.figures is None:
             self.archive.refused.append(Refused(candidate, parent, said))
@@ -184,6 +187,11 @@ class ImprovingSearch(Generic[C]):
             said = f"{_told(member, parent)}; {said}"
         self._record(k, parent, (*notes, said), explored)
         return explored.drove
+
+    def _explored(self, candidate: C) -> Explored:
+        explored = self._explorer.explore(candidate)
+        self._results.append((candidate, explored))
+        return explored
 
     def _record(
         self,

@@ -117,10 +117,12 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
 
     attempts = [(each.k, each.passed, each.parent) for each in run.attempts]
     assert attempts[:4] == [
-        *((1, True, None), (7, False, (1, 0)), (8, False, (1, 0)), (9, True, (1, 0)))
+        *((1, True, None), (7, False, (1, 0)), (8, True, (1, 0)), (9, True, (1, 0)))
     ]
     assert {each.parent for each in run.attempts[4:]} <= {(1, 0), (9, 0)}
+    assert run.attempts[2].unchanged
     assert run.attempts[2].notes[-1] == "same code as k=1 j=0"
+    assert run.attempts[4].failed_tests == run.attempts[1].failed_tests
     assert "4 of 4 disturbed episodes" in run.attempts[3].notes[-1]
 
     found = read_improvement(out)
