@@ -9,6 +9,7 @@ from tdac_agent.builtin.level import LevelController
 from tdac_agent.builtin.parameters import P, read_parameters
 from tdac_agent.builtin.repair import learn_bounds, read_rules, repair, write_rules
 from tdac_agent.builtin.template import Template
+from tdac_agent.builtin.variation import varied, varied_parameters
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import Reply, Request
@@ -56,6 +57,8 @@ class Builtin(Generic[P]):
         if request.kind == "generate":
             parameters, _ = read_rules(request.rules, self.template.kind)
             return Reply(self._file(parameters), notes=(_describe(parameters),))
+        if request.kind == "improve":
+            return self._varied(request)
         if request.report is None:
             raise ValueError(f"a request to {request.kind} needs a report")
         remembered, bounds = read_rules(request.rules, self.template.kind)
@@ -73,6 +76,16 @@ class Builtin(Generic[P]):
             rules = write_rules(parameters, changes, bounds, k)
             return Reply(_operations(rules), notes=tuple(notes))
         return Reply(self._file(parameters), notes=tuple(notes))
+
+    def _varied(self, request: Request) -> Reply:
+        """Another controller near one that works."""
+        source = request.controller or ""
+        known = read_parameters(source, self.template.kind)
+        if known is None:  # it is not from the template
+            changed, notes = varied(source, request.sample)
+            return Reply(f"```python\n{changed}```\n", notes=notes)
+        parameters, notes = varied_parameters(known, request.sample)
+        return Reply(self._file(parameters), notes=notes)
 
     def _file(self, parameters: P) -> str:
         return f"```python\n{self.template.render(parameters)}```\n"

@@ -5,14 +5,48 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterator
+from dataclasses import fields
 from typing import NamedTuple
 
 import numpy as np
 
+from tdac_agent.builtin.parameters import P
+
+STEP = 0.15
+"""Standard deviation of a change of a parameter, as a part of its range."""
 SPREAD = 0.25
 """Standard deviation of the logarithm of a factor."""
 MOST_CHANGED = 2
 DIGITS = 3
+
+
+def varied_parameters(
+    parameters: P, seed: tuple[int, ...]
+) -> tuple[P, tuple[str, ...]]:
+    """Moves one or two parameters of a template by random steps within their bounds.
+
+    Args:
+        parameters: The parameters.
+        seed: Seed of the choice and of the steps.
+
+    Returns:
+        The variation, and a note for each change, as `varied` has them.
+    """
+    random = np.random.default_rng(seed)
+    known, changed = fields(parameters), parameters
+    count = 1 + int(random.integers(MOST_CHANGED))
+    for number in sorted(random.choice(len(known), count, replace=False).tolist()):
+        name, bounds = known[number].name, known[number].metadata
+        low, high, value = bounds["low"], bounds["high"], getattr(parameters, name)
+        step = STEP * (high - low) * float(random.standard_normal())
+        inside = low <= value + step <= high
+        changed = changed.changed(**{name: value + step if inside else value - step})
+    notes = [
+        f"{name.upper()} {before:g} -> {after:g}"
+        for name in (item.name for item in known)
+        if (before := getattr(parameters, name)) != (after := getattr(changed, name))
+    ]
+    return changed, tuple(notes)
 
 
 def varied(source: str, seed: tuple[int, ...]) -> tuple[str, tuple[str, ...]]:

@@ -16,6 +16,7 @@ from tdac_agent.prompting.prompt import generate_prompt, load_template
 from tdac_agent.prompting.rules import RepairRule, RuleBook
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 from tdac_agent.synthesis.setup import checked_vision
+from tdac_agent.synthesis.workload import most_variations
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.task_file import Profile
 from tdac_envs.ladder.task_sets import TaskSet
@@ -35,7 +36,7 @@ def run(
         profile: What a controller must define; by default as the task says.
         models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
             `max_output`, `rules`, `max_cost` and `max_tokens`, as for `synthesize`.
-        loop: `iterations`, `patience`, `candidates`, `refine` and `vision`.
+        loop: `iterations`, `patience`, `candidates`, `refine`, `vision` and `improve`.
         as_json: Whether to print the forecast as JSON.
     """
     for name in _names(models):
@@ -72,17 +73,19 @@ def show(
         setting: Setting of the task, or the task set.
         question: The question.
         models: As for `run`.
-        loop: `iterations`, `patience`, `candidates`, `refine` and `vision`; on a set
-            `improve`.
+        loop: `iterations`, `patience`, `candidates`, `refine`, `vision` and `improve`.
         as_json: Whether to print the forecast as JSON.
     """
     names = _names(models)
-    improve = loop.get("improve", 0)
+    terms = dict(loop)
+    improve = terms.pop("improve")
     checked_vision(loop["vision"], names[1], loop["patience"], improve)
+    varied = most_variations(improve, on_set=isinstance(setting, TaskSet))
     options = Options(setting, models["base_url"], models["key_over_http"])
     missing = [line for each in names for line in missing_for_name(each, options)]
     limits = ("base_url", "max_output", "max_cost", "max_tokens")
-    terms = {**loop, **{limit: models[limit] for limit in limits}}
+    terms |= {limit: models[limit] for limit in limits}
+    terms["variations"] = varied
     forecast = cost_of(name, question, *names, load_prices(), **terms)
     if as_json:
         sys.stdout.write(forecast.model_dump_json(indent=2) + "\n")
@@ -108,10 +111,15 @@ def _estimates(forecast: CostForecast) -> list[str]:
     if forecast.first_cost is not None:
         reserved = format_usd(forecast.first_cost)
         lines.append(f"first question: at most {reserved}, reserved before it is asked")
-    whole = f"whole run: {forecast.questions} questions (K={k}, J={j})"
+    whole = f"whole run: {forecast.questions} questions (K={k}, J={j}"
+    if forecast.variations:
+        whole += f", and {forecast.variations} to improve what works"
+    whole += ")"
     if forecast.pictures:
         whole += f" with {forecast.pictures} pictures"
     whole += " if no controller passes"
+    if forecast.variations:
+        whole += " before the last one"
     if forecast.cost_once is not None and forecast.cost_most is not None:
         whole += (
             f": at most {format_usd(forecast.cost_once)}, or "

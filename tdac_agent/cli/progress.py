@@ -66,18 +66,8 @@ class Progress:
             self._spinner.update(text="checking the suite")
         elif kind == "prove.step":
             self._spinner.update(text=f"checking the suite: {record['doing']} …")
-        elif kind == "call.intent":
-            verb = VERBS[record["kind"]]
-            self._spinner.update(
-                text=f"{at}  {verb} controller.py: {escape(record['model'])}"
-            )
-        elif kind == "call.fault":
-            self._print_fault(at, record)
-        elif kind == "call.reply":
-            for note in record["notes"]:
-                self.say(f"  {at}", escape(note), "dim")
-        elif kind == "call.unused":
-            self._print_unused(at, record)
+        elif kind.startswith("call."):
+            self._show_call(at, record)
         elif kind == "rules":
             for note in record["notes"]:
                 self.say(f"  k={record['k']}", f"rules: {escape(note)}", "dim")
@@ -85,6 +75,8 @@ class Progress:
             self._spinner.update(text=f"{at}  testing controller.py in the sandbox")
         elif kind == "verify.end":
             self._print_attempt(at, record)
+        elif kind.startswith("drive."):
+            self._show_episodes(at, record)
 
     def doing(self, text: str) -> None:
         """Shows the current activity."""
@@ -97,6 +89,20 @@ class Progress:
         if record["event"] == "run.resume":
             answers = _answers(record["answers"])
             self._console.print(f"continuing: {answers}{_unanswered(record)}")
+
+    def _show_call(self, at: str, record: dict[str, Any]) -> None:
+        """Shows a question, or what came of it."""
+        kind = record["event"]
+        if kind == "call.intent":
+            verb = VERBS[record["kind"]]
+            self.doing(f"{at}  {verb} controller.py: {escape(record['model'])}")
+        elif kind == "call.fault":
+            self._print_fault(at, record)
+        elif kind == "call.reply":
+            for note in record["notes"]:
+                self.say(f"  {at}", escape(note), "dim")
+        elif kind == "call.unused":
+            self._print_unused(at, record)
 
     def _print_fault(self, at: str, record: dict[str, Any]) -> None:
         wait = record["wait"]
@@ -116,8 +122,18 @@ class Progress:
             said = f"it says: “{record['says']}”" if record["says"] else "it is empty"
             self.say(f"  {at}", escape(said), "dim")
 
+    def _show_episodes(self, at: str, record: dict[str, Any]) -> None:
+        """Shows how disturbed episodes go, and prints those of the comparison."""
+        reached = f"{record.get('reached', 0)} of {record['episodes']} goals reached"
+        if record["event"] != "drive.end":
+            self.doing(f"{at}  disturbed episodes: {reached}")
+        elif record["what"] == "comparison":
+            self.say(f"  {at}", f"other disturbed episodes: {reached}", "dim")
+
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
-        if record["passed"]:
+        if record.get("parent") is not None:
+            self.say_varied(at, record)
+        elif record["passed"]:
             self.say(f"✔ {at}", "all tests passed", "green")
         elif not record["valid"]:
             why = "; ".join(record["notes"][-1:])
@@ -128,6 +144,11 @@ class Progress:
             failed = record["failed_tests"]
             names = escape(list_tests(failed, 3))
             self.say(f"[red]✘ {at}[/]", f"[red]{len(failed)} failed:[/] {names}")
+
+    def say_varied(self, at: str, record: dict[str, Any]) -> None:
+        """Prints what came of a variation of a candidate."""
+        said = escape("; ".join(record["notes"][-1:]))
+        self.say(f"~ {at}", said, "" if record["valid"] else "yellow")
 
     def say(self, place: str, text: str, style: str = "") -> None:
         """Prints a line in two columns, so that wrapped text stays below the text."""

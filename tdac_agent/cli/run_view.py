@@ -12,6 +12,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.library.listing import resume_command
 from tdac_agent.models.budget import format_usd
+from tdac_agent.runs.improvement_record import read_improvement
 from tdac_agent.runs.run_record import Attempt, Run
 
 
@@ -25,6 +26,11 @@ def show_run(run: Run, console: Console) -> None:
             f"[bold green]verified[/] in iteration {run.tau}, {run.seconds:.1f} s: "
         )
         console.print(f"{ending}{escape(str(run.controller))}", soft_wrap=True)
+        found = read_improvement(folder) if run.improve else None
+        if found is not None:
+            _print_indented(console, found.told)
+        if run.reason:
+            _print_indented(console, f"the search ended early: {run.reason}")
         _print_indented(console, usage)
         evidence = f"{folder / 'report.json'}, {folder / 'trajectory.png'}"
         _print_unwrapped(console, f"evidence: {evidence}")
@@ -80,11 +86,14 @@ def _attempts(run: Run) -> Table:
     table.add_column("k", justify="right")
     table.add_column("j", justify="right")
     table.add_column("result")
-    table.add_column("failed tests")
+    varied = any(attempt.parent is not None for attempt in run.attempts)
+    table.add_column("failed tests" + (", or how it drives" if varied else ""))
     table.caption = "k: iteration; j: attempt to repair its candidate (0: the first)"
+    if varied:
+        table.caption += f"; k above {run.iterations}: a variation"
     table.caption_justify = "left"
     for attempt in run.attempts:
-        failed = list_tests(attempt.failed_tests, 4) or _why_invalid(attempt)
+        failed = list_tests(attempt.failed_tests, 4) or _remark(attempt)
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
 
@@ -96,9 +105,10 @@ def list_tests(tests: Sequence[str], most: int) -> str:
     return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
-def _why_invalid(attempt: Attempt) -> str:
-    """Why an attempt has no valid code, from its last note; empty if it has."""
-    return "" if attempt.valid else "; ".join(attempt.notes[-1:])
+def _remark(attempt: Attempt) -> str:
+    """The last note on an attempt without valid code, or on a variation."""
+    told = not attempt.valid or attempt.parent is not None
+    return "; ".join(attempt.notes[-1:]) if told else ""
 
 
 def _result(attempt: Attempt) -> str:

@@ -75,6 +75,14 @@ def synth(
             "repaired. Each counts as an iteration.",
         ),
     ] = 1,
+    improve: Annotated[
+        Optional[int],  # noqa: UP045
+        number_flag(
+            min=32,
+            help="Further simulated episodes, disturbed ones on a task: vary what "
+            "works, and select the best of all.",
+        ),
+    ] = None,
     suite: Suite = None,
     learner: Learner = "builtin",
     optimizer: Optimizer = None,
@@ -163,15 +171,6 @@ def synth(
             rich_help_panel=SETS,
         ),
     ] = None,
-    improve: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(
-            min=32,
-            help="Further simulated episodes: vary the candidates that work, and "
-            "select the best of all.",
-            rich_help_panel=SETS,
-        ),
-    ] = None,
     then_verify: Annotated[
         bool,
         typer.Option(
@@ -215,8 +214,9 @@ def synth(
         "candidates": candidates,
         "refine": refine,
         "vision": vision,
+        "improve": improve or 0,
     }
-    on_set = SynthSetFlags(set_name, episodes, feedback_episodes, improve, then_verify)
+    on_set = SynthSetFlags(set_name, episodes, feedback_episodes, then_verify)
     if on_set != SynthSetFlags():
         from tdac_agent.cli import synth_set
 

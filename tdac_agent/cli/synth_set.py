@@ -24,6 +24,7 @@ from tdac_agent.library.listing import next_folder
 from tdac_agent.models.choice import check_name
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.runs.improvement_record import NOT_SHOWN, is_shown
 from tdac_agent.runs.resume import check_own, existing_run
 from tdac_agent.runs.run_record import Run
 from tdac_agent.runs.selection_record import CandidateFigures, Improvement, Selection
@@ -50,10 +51,11 @@ class SetProgress(Progress):
             case "drive.step":
                 so_far = f"{record['reached']} of {record['done']} worlds reached"
                 self.doing(f"{_driven(record)}: {so_far}")
-            case "drive.end" if record["what"] in FINAL:
-                result = f"{record['reached']} of {record['driven']} reached"
-                worlds = f"{record['what']} worlds"
-                self.say(f"  {_at(record)}", f"{worlds}: {result}", "dim")
+            case "drive.end":
+                if record["what"] in FINAL:
+                    result = f"{record['reached']} of {record['driven']} reached"
+                    worlds = f"{record['what']} worlds"
+                    self.say(f"  {_at(record)}", f"{worlds}: {result}", "dim")
             case "hidden.start":
                 self.doing("driving on hidden worlds")
             case _:
@@ -62,7 +64,7 @@ class SetProgress(Progress):
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         said = escape("; ".join(record["notes"][-1:]))
         if record["parent"] is not None:
-            self.say(f"~ {at}", said, "" if record["valid"] else "yellow")
+            self.say_varied(at, record)
         elif not record["valid"]:
             self.say(f"– {at}", said, "yellow")
         elif record["unchanged"]:
@@ -138,7 +140,7 @@ def dry_run(
     Args:
         flags: Flags that concern task sets.
         models: As for `dry_run.run`.
-        loop: `iterations`, `patience`, `candidates`, `refine` and `vision`.
+        loop: `iterations`, `patience`, `candidates`, `refine`, `vision` and `improve`.
         as_json: Whether to print the forecast as JSON.
     """
     assert flags.name is not None
@@ -147,8 +149,7 @@ def dry_run(
     tasks = load_set(flags.name)
     template = load_template(models["prompt"])
     question = set_prompt(tasks, dry.rules_of(models), template)
-    terms = {**loop, "improve": flags.improve or 0}
-    return dry.show(tasks.name, tasks, question, models, terms, as_json)
+    return dry.show(tasks.name, tasks, question, models, loop, as_json)
 
 
 def _write(wanted: dict[str, Any], console: Console) -> int:
@@ -256,7 +257,7 @@ def _improvement(found: Improvement) -> str:
     assert found.after is not None
     assert found.low is not None
     assert found.high is not None
-    told = "" if found.low > 0.0 else "; no improvement is shown"
+    told = "" if is_shown(found.low, found.p) else f"; {NOT_SHOWN}"
     return (
         f"improving: {about}; time score {found.before:.3f} ({base}) -> "
         f"{found.after:.3f} on {found.worlds} other worlds: "

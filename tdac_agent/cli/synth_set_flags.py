@@ -16,7 +16,6 @@ class SynthSetFlags:
     name: str | None = None
     episodes: int | None = None
     feedback_episodes: int | None = None
-    improve: int | None = None
     then_verify: bool = False
 
     def check(self, task: TaskFlags, others: Mapping[str, object]) -> None:

@@ -32,7 +32,6 @@ from tdac_agent.evaluation.finished import (
     finished_evaluation,
 )
 from tdac_agent.evaluation.overlay import Overlay, draw_overlay
-from tdac_agent.evaluation.seeded_run import run_seeds
 from tdac_agent.evaluation.unfinished import folder_of, open_store
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
@@ -44,6 +43,7 @@ from tdac_agent.verification.judge.kept_episodes import KeptEpisode, kept_episod
 from tdac_agent.verification.judge.seeded import SeededJob
 from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.seeded_run import run_seeds
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import VARIATIONS

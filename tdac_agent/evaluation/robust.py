@@ -12,7 +12,6 @@ from tdac_agent.evaluation.robust_report import (
     RobustReport,
     summarise,
 )
-from tdac_agent.evaluation.seeded_run import run_seeds
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.disturbance import Disturbance
@@ -27,6 +26,7 @@ from tdac_agent.verification.judge.sequential import (
     SequentialTest,
 )
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.seeded_run import run_seeds
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import whole_number
 

@@ -22,7 +22,6 @@ from tdac_agent.evaluation.kept_sets import (
     unfinished,
 )
 from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, on_record
-from tdac_agent.evaluation.seeded_run import run_job
 from tdac_agent.evaluation.set_report import (
     SetProvenance,
     SetReport,
@@ -40,6 +39,7 @@ from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks
 from tdac_agent.verification.judge.set_job import SetJob, WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.seeded_run import run_job
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError

@@ -56,16 +56,18 @@ def overview_of(told: Sequence[Told]) -> Overview:
     groups = [frames.only(**{name: row[name] for name in KIND}) for row in table]
     working = {str(one.run.folder) for one in told if one.status == "running"}
     kinds = tuple(
-        _kind(row, int(group.runs["run"].isin(working).sum()))
+        _kind(row, group.runs, group.runs["run"].isin(working))
         for row, group in zip(table, groups, strict=True)
     )
     return Overview(kinds, set_kinds, _assumptions(groups), _figures(frames))
 
 
-def _kind(row: dict[str, Any], working: int) -> dict[str, Any]:
+def _kind(
+    row: dict[str, Any], runs: pd.DataFrame, working: pd.Series
+) -> dict[str, Any]:
     return row | {
-        "running": working,
-        "cut_short": row["censored"] - working,
+        "running": int(working.sum()),
+        "cut_short": int((runs["censored"] & ~working).sum()),
         "sr": _rate(row, "sr"),
         "first_pass": _rate(row, "first_pass"),
         "cs_K": _rate(row, "cs_K"),

@@ -18,6 +18,7 @@ from tdac_agent.models.picture import MOST_BYTES as MOST_PICTURE_BYTES
 from tdac_agent.models.provider import PICTURED
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import CandidateHistory, Told, learner_named
+from tdac_agent.runs.improvement_record import read_improvement
 from tdac_agent.runs.resume import resume_words
 from tdac_agent.runs.run_record import (
     AGENT,
@@ -84,6 +85,7 @@ def section_of(
         "spent": spent(told),
         "origin": list(_origin(told)),
         "commands": list(_commands(told, name)),
+        "improvement": read_improvement(told.run.folder) if told.run.improve else None,
         "units": None if told.report is None else UNITS[told.report.provenance.unit],
     }
 
@@ -203,7 +205,7 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     if run.on_set:
         limits += ["--episodes", str(run.episodes)]
         limits += ["--feedback-episodes", str(run.feedback_episodes)]
-        limits += ["--improve", str(run.improve)] if run.improve else []
+    limits += ["--improve", str(run.improve)] if run.improve else []
     if run.given_rules:
         limits += ["--rules", f"{name}/{GIVEN_RULES_FILE}"]
     limits += ["--vision"] if run.vision else []

@@ -115,11 +115,15 @@ def row_of(folder: Path) -> dict[str, Any]:
 
 
 def _begun(run: Run) -> int:
-    """The iteration that was begun last, though its candidate may not be judged yet."""
+    """The iteration that was begun last, though its candidate may not be judged yet.
+
+    Variations of what works are no iterations.
+    """
     folders = (run.folder / "iterations").glob("k*/")
     names = [folder.name[1:] for folder in folders]
     begun = [int(name) for name in names if name.isascii() and name.isdecimal()]
-    return max([*begun, *(attempt.k for attempt in run.attempts)], default=0)
+    ks = [*begun, *(attempt.k for attempt in run.attempts)]
+    return max((k for k in ks if k <= run.iterations), default=0)
 
 
 def resume_command(run: Run) -> str:

@@ -94,7 +94,7 @@ def frames_of(runs: Iterable[Run]) -> Frames:
         if run.on_set:
             continue
         rows.append(_row(run))
-        candidates += [_candidate(run, attempt) for attempt in run.attempts]
+        candidates += [_candidate(run, attempt) for attempt in run.of_loop]
     return _frames(rows, candidates)
 
 
@@ -145,7 +145,7 @@ def _row(run: Run) -> Row:
         "status": run.status,
         "tau": run.tau,
         "done": _done(run),
-        "censored": not run.finished,
+        "censored": not run.finished and run.tau is None,
         "tokens": tokens or None,
         "cost": run.cost,
         "seconds": run.seconds,
@@ -156,10 +156,10 @@ def _done(run: Run) -> int:
     """Number of completed iterations; those that began side by side end together."""
     done = 0
     for _, group in itertools.groupby(
-        sorted({a.k for a in run.attempts}), lambda k: (k - 1) // run.candidates
+        sorted({a.k for a in run.of_loop}), lambda k: (k - 1) // run.candidates
     ):
         ks = set(group)
-        tried = [a for a in run.attempts if a.k in ks]
+        tried = [a for a in run.of_loop if a.k in ks]
         first = min(ks)
         size = min(run.candidates, run.iterations - first + 1)
         complete = len(ks) == size and all(not a.valid for a in tried if a.j == 0)

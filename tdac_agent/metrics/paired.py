@@ -94,6 +94,36 @@ def bootstrap(scores: Mapping[str, Array], seed: int = 0) -> dict[str, Bootstrap
     return found
 
 
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Means before and after a change, and the interval of their difference.
+
+    Attributes:
+        before: Mean before it.
+        after: Mean after it.
+        low: Lower end of the difference, at the confidence `LEVEL`.
+        high: Upper end of the difference.
+        p: Two-sided p-value of the hypothesis that there is none; see
+            `Bootstrap.p_value`.
+    """
+
+    before: float
+    after: float
+    low: float
+    high: float
+    p: float
+
+
+def paired_change(before: Sequence[float], after: Sequence[float]) -> Change:
+    """Compares scores in the same worlds or episodes, in the same order."""
+    scores = {"before": before, "after": after}
+    found = bootstrap({name: np.array([each]) for name, each in scores.items()})
+    one, other = found["before"], found["after"]
+    change = other.minus(one)
+    ends = change.estimate()
+    return Change(one.mean, other.mean, ends.low, ends.high, change.p_value())
+
+
 def over_sets(parts: Sequence[Bootstrap]) -> Bootstrap:
     """The mean over sets of equal weight."""
     return Bootstrap(

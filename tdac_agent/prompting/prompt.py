@@ -219,6 +219,7 @@ def repair_question(
     rules: tuple[RepairRule, ...] = (),
     unchanged: bool = False,
     about: str = ONE_TASK,
+    aim: str = "",
     picture: NamedPicture | None = None,
 ) -> str:
     """Like `repair_prompt`, from the text of the feedback.
@@ -232,6 +233,7 @@ def repair_question(
         rules: The rules in force, with their effects.
         unchanged: Whether the last edit returned the same code.
         about: What the scope `task` of a rule means.
+        aim: What an improved controller shall do better.
         picture: The picture that goes with the question.
     """
     return (
@@ -245,6 +247,7 @@ def repair_question(
             rules=rules,
             unchanged=unchanged,
             about=about,
+            aim=aim,
             picture=picture,
             most_operations=MAX_OPERATIONS,
             longest_rule=MAX_RULE_CHARS,

@@ -326,7 +326,8 @@ class Recorder:
         self.run.reason = str(facts.get("reason", ""))
         self.run.enough = str(facts.get("enough", ""))
         self.run.outlook = str(facts.get("outlook", ""))
-        self.run.censored = not self.run.finished
+        solved = self.run.tau is not None and not self.run.on_set
+        self.run.censored = not (self.run.finished or solved)
         self.event("run.end", status=status, **facts)
         self.save()
 

@@ -178,6 +178,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "iterations": run.iterations,
         "patience": run.patience,
         "candidates": run.candidates,
+        "improve": run.improve,
         "seed": run.seed,
         "index": run.index,
         "start_from": _text(initial) if initial.is_file() else None,

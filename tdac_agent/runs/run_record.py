@@ -125,7 +125,7 @@ class Run(PrintableRecord):
         None, description="Most episodes of a test of a candidate on a task set."
     )
     improve: int = Field(
-        0, description="Further simulated episodes, to improve what works; on sets."
+        0, description="Further simulated episodes, to improve what works."
     )
     then_verify: bool = Field(
         False, description="Whether the selected controller drives on hidden worlds."
@@ -145,6 +145,11 @@ class Run(PrintableRecord):
     enough: str = Field("", description="Flag to resume with, if the budget ended it.")
     outlook: str = Field("", description="Limits that suffice, if the budget ended it.")
     censored: bool = Field(False, description="Ended before success or K.")
+
+    @property
+    def of_loop(self) -> list[Attempt]:
+        """The attempts of the loop: those that are no variations of what works."""
+        return [each for each in self.attempts if each.parent is None]
 
     @property
     def verified(self) -> bool:

@@ -58,6 +58,10 @@ class Improvement(_Record):
     after: float | None = Field(None, description="That of the selected one.")
     low: float | None = Field(None, description="Lower end of the difference.")
     high: float | None = Field(None, description="Upper end of the difference.")
+    p: float | None = Field(
+        None,
+        description="p-value of no difference; not below what so few worlds can show.",
+    )
 
 
 class Selection(_Record):

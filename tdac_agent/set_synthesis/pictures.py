@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 from tdac_agent.episodes.trajectory import Rollout, Trajectory
 from tdac_agent.evaluation.kept_sets import TRAJECTORIES
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
-from tdac_agent.verification.diagnosis.figures import event_of
+from tdac_agent.verification.diagnosis.figures import EpisodeFigures, event_of
 from tdac_agent.verification.diagnosis.model_picture import (
     FailurePicture,
     picture_of_event,
@@ -20,16 +19,6 @@ from tdac_agent.verification.diagnosis.model_picture import (
 from tdac_agent.verification.judge.set_job import WorldEpisode, shown_units
 from tdac_envs.ladder.picture import backdrop_of
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet
-
-
-class _Figures(NamedTuple):
-    """See `tdac_agent.verification.diagnosis.figures.Figures`."""
-
-    name: str
-    held_out: bool
-    outcome: str
-    d0: float
-    d_min: float
 
 
 def world_picture(
@@ -66,8 +55,8 @@ def _drawn(
 ) -> FailurePicture:
     units, rollout = shown_units(tasks.file, task), _rollout(task, episode, trajectory)
     distances = rollout.distances().tolist()
-    figures = _Figures(
-        rollout.name, False, rollout.outcome, distances[0], min(distances)
+    figures = EpisodeFigures(
+        rollout.name, rollout.outcome, distances[0], min(distances)
     )
     found = diagnose(rollout, task, units)
     event = event_of(task, trajectory, figures, found, units)

@@ -43,6 +43,5 @@ def resume_set_arguments(
         "tasks": load_set(file),
         "episodes": run.episodes,
         "feedback_episodes": run.feedback_episodes,
-        "improve": run.improve,
         **flags,
     }

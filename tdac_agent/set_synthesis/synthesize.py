@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
-from tdac_agent.metrics.paired import bootstrap
+from tdac_agent.metrics.paired import paired_change
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider, recorded_seed
@@ -22,15 +20,21 @@ from tdac_agent.runs.recorder import Event
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
 from tdac_agent.runs.selection_record import Improvement
-from tdac_agent.set_synthesis.archive import Archive
 from tdac_agent.set_synthesis.delivery import deliver_selected, start_on_set
 from tdac_agent.set_synthesis.hidden import verify_hidden
-from tdac_agent.set_synthesis.improve import ImprovingSearch, base_of, finalists
+from tdac_agent.set_synthesis.improve import (
+    SetExplorer,
+    base_of,
+    finalists,
+    founders,
+)
 from tdac_agent.set_synthesis.search import search
 from tdac_agent.set_synthesis.selection import select
 from tdac_agent.set_synthesis.trials import MOST_EPISODES, Candidate, Trials
+from tdac_agent.synthesis.archive import Archive
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
 from tdac_agent.synthesis.dialogue import Dialogue
+from tdac_agent.synthesis.improve import ImprovingSearch
 from tdac_agent.synthesis.setup import (
     account_of,
     checked_vision,
@@ -262,39 +266,37 @@ def _finish(writing: _Writing) -> None:
     recorder.finish(status, **facts)  # type: ignore[arg-type]
 
 
-def _improved(writing: _Writing, written: list[Candidate]) -> tuple[Archive, str]:
+def _improved(
+    writing: _Writing, written: list[Candidate]
+) -> tuple[Archive[Candidate], str]:
     """Searches for improvements; also returns what ended this early, if anything did.
 
     Without money for further questions, the run goes on with what there is.
     """
-    search = ImprovingSearch(writing.dialogue, writing.trials, written)
+    trials = writing.trials
+    begun = founders(trials, written)
+    search = ImprovingSearch(writing.dialogue, SetExplorer(trials), written)
     try:
-        search.run()
+        search.run(begun)
     except OutOfBudget as error:
         return search.archive, str(error)
     return search.archive, ""
 
 
-def _compared(trials: Trials, archive: Archive, chosen: Candidate) -> Improvement:
+def _compared(
+    trials: Trials, archive: Archive[Candidate], chosen: Candidate
+) -> Improvement:
     """Compares the selected candidate with what the search began with."""
     base = base_of(archive)
     about = {"variations": archive.variations, "k": base.k, "j": base.j}
     if chosen is base:
         return Improvement(worlds=0, **about)
-    times = {
-        name: np.array([[e.time_score for e in trials.compare(each).episodes]])
-        for name, each in (("before", base), ("after", chosen))
-    }
-    found = bootstrap(times)
-    change = found["after"].minus(found["before"]).estimate()
-    return Improvement(
-        worlds=found["before"].worlds,
-        before=found["before"].mean,
-        after=found["after"].mean,
-        low=change.low,
-        high=change.high,
-        **about,
+    before, after = (
+        [each.time_score for each in trials.compare(one).episodes]
+        for one in (base, chosen)
     )
+    change = asdict(paired_change(before, after))
+    return Improvement(worlds=len(before), **change, **about)
 
 
 def _why_none(able: list[Candidate]) -> str:

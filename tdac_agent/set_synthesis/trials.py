@@ -39,7 +39,7 @@ class Candidate:
         folder: Its folder.
         feedback: Reports of its tests, in order.
         validation: Its episodes on validation worlds.
-        explored: Its episodes on the worlds for variations.
+        explored: Its report on the worlds for variations, if it was to drive there.
     """
 
     k: int
@@ -48,7 +48,7 @@ class Candidate:
     folder: Path
     feedback: list[SetReport] = field(default_factory=list)
     validation: list[WorldEpisode] = field(default_factory=list)
-    explored: list[WorldEpisode] = field(default_factory=list)
+    explored: SetReport | None = None
 
     @property
     def drives(self) -> bool:
@@ -58,7 +58,8 @@ class Candidate:
     @property
     def explored_score(self) -> float | None:
         """Mean time score on the worlds for variations; None if it did not drive."""
-        return _mean(self.explored) if self.explored else None
+        report = self.explored
+        return _mean(report.episodes) if report and report.episodes else None
 
     @property
     def first_failure(self) -> SetReport | None:
@@ -91,7 +92,7 @@ class Candidate:
         return _mean(self.validation)
 
 
-def _mean(episodes: list[WorldEpisode]) -> float:
+def _mean(episodes: Sequence[WorldEpisode]) -> float:
     return fmean(each.time_score for each in episodes) if episodes else 0.0
 
 
@@ -196,7 +197,7 @@ class Trials:
         """Drives on the worlds for variations, the same ones for each candidate."""
         first, count = self._first_for("improve"), self.shares.block
         report = self._drive(candidate, first, count, candidate.exploring_folder)
-        candidate.explored.extend(report.episodes)
+        candidate.explored = report
         self.explore_used += report.worlds
         self.explore_left -= report.worlds
         return report

@@ -83,7 +83,16 @@ def _report(run: Run, source: str, folder: Path, tests: Tests) -> Report:
 def deliver(
     recorder: Recorder, task: Task, k: int, source: str, report: Report, evidence: Path
 ) -> None:
-    """Copies the verified controller and its evidence to the top of the run folder."""
+    """Ends a run with its first verified controller, of iteration `k`."""
+    place(recorder, task, source, report, evidence)
+    recorder.run.tau = k
+    recorder.finish("verified", k=k)
+
+
+def place(
+    recorder: Recorder, task: Task, source: str, report: Report, evidence: Path
+) -> None:
+    """Copies a verified controller and its evidence to the top of the run folder."""
     folder = recorder.run.folder
     write_atomic(folder / "controller.py", source)
     write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")
@@ -93,5 +102,3 @@ def deliver(
     outcomes = {episode.name: episode.outcome for episode in report.episodes}
     trajectories = load_trajectories(folder / "trajectories")
     draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")
-    recorder.run.tau = k
-    recorder.finish("verified", k=k)

@@ -37,7 +37,10 @@ class CostForecast(PrintableRecord):
     first_needs: str = Field(
         description="Flag that the first question needs; empty if the limits suffice."
     )
-    questions: int = Field(description="Questions of the run, if no candidate passes.")
+    questions: int = Field(
+        description="Questions of the run, if no candidate passes before the last one."
+    )
+    variations: int = Field(description="Part of them that vary what works, at most.")
     pictures: int = Field(description="Most pictures that go with them.")
     cost_once: float | None = Field(
         description="Maximum in USD if each first answer can be used."
@@ -63,7 +66,7 @@ def cost_of(
     patience: int = 1,
     refine: bool = True,
     candidates: int = 1,
-    improve: int = 0,
+    variations: int = 0,
     vision: bool = False,
     base_url: str | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
@@ -82,7 +85,7 @@ def cost_of(
         patience: J.
         refine: Whether failures become rules.
         candidates: N, asked for side by side.
-        improve: Simulated episodes to improve what works, on a task set.
+        variations: Most variations of what works (`most_variations`).
         vision: Whether pictures go with questions to edit or improve a controller.
         base_url: URL of the models' server; by default the vendor's.
         max_output: Token limit of an answer.
@@ -90,7 +93,7 @@ def cost_of(
         max_tokens: Limit of tokens; by default as in `bounds_of`.
     """
     tokens = estimate_tokens(prompt)
-    terms = {"candidates": candidates, "improve": improve}
+    terms = {"candidates": candidates, "variations": variations}
     work = whole(iterations, patience, refine=refine, **terms)
     pictures = whole(iterations, patience, refine=False, **terms).optimizer
     pictures = pictures if vision else 0
@@ -135,6 +138,7 @@ def cost_of(
         max_tokens=max_tokens,
         first_needs=_needed(Budget(limit, max_tokens), worst),
         questions=work.questions,
+        variations=variations,
         pictures=pictures,
         cost_once=once,
         cost_most=most,

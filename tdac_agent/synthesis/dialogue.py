@@ -133,7 +133,12 @@ class Dialogue:
         return self._code(self.optimizer, request)
 
     def improve(
-        self, k: int, source: str, text: str, picture: FailurePicture | None = None
+        self,
+        k: int,
+        source: str,
+        text: str,
+        aim: str,
+        picture: FailurePicture | None = None,
     ) -> ModelAnswer:
         """Asks for a better controller, candidate (k, 0).
 
@@ -141,6 +146,7 @@ class Dialogue:
             k: Number of the candidate.
             source: Source of the controller.
             text: How it drives, and what was tried with it.
+            aim: What to raise.
             picture: A picture of a failure.
         """
         images = self._images("improve", k, 0, picture)
@@ -149,6 +155,7 @@ class Dialogue:
             self._question(),
             source,
             text,
+            aim=aim,
             picture=self._named(images, picture),
         )
         request = Request(

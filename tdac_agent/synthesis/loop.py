@@ -26,10 +26,13 @@ from tdac_agent.synthesis.calls import Calls, OutOfBudget
 from tdac_agent.synthesis.candidates import (
     Tests,
     deliver,
+    place,
     verify_all,
     verify_candidate,
 )
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
+from tdac_agent.synthesis.disturbed import MOST_EPISODES
+from tdac_agent.synthesis.improve_task import TaskCandidate, improve_verified
 from tdac_agent.synthesis.setup import (
     account_of,
     checked_vision,
@@ -38,6 +41,8 @@ from tdac_agent.synthesis.setup import (
     open_record,
     settled_seed,
 )
+from tdac_agent.synthesis.workload import LEAST_IMPROVE
+from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.model_picture import (
     FailurePicture,
@@ -62,6 +67,7 @@ def synthesize(
     iterations: int = 20,
     patience: int = 1,
     candidates: int = 1,
+    improve: int = 0,
     seed: int | None = None,
     start_from: str | None = None,
     base_url: str | None = None,
@@ -80,7 +86,7 @@ def synthesize(
     judge: WarmJudge | None = None,
     on_event: Event | None = None,
 ) -> Run:
-    """Writes, tests and repairs controllers until one is verified.
+    """Writes, tests and repairs controllers until one is verified, and improves it.
 
     If `out` contains the same run, unfinished, that run is resumed: recorded answers
     and verifications are reused (docs/models.md).
@@ -95,8 +101,12 @@ def synthesize(
         patience: J, edits per iteration.
         candidates: N, new controllers that are asked for side by side, each of them an
             iteration. They are judged in parallel, and the best one is repaired.
+        improve: Simulated disturbed episodes (docs/robustness.md) for variations of
+            verified candidates (`tdac_agent.synthesis.workload.task_shares`); 0 for
+            none.
         seed: Seed of the jittered starts of all candidates. By default each candidate
             has its own, as for `verify`; a replay uses the seed of its recorded run.
+            With `improve`, one for all is drawn; the disturbed episodes follow from it.
         start_from: Source of an initial controller instead of a generated one.
         base_url: Server of `anthropic:` or `openai:` models; by default the vendor's.
         key_over_http: Whether a key may be sent unencrypted to such a server on
@@ -122,6 +132,7 @@ def synthesize(
         The run; if `run.verified`, `run.controller` is the verified controller.
 
     Raises:
+        TaskError: A number is out of range, or the environment has no disturbances.
         RunError: The folder cannot be used, or contains another run.
         ProviderError: A model cannot be used, e.g. without its key, or nothing bounds
             what it costs; or pictures would have no effect.
@@ -129,6 +140,9 @@ def synthesize(
         PromptError: The template cannot be used.
         Fault: The sandbox, suite or provider is broken; the fault is also recorded.
     """
+    if improve:
+        whole_number("improve", improve, LEAST_IMPROVE, MOST_EPISODES)
+        task.disturbed_options(Disturbance())
     template, book = load_template(prompt), rules or RuleBook()
     models = choose_models(
         learner, optimizer, task.setting, base_url, key_over_http=key_over_http
@@ -146,9 +160,10 @@ def synthesize(
         patience=patience,
         candidates=whole_number("candidates", candidates, 1),
         refine=refine,
-        vision=checked_vision(vision, models[1].name, patience),
+        vision=checked_vision(vision, models[1].name, patience, improve),
         given_rules=given_lines(book),
-        seed=settled_seed(seed, models[0], out),
+        seed=settled_seed(seed, models[0], out, needed=improve > 0),
+        improve=improve,
     )
     account = account_of(models, existing_run(out), max_cost, max_tokens, budget)
     with hold_folder(out):
@@ -211,6 +226,7 @@ class _Tested:
     """A candidate and its report."""
 
     k: int
+    j: int
     source: str
     report: Report
     folder: Path
@@ -229,6 +245,8 @@ class _Loop:
         self._recorder = dialogue.calls.recorder
         # Recorded answers do not count, so that a resumed run asks as often again.
         self._empty = 0
+        # Verified ones beside the best of a group.
+        self._others: list[_Tested] = []
 
     def iteration(self, ks: Sequence[int], answers: Sequence[ModelAnswer]) -> bool:
         """Tests new candidates, and repairs the best; returns whether one passed.
@@ -261,9 +279,9 @@ class _Loop:
             self._recorder.judged(k, j, report, notes)
             failure = feedback_of(report)
             dialogue.saw(k, j, failure)
-            best = _Tested(k, source, report, folder)
+            best = _Tested(k, j, source, report, folder)
         if report.passed:
-            self._deliver(best)
+            self._finish(best)
             return True
         if run.refine:
             dialogue.summarise(k, run.patience, source, failure)
@@ -285,10 +303,11 @@ class _Loop:
         reports = verify_all(self._recorder, jobs, self._tests)
         for (k, source, notes, folder), report in zip(begun, reports, strict=True):
             self._recorder.judged(k, 0, report, notes)
-            tested.append(_Tested(k, source, report, folder))
+            tested.append(_Tested(k, 0, source, report, folder))
         if not tested:
             return None
         best = min(tested, key=lambda each: (len(each.report.failures), each.k))
+        self._others = [one for one in tested if one.report.passed and one is not best]
         # The next question is about the last one that was seen.
         for each in [*(one for one in tested if one is not best), best]:
             self._dialogue.saw(each.k, 0, feedback_of(each.report))
@@ -314,9 +333,25 @@ class _Loop:
         if learner.paid and self._empty >= MOST_SPENT and k < most:
             raise given_up(learner, self._empty, notes)
 
-    def _deliver(self, best: _Tested) -> None:
-        task, at = self._tests.task, (best.k, best.source, best.report, best.folder)
-        deliver(self._recorder, task, *at)
+    def _finish(self, first: _Tested) -> None:
+        """Delivers a verified candidate, or the best variation of it."""
+        recorder, task = self._recorder, self._tests.task
+        first_at = (first.source, first.report, first.folder)
+        if not recorder.run.improve:
+            deliver(recorder, task, first.k, *first_at)
+            return
+        recorder.run.tau = first.k
+        # An interrupted search leaves a verified controller.
+        place(recorder, task, *first_at)
+        founders = [
+            TaskCandidate(each.k, each.j, each.source, each.folder, each.report)
+            for each in (first, *self._others)
+        ]
+        chosen, stopped = improve_verified(self._dialogue, self._tests, founders)
+        if chosen is not founders[0]:
+            assert chosen.report is not None
+            place(recorder, task, chosen.source, chosen.report, chosen.folder)
+        recorder.finish("verified", k=chosen.k, j=chosen.j, reason=stopped)
 
 
 def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:

@@ -141,7 +141,7 @@ def checked_vision(
         vision: Whether they should.
         optimizer: Name of the model that gets them.
         patience: J.
-        improve: Simulated episodes to improve what works, on a task set.
+        improve: Simulated episodes to improve what works.
 
     Raises:
         ProviderError: They would have no effect.
@@ -159,13 +159,15 @@ def checked_vision(
     return vision
 
 
-def settled_seed(given: int | None, learner: Provider, out: Path) -> int | None:
+def settled_seed(
+    given: int | None, learner: Provider, out: Path, *, needed: bool = False
+) -> int | None:
     """The seed of a run; None if each of its candidates has its own.
 
-    If no secret can be kept, a seed is drawn for a new run.
+    If a seed is needed, or no secret can be kept, one is drawn for a new run.
     """
     known = recorded_seed(learner) if given is None else given
-    if known is not None or lasting_secret() is not None:
+    if known is not None or (not needed and lasting_secret() is not None):
         return known
     before = existing_run(out)
     return drawn_seed() if before is None else before.seed

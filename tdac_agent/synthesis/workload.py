@@ -19,18 +19,21 @@ FEEDBACK_TOKENS = 12_000
 
 MOST_BLOCK = 32
 LEAST_IMPROVE = 32
-"""Least number of episodes for improving: some variations on some worlds each."""
+"""Least number of episodes for improving: some variations in some episodes each."""
+ASKED_FOR_ONE = 2
+"""Most variations that are asked for on a task, for each one that can drive: many do
+not pass the tests."""
 
 
 class Shares(NamedTuple):
-    """How the simulated episodes of a run on a task set are divided.
+    """How the simulated episodes of a run are divided.
 
     Attributes:
-        feedback: For tests of candidates.
-        validation: For the selection.
+        feedback: For tests of candidates on a set.
+        validation: For the selection on a set.
         explore: For variations of candidates.
-        block: Worlds that each of these drives on.
-        comparison: Worlds on which the improved controller and what it improves drive
+        block: Episodes of each of these.
+        comparison: Episodes in which the improved controller and what it improves drive
             at the end.
     """
 
@@ -56,9 +59,38 @@ def shares(episodes: int, improve: int = 0) -> Shares:
     """
     part = improve // 8
     explore = improve - 3 * part
-    block = min(MOST_BLOCK, max(4, explore // 8))
     half = episodes // 2
-    return Shares(half, episodes - half + part, explore, block, part)
+    return Shares(half, episodes - half + part, explore, _block(explore), part)
+
+
+def task_shares(improve: int) -> Shares:
+    """Divides the episodes for improving a controller for one task.
+
+    Args:
+        improve: Their number: three quarters for variations, a quarter for the
+            comparison at the end.
+    """
+    part = improve // 8
+    explore = improve - 2 * part
+    return Shares(0, 0, explore, _block(explore), part)
+
+
+def _block(explore: int) -> int:
+    return min(MOST_BLOCK, max(4, explore // 8))
+
+
+def most_variations(improve: int, *, on_set: bool) -> int:
+    """Number of variations that a run may ask for, if each first answer is used.
+
+    Args:
+        improve: Episodes to improve what works; 0 for none.
+        on_set: Whether the run is on a task set.
+    """
+    if not improve:
+        return 0
+    if on_set:
+        return shares(0, improve).variations
+    return ASKED_FOR_ONE * task_shares(improve).variations
 
 
 class Workload(NamedTuple):
@@ -86,20 +118,19 @@ def whole(
     *,
     refine: bool = True,
     candidates: int = 1,
-    improve: int = 0,
+    variations: int = 0,
 ) -> Workload:
-    """The questions of a run in which no candidate passes.
+    """The questions of a run in which no candidate passes before the last one.
 
     Args:
         iterations: K.
         patience: J.
         refine: Whether failures become rules.
         candidates: N, of which one is repaired.
-        improve: Episodes to improve what works.
+        variations: Most variations of what works.
     """
-    varied = shares(0, improve).variations
     repaired = math.ceil(iterations / candidates)
-    return Workload(iterations, repaired * (patience + refine) + varied)
+    return Workload(iterations, repaired * (patience + refine) + variations)
 
 
 def from_here(
@@ -109,15 +140,15 @@ def from_here(
     *,
     refine: bool = True,
     candidates: int = 1,
-    improve: int = 0,
+    variations: int = 0,
 ) -> Workload:
-    """A question and all that follow it if no candidate passes."""
+    """A question and all that follow it if no candidate passes before the last one."""
     _, k, j = request.sample
     if request.kind == "improve":
-        return Workload(0, max(1, shares(0, improve).variations + 1 - k + iterations))
+        return Workload(0, max(1, variations + 1 - k + iterations))
     # Those that were asked side by side have the last k of their group.
     last = min(iterations, k + (-k) % candidates)
-    terms = {"candidates": candidates, "improve": improve}
+    terms = {"candidates": candidates, "variations": variations}
     later = whole(iterations - last, patience, refine=refine, **terms)
     left = {"generate": patience, "edit": patience - j + 1, "summarise": 0}
     mine = last - k + 1 if request.kind == "generate" else 0
@@ -161,7 +192,7 @@ def rest_of(
         run.patience,
         refine=run.refine,
         candidates=run.candidates,
-        improve=run.improve,
+        variations=most_variations(run.improve, on_set=run.on_set),
     )
     tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
     shown = _pictures_left(run, request)
@@ -188,6 +219,6 @@ def _pictures_left(run: Run, request: Request) -> int:
         run.patience,
         refine=False,
         candidates=run.candidates,
-        improve=run.improve,
+        variations=most_variations(run.improve, on_set=run.on_set),
     )
     return left.optimizer - (request.kind in PICTURED)

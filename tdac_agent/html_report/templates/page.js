@@ -216,8 +216,9 @@
     play.addEventListener("click", () => (before === null ? start() : pause()));
     scrub.addEventListener("input", () => { pause(); step = Number(scrub.value); draw(); });
     background.addEventListener("load", draw);
-    // The last candidate of a run is the verified one, if there is one.
-    show([...first.values()].at(player.dataset.begin === "last" ? -1 : 0), false);
+    // The last candidate of a loop is the verified one, if there is one.
+    const { begin } = player.dataset;
+    show(first.get(begin) ?? [...first.values()].at(begin === "first" ? 0 : -1), false);
     return { show, play: start };
   }
 })();

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import cv2
 import numpy as np
@@ -53,6 +53,20 @@ class Figures(Protocol):
     @property
     def d_min(self) -> float:
         """Least remaining path, px or m."""
+
+
+class EpisodeFigures(NamedTuple):
+    """Figures of an episode whose start is not held out; see `Figures`."""
+
+    name: str
+    outcome: str
+    d0: float
+    d_min: float
+
+    @property
+    def held_out(self) -> bool:
+        """See `Figures`."""
+        return False
 
 
 def draw_trajectories(

@@ -103,6 +103,15 @@ def shortest_path_length(task: Nominal) -> float:
     return task.shortest if len(path) < 2 else path_length(path)
 
 
+def least_steps(task: Nominal) -> float:
+    """OT of a task: its shortest path at full speed, up to the goal's tolerance.
+
+    No drive needs fewer steps; see `tdac_envs.ladder.scores`.
+    """
+    length = shortest_path_length(task) - task.goal_tolerance
+    return max(1.0, length / task.full_step)
+
+
 def spectral_arc_length(speeds: NDArray[np.float64], dt: float) -> float:
     """Smoothness of a movement (SPARC): minus the arc length of its speed's spectrum.
 

@@ -13,11 +13,12 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.figures import (
+    Figures,
     diagnosis_of,
     event_of,
     failed_episodes,
 )
-from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 from tdac_envs.drawing.backdrop import Backdrop
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drawing.closeup import Event, bounded_picture
@@ -56,15 +57,33 @@ def failure_picture(
     Returns:
         None if no such episode drove.
     """
-    units = task.setting.units
     for episode, trajectory in failed_episodes(report, trajectories):
-        if episode.held_out or not trajectory.steps:
-            continue
-        diagnosis = diagnosis_of(report, episode)
-        event = event_of(task.nominal, trajectory, episode, diagnosis, units)
-        background = pictures_of(task.setting).backdrop()
-        return picture_of_event(background, trajectory, event, units, side)
+        if not episode.held_out and trajectory.steps:
+            found = diagnosis_of(report, episode)
+            return episode_picture(task, episode, found, trajectory, side)
     return None
+
+
+def episode_picture(
+    task: Task,
+    episode: Figures,
+    diagnosis: Diagnosis | None,
+    trajectory: Trajectory,
+    side: int,
+) -> FailurePicture:
+    """The picture of a failed episode of a task.
+
+    Args:
+        task: Task whose map or world is drawn.
+        episode: Figures of the episode.
+        diagnosis: Its diagnosis, if there is one.
+        trajectory: Its trajectory.
+        side: Most width and height, px.
+    """
+    units = task.setting.units
+    event = event_of(task.nominal, trajectory, episode, diagnosis, units)
+    background = pictures_of(task.setting).backdrop()
+    return picture_of_event(background, trajectory, event, units, side)
 
 
 def picture_of_event(

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.episodes.episode import not_driven
 from tdac_agent.episodes.trajectory import Outcome, Trajectory
@@ -21,8 +22,12 @@ from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task, load_task
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
-from tdac_agent.verification.diagnosis.measures import Measured, measure
-from tdac_agent.verification.diagnosis.report import Cause
+from tdac_agent.verification.diagnosis.measures import (
+    Measured,
+    least_steps,
+    measure,
+)
+from tdac_agent.verification.diagnosis.report import Cause, Diagnosis
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.driving import (
@@ -34,10 +39,12 @@ from tdac_agent.verification.judge.driving import (
 from tdac_agent.verification.judge.in_order import in_order
 from tdac_agent.verification.judge.kept_episodes import KeptEpisode, keep_episode
 from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_envs.ladder.scores import time_score
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
 # In an evaluation, the remaining episodes are skipped after this many time-outs.
 MOST_LATE = 3
+SCORE_DIGITS = 6
 
 
 class SeededJob(BaseModel):
@@ -45,7 +52,9 @@ class SeededJob(BaseModel):
 
     `test` stops a robust verification early. `keep` is the folder of an evaluation,
     which keeps measures instead of a diagnosis, and poses and call times as well;
-    `late` is the number of time-outs among its episodes that were run before.
+    `late` is the number of time-outs among its episodes that were run before. With
+    `failures`, episodes are scored, and it is the folder for the trajectories of those
+    that fail, `SEED.npz`.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -59,6 +68,7 @@ class SeededJob(BaseModel):
     test: SequentialTest | None
     keep: Path | None = None
     late: int = 0
+    failures: Path | None = None
     tier: str
     limits: Limits
     out: Path
@@ -90,6 +100,16 @@ class SeededEpisode(PrintableRecord):
     def success(self) -> bool:
         """Whether the goal was reached without contact."""
         return self.outcome == "reached" and not self.collisions
+
+
+class ScoredEpisode(SeededEpisode):
+    """The figures with scores, and the whole diagnosis of a failure."""
+
+    time_score: float = Field(description="Success weighted by completion time, SCT.")
+    clearance: float = Field(
+        description="Least gap between body and obstacles, px or m; 0 after a failure."
+    )
+    diagnosis: Diagnosis | None = None
 
 
 class JobEnding(PrintableRecord):
@@ -173,18 +193,21 @@ def _lasting(kept: EpisodeSummary, figures: Measured) -> KeptEpisode:
 
 
 def _in_order(setup: EpisodeSetup, job: SeededJob) -> Generator[EpisodeSummary]:
-    work = partial(_run_episode, setup, job.keep is not None)
+    work = partial(_run_episode, setup, job.keep is not None, job.failures)
     patience = None if job.keep is None else MOST_LATE
     return in_order(work, setup.child_pool.close, job.seeds, job.late, patience)
 
 
 def _run_episode(
-    setup: EpisodeSetup, measured: bool, seed: int, skip: bool
+    setup: EpisodeSetup, measured: bool, failures: Path | None, seed: int, skip: bool
 ) -> EpisodeSummary:
     """Drives or skips the episode of a seed, and returns what is kept of it."""
     driven = _skipped(setup, seed) if skip else drive_seed(setup, seed)
     rollout = driven.rollout
     late = rollout.outcome == "error" and rollout.timed_out
+    if failures is not None:
+        scored = _scored(driven, seed, setup.task, failures)
+        return EpisodeSummary(scored, driven.tier, late, rollout.is_retryable)
     if not measured:
         found = figures(driven, seed, setup.task)
         return EpisodeSummary(found, driven.tier, late, rollout.is_retryable)
@@ -214,19 +237,55 @@ def _skipped(setup: EpisodeSetup, seed: int) -> SeededResult:
 
 def figures(driven: SeededResult, seed: int, task: Task) -> SeededEpisode:
     """Figures of an episode, with the diagnosis of a failure."""
+    found = _diagnosis_of(driven, task)
+    return SeededEpisode(**_facts(driven, seed, task, found))
+
+
+def _scored(
+    driven: SeededResult, seed: int, task: Task, failures: Path
+) -> ScoredEpisode:
+    """The figures with scores; keeps the trajectory of a failure."""
+    rollout, found = driven.rollout, _diagnosis_of(driven, task)
+    room = float(rollout.rooms.min(initial=math.inf)) - rollout.radius
+    score = 0.0
+    if found is None:
+        steps = rollout.trajectory.steps
+        score = time_score(True, steps, least_steps(driven.task))
+    elif rollout.trajectory.steps:
+        failures.mkdir(parents=True, exist_ok=True)
+        rollout.trajectory.save(failures / f"{seed}.npz")
+    return ScoredEpisode(
+        **_facts(driven, seed, task, found),
+        time_score=round(score, SCORE_DIGITS),
+        clearance=0.0 if found else round(max(room, 0.0), task.setting.units.digits),
+        diagnosis=found,
+    )
+
+
+def _diagnosis_of(driven: SeededResult, task: Task) -> Diagnosis | None:
+    """What happened in a failed episode; None for a success."""
+    rollout = driven.rollout
+    if rollout.reached and not rollout.collisions:
+        return None
+    return diagnose(rollout, task.nominal)
+
+
+def _facts(
+    driven: SeededResult, seed: int, task: Task, found: Diagnosis | None
+) -> dict[str, Any]:
+    """The fields of a `SeededEpisode`."""
     rollout, failure = driven.rollout, {}
     distances, digits = rollout.distances(), task.setting.units.digits
-    if not rollout.reached or rollout.collisions:
-        found = diagnose(rollout, task.nominal)
+    if found is not None:
         failure = found.model_dump(include={"cause", "step", "x", "y", "side"})
-    return SeededEpisode(
-        seed=seed,
-        outcome=rollout.outcome,
-        steps=rollout.trajectory.steps,
-        collisions=rollout.collisions,
-        d0=round(float(distances[0]), digits),
-        d_min=round(float(distances.min()), digits),
-        error=rollout.error,
-        cpu_seconds=round(driven.cpu_seconds, 3),
+    return {
+        "seed": seed,
+        "outcome": rollout.outcome,
+        "steps": rollout.trajectory.steps,
+        "collisions": rollout.collisions,
+        "d0": round(float(distances[0]), digits),
+        "d_min": round(float(distances.min()), digits),
+        "error": rollout.error,
+        "cpu_seconds": round(driven.cpu_seconds, 3),
         **failure,
-    )
+    }

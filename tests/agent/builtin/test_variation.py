@@ -2,12 +2,19 @@
 
 import ast
 import re
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
 
 import tdac_agent
-from tdac_agent.builtin.variation import varied
+from tdac_agent.builtin.parameters import read_parameters
+from tdac_agent.builtin.provider import make_builtin
+from tdac_agent.builtin.variation import varied, varied_parameters
+from tdac_agent.environments.epuck.builtin import EPuckParameters
+from tdac_agent.environments.map2d.builtin import Parameters
+from tdac_agent.models.choice import Options
+from tdac_agent.models.provider import Request
 
 LEVELS = sorted((Path(tdac_agent.__file__).parent / "builtin" / "levels").glob("*.py"))
 SOURCE = """A, B = 3, 0.5  # two ä
@@ -53,3 +60,32 @@ def test_each_level_can_be_varied(path):
     assert notes
     assert changed != source
     compile(changed, path.name, "exec")
+
+
+@pytest.mark.parametrize("kind", [Parameters, EPuckParameters])
+def test_one_or_two_parameters_move_within_their_bounds(kind):
+    """A value out of bounds would be refused; one at its bound moves inwards."""
+    changed, before = set(), asdict(kind())
+    for k in range(40):
+        parameters, notes = varied_parameters(kind(), (0, k, 0))
+        assert (parameters, notes) == varied_parameters(kind(), (0, k, 0))
+        after = asdict(parameters)
+        others = {name for name in before if before[name] != after[name]}
+        assert 1 <= len(others) == len(notes) <= 2
+        assert {note.split()[0].lower() for note in notes} == others
+        changed |= others
+    assert changed == set(before)
+
+
+@pytest.mark.parametrize("template", [True, False])
+def test_the_built_in_learner_improves_any_controller(small_task, template):
+    """One from its template by its parameters, another one by its constants."""
+    learner = make_builtin("", Options(small_task.setting))
+    source = SOURCE
+    if template:
+        source = learner.template.render(Parameters())
+    answer = learner.complete(Request("improve", "?", source, sample=(0, 7, 0)))
+    changed = answer.text.removeprefix("```python\n").removesuffix("```\n")
+    assert changed != source
+    assert answer.notes
+    assert (read_parameters(changed, Parameters) is not None) == template

@@ -15,16 +15,16 @@ from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.history import gather_run
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.runs.selection_record import read_selection
-from tdac_agent.set_synthesis.archive import Archive, Figures, Member
-from tdac_agent.set_synthesis.improve import base_of, finalists
+from tdac_agent.set_synthesis.improve import SetFigures, base_of, finalists
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.set_synthesis.trials import Candidate
+from tdac_agent.synthesis.archive import Archive, Member
 from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_envs.core.errors import TaskError
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 scores = st.floats(0.0, 1.0)
-figures = st.builds(Figures, scores, scores, scores, scores)
+figures = st.builds(SetFigures, scores, scores, scores, scores)
 
 
 @st.composite
@@ -34,7 +34,7 @@ def archives(draw):
     for k, each in enumerate(draw(st.lists(figures, min_size=1, max_size=8))):
         parent = archive.members[0] if k else None
         candidate = Candidate(k, 0, f"A = {k}", Path())
-        archive.members.append(Member(candidate, None, each, parent))
+        archive.members.append(Member(candidate, each, parent))
     return archive
 
 
@@ -43,7 +43,7 @@ def test_the_front_is_what_nobody_beats(archive):
     front = archive.front()
     assert front
     for each in archive.members:
-        beaten = any(other.figures.beats(each.figures) for other in archive.members)
+        beaten = any(other.beats(each) for other in archive.members)
         assert beaten == (not any(each is one for one in front))
     assert archive.best().figures.time == max(m.figures.time for m in archive.members)
 
@@ -173,6 +173,6 @@ def test_the_command_says_what_improving_brought(tdac, tmp_path):
     assert (code, err) == (0, "")
     assert re.search(r"improving: \d variations?; ", out)
     assert "~ k=21 j=0" in out
-    code, _, err = tdac("synth", "--improve", 32)
+    code, _, err = tdac("synth", "--feedback-episodes", 3)
     assert code == 2
-    assert "--improve needs --set NAME" in err
+    assert "--feedback-episodes needs --set NAME" in err

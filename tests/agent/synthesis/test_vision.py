@@ -237,7 +237,7 @@ PRICES = PriceList(
 @pytest.mark.parametrize("vendor", ["openai:dear", "anthropic:cheap"])
 def test_a_forecast_counts_the_pictures(vendor):
     """One for each edit and variation, none for the others."""
-    given = {"iterations": 4, "patience": 2, "candidates": 2, "improve": 32}
+    given = {"iterations": 4, "patience": 2, "candidates": 2, "variations": 4}
     models = ("openai:dear", vendor, PRICES)
     blind = cost_of("small", "question", *models, **given)
     shown = cost_of("small", "question", *models, **given, vision=True)

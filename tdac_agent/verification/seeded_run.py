@@ -18,6 +18,7 @@ from tdac_agent.verification.judge.seeded import (
     ENDING_FILE,
     EPISODES_FILE,
     JobEnding,
+    ScoredEpisode,
     SeededEpisode,
     SeededJob,
 )
@@ -26,7 +27,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import DEADLINE_SECONDS
 from tdac_envs.core.errors import TaskError
 
-E = TypeVar("E", SeededEpisode, Measured, WorldEpisode)
+E = TypeVar("E", SeededEpisode, ScoredEpisode, Measured, WorldEpisode)
 # Wall time / simulated time: a policy is stopped at 2, a time-out is repeated once.
 SLOWEST = 4.0
 

@@ -1,0 +1,139 @@
+"""`improvement.json` of a run on a task: what variations of its controller brought."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import ConfigDict, Field, ValidationError
+
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.units import Place
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+
+IMPROVEMENT_FILE = "improvement.json"
+NOT_SHOWN = "no improvement is shown"
+"""What is said if no difference is shown."""
+MOST_P = 0.05
+"""Most p-value of a difference that is shown, beside an interval above 0: with few
+episodes, the interval is too narrow."""
+
+
+def is_shown(low: float, p: float | None) -> bool:
+    """Whether a difference is shown to be an improvement.
+
+    Args:
+        low: Lower end of its interval.
+        p: Its p-value; None if it is not on record.
+    """
+    return low > 0.0 and (p is None or p <= MOST_P)
+
+
+class _Record(PrintableRecord):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class MemberFigures(_Record):
+    """A verified candidate in the disturbed episodes of the search."""
+
+    k: int
+    j: int
+    parent: tuple[int, int] | None = Field(
+        description="(k, j) of the candidate that it varies."
+    )
+    controller_sha256: str
+    robustness: float = Field(description="Share of episodes that reached the goal.")
+    time: float = Field(description="Mean time score.")
+    nominal: float = Field(description="Time score of the nominal episode.")
+    clearance: float = Field(
+        description="Mean of the least gaps between body and obstacles; an episode "
+        "that fails counts as 0."
+    )
+
+
+class PairedChange(_Record):
+    """Means of both controllers in the same episodes, and their difference.
+
+    The interval is that of a paired bootstrap over episodes, with 95 % confidence.
+    """
+
+    before: float = Field(description="Of the first verified controller.")
+    after: float = Field(description="Of the selected one.")
+    low: float = Field(description="Lower end of the difference.")
+    high: float = Field(description="Upper end of the difference.")
+    p: float = Field(
+        description="p-value of no difference; not below what so few episodes can show."
+    )
+
+    @property
+    def shown(self) -> bool:
+        """Whether an improvement is shown."""
+        return is_shown(self.low, self.p)
+
+    @property
+    def told(self) -> str:
+        """Means and difference, as text."""
+        change = self.after - self.before
+        return (
+            f"{self.before:.3f} -> {self.after:.3f}, {change:+.3f} "
+            f"({self.low:+.3f} to {self.high:+.3f})"
+        )
+
+
+class TaskImprovement(_Record):
+    """The search for a better controller, after the first verified one."""
+
+    schema_version: int = 1
+    unit: Place = Field(description="Unit of the clearance.")
+    disturbance: Disturbance
+    first_seed: int = Field(description="Of the episodes of the search.")
+    block: int = Field(description="Their number, the same for all candidates.")
+    improve: int = Field(description="Limit of disturbed episodes.")
+    used: int
+    asked: int = Field(description="Number of variations that were answered.")
+    members: tuple[MemberFigures, ...] = Field(description="Oldest first.")
+    first: tuple[int, int] = Field(description="(k, j) of the first verified one.")
+    k: int = Field(description="Iteration of the selected candidate.")
+    j: int = Field(description="Its edit.")
+    controller_sha256: str
+    first_comparison: int = Field(description="Seed of its first episode.")
+    episodes: int = Field(
+        description="Episodes of the comparison, which decided nothing; 0 if the first "
+        "verified candidate was selected."
+    )
+    robustness: PairedChange | None = None
+    time: PairedChange | None = None
+    stopped: str = Field("", description="What ended the search early.")
+
+    @property
+    def selected(self) -> tuple[int, int]:
+        """(k, j) of the selected candidate."""
+        return self.k, self.j
+
+    @property
+    def told(self) -> str:
+        """What the search brought, in one line."""
+        varied = sum(each.parent is not None for each in self.members)
+        about = f"{self.asked} variation{'' if self.asked == 1 else 's'}"
+        about = f"improving: {about}, {varied} of them verified"
+        first, selected = (
+            "k={} j={}".format(*one) for one in (self.first, self.selected)
+        )
+        if self.robustness is None or self.time is None:
+            return f"{about}; none was selected instead of {first}"
+        shown = self.robustness.shown or self.time.shown
+        return (
+            f"{about}; {selected} was selected instead of {first}; in "
+            f"{self.episodes} other disturbed episodes: goals reached "
+            f"{self.robustness.told}; time score {self.time.told}"
+            f"{'' if shown else f'; {NOT_SHOWN}'}"
+        )
+
+
+def read_improvement(folder: Path) -> TaskImprovement | None:
+    """What the search of a run brought; None if there is no readable record."""
+    try:
+        content = parse_json(read_file(folder / IMPROVEMENT_FILE, RECORD_BYTES))
+        return TaskImprovement.model_validate(content)
+    except (OSError, ValueError, ValidationError):
+        return None

@@ -1,0 +1,212 @@
+"""Drives verified candidates in disturbed episodes, and counts these."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import ConfigDict, Field, ValidationError
+
+from tdac_agent.prompting.feedback import cut
+from tdac_agent.runs.recorder import Recorder
+from tdac_agent.sandbox import Limits
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.synthesis.archive import Candidate
+from tdac_agent.synthesis.candidates import Tests
+from tdac_agent.synthesis.workload import Shares
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.task import lay_out
+from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.seeded import ScoredEpisode, SeededJob
+from tdac_agent.verification.seeded_run import run_seeds
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+
+PURPOSES = ("improve", "comparison")
+"""What the episodes are for, in the order of their seeds."""
+FIRST_SEED = 2**33
+"""Greater than the seeds that `tdac verify --robust` chooses by default."""
+SEEDS = 2**32
+"""Number of seeds for each purpose."""
+MOST_EPISODES = 100_000
+MOST_TOLD = 3
+"""Failures whose diagnosis is told."""
+EPISODES_FILE = "disturbed.json"
+FAILURES = "failures"
+"""Folder with the trajectories of failed episodes."""
+
+
+class DisturbedEpisodes(PrintableRecord):
+    """Episodes with consecutive seeds, as those of `tdac verify --robust`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    schema_version: int = 1
+    task_sha256: str
+    controller_sha256: str
+    disturbance: Disturbance
+    first_seed: int
+    sandbox: str = Field(description="Sandbox tier.")
+    versions: dict[str, str]
+    episodes: tuple[ScoredEpisode, ...]
+
+    @property
+    def reached(self) -> int:
+        """Number of episodes that reached the goal without a contact."""
+        return sum(each.success for each in self.episodes)
+
+    @property
+    def successes(self) -> list[float]:
+        """1 for each episode that reached the goal, else 0."""
+        return [float(each.success) for each in self.episodes]
+
+    @property
+    def times(self) -> list[float]:
+        """Time score of each episode."""
+        return [each.time_score for each in self.episodes]
+
+    @property
+    def told(self) -> str:
+        """The result in one line."""
+        count = len(self.episodes)
+        return f"the goal reached in {self.reached} of {count} disturbed episodes"
+
+    @property
+    def failed(self) -> dict[str, int]:
+        """Number of failures by cause."""
+        failed = (each for each in self.episodes if not each.success)
+        causes = Counter(str(each.cause or each.outcome) for each in failed)
+        return dict(causes.most_common())
+
+    @property
+    def feedback(self) -> str | None:
+        """Causes of failures, and diagnoses of some; None without a failure."""
+        causes = [f"{count} {cause}" for cause, count in self.failed.items()]
+        if not causes:
+            return None
+        texts = [each.diagnosis.text for each in self.episodes if each.diagnosis]
+        parts = [f"{self.told[0].upper()}{self.told[1:]}; {', '.join(causes)}."]
+        parts += [f"{n}. {cut(text)}" for n, text in enumerate(texts[:MOST_TOLD], 1)]
+        return "\n\n".join(parts)
+
+
+@dataclass(slots=True)
+class DisturbedTrials:
+    """Drives candidates; all of them have the same seeds.
+
+    Attributes:
+        recorder: Records the run.
+        tests: The task, the judge and the sandbox tier.
+        shares: How the episodes are divided.
+        used: Number of episodes that were driven.
+    """
+
+    recorder: Recorder
+    tests: Tests
+    shares: Shares
+    used: int = 0
+
+    @property
+    def can_explore(self) -> bool:
+        """Whether there are episodes for another variation."""
+        return self.used + self.shares.block <= self.shares.explore
+
+    def explore(self, candidate: Candidate) -> DisturbedEpisodes:
+        """Drives the episodes for variations."""
+        return self._drive(candidate, "improve", self.shares.block)
+
+    def compare(self, candidate: Candidate) -> DisturbedEpisodes:
+        """Drives the episodes of the comparison at the end, which decide nothing."""
+        return self._drive(candidate, "comparison", self.shares.comparison)
+
+    def first_seed(self, purpose: str) -> int:
+        """Seed of the first episode for a purpose; the others count up from it."""
+        run = self.recorder.run
+        digest = hashlib.sha256(f"disturbed|{run.seed}|{run.index}".encode()).digest()
+        first = int.from_bytes(digest[:8], "big") % (SEEDS - MOST_EPISODES)
+        return FIRST_SEED + PURPOSES.index(purpose) * SEEDS + first
+
+    def _drive(
+        self, candidate: Candidate, purpose: str, count: int
+    ) -> DisturbedEpisodes:
+        """Drives episodes; those on record are reused."""
+        about = {"k": candidate.k, "j": candidate.j, "what": purpose, "episodes": count}
+        self.recorder.event("drive.start", **about)
+        out, first = candidate.folder / purpose, self.first_seed(purpose)
+        # The record of another installation's run is not trusted.
+        found = None
+        if self.recorder.run.mark:
+            found = self._kept(out, candidate, first, count)
+        if found is None:
+            found = self._driven(candidate, out, range(first, first + count), about)
+        self.used += count
+        self.recorder.event("drive.end", **about, reached=found.reached)
+        return found
+
+    def _driven(
+        self, candidate: Candidate, out: Path, seeds: range, about: dict[str, object]
+    ) -> DisturbedEpisodes:
+        task = self.tests.task
+        source = candidate.source.encode("utf-8", "surrogatepass")
+        out.mkdir(exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix="tdac-improve-") as name:
+            folder = Path(name)
+            file = folder / "controller.py"
+            write_atomic(file, source)
+            job = SeededJob(
+                task=lay_out(task, folder / "work"),
+                policy=PolicySpec("controller", file),
+                disturbance=Disturbance(),
+                variation="jitter",
+                seeds=tuple(seeds),
+                test=None,
+                failures=(out / FAILURES).resolve(),
+                tier=self.tests.tier,
+                limits=Limits(),
+                out=folder / "results",
+            )
+            ended, ending = run_seeds(
+                job,
+                task.nominal,
+                ScoredEpisode,
+                self.tests.judge,
+                lambda done, reached: self.recorder.tell(
+                    {"event": "drive.step", **about, "done": done, "reached": reached}
+                ),
+            )
+        found = DisturbedEpisodes(
+            task_sha256=task.sha256(),
+            controller_sha256=sha256_of(source),
+            disturbance=job.disturbance,
+            first_seed=seeds.start,
+            sandbox=ending.tier,
+            versions=dict(versions()),
+            episodes=tuple(ended),
+        )
+        write_atomic(out / EPISODES_FILE, found.model_dump_json(indent=2) + "\n")
+        return found
+
+    def _kept(
+        self, out: Path, candidate: Candidate, first: int, count: int
+    ) -> DisturbedEpisodes | None:
+        """The episodes in a folder if they are complete and of this candidate."""
+        try:
+            content = parse_json(read_file(out / EPISODES_FILE, RECORD_BYTES))
+            found = DisturbedEpisodes.model_validate(content)
+        except (OSError, ValueError, ValidationError):
+            return None
+        source = candidate.source.encode("utf-8", "surrogatepass")
+        wanted = {
+            "task_sha256": self.tests.task.sha256(),
+            "controller_sha256": sha256_of(source),
+            "disturbance": Disturbance(),
+            "first_seed": first,
+            "versions": dict(versions()),
+        }
+        same = all(getattr(found, name) == value for name, value in wanted.items())
+        seeds = [each.seed for each in found.episodes]
+        return found if same and seeds == list(range(first, first + count)) else None

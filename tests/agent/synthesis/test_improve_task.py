@@ -1,0 +1,302 @@
+"""`--improve E` on a task: variations of a verified controller."""
+
+import json
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from script import STILL, Script, code
+from small import write_small_task
+
+from tdac_agent.errors import RunError
+from tdac_agent.evaluation.robust import verify_robust
+from tdac_agent.html_report.page import make_page
+from tdac_agent.library.listing import row_of
+from tdac_agent.metrics import frames_of
+from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
+from tdac_agent.runs.run_record import load_run
+from tdac_agent.synthesis.disturbed import DisturbedEpisodes
+from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.workload import (
+    LEAST_IMPROVE,
+    most_variations,
+    task_shares,
+)
+from tdac_agent.tasks.task import load_task
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_envs.core.errors import TaskError
+
+FRAGILE = """
+
+LAST = [0.0, 0.0]
+LATE = []
+
+
+def policy(obs):
+    if any(LAST) and not obs["wheel_speeds"].any():
+        LATE.append(True)
+    LAST[:] = (0.0, 0.0) if LATE else drive(obs)
+    return tuple(LAST)
+"""
+"""It stops for ever if an action takes effect a step late, as in disturbed episodes."""
+
+
+ENOUGH_FOR_ONE = 40_000
+"""Tokens that are enough for one question and not for two."""
+
+
+@pytest.fixture
+def task(tmp_path):
+    return load_task(write_small_task(tmp_path / "task", profile="policy"))
+
+
+@pytest.fixture
+def fragile(good_source):
+    return good_source.replace("def policy(", "def drive(") + FRAGILE
+
+
+@pytest.fixture
+def write(task, tmp_path, warm):
+    def run(model="builtin", **values):
+        given = {"out": tmp_path / "run", "judge": warm, "improve": 32, "seed": 3}
+        given["retry"] = RetryPolicy(first_wait=0.0)
+        return synthesize(task, model, iterations=6, **given | values)
+
+    return run
+
+
+def report_of(folder):
+    return Report.model_validate_json((folder / "report.json").read_text())
+
+
+@given(st.integers(LEAST_IMPROVE, 10_000))
+def test_the_shares_of_a_task_are_all_episodes(improve):
+    """And there are at least some variations."""
+    parts = task_shares(improve)
+    assert parts.explore + 2 * parts.comparison == improve
+    assert parts.variations >= 4
+    assert (parts.variations + 1) * parts.block <= parts.explore
+    assert most_variations(improve, on_set=False) == 2 * parts.variations
+    assert most_variations(0, on_set=False) == 0
+
+
+def test_a_more_robust_variation_is_asked_for_and_delivered(
+    write, fragile, good_source, tmp_path
+):
+    """The model sees the parent, its figures, and what was tried with it."""
+    answers = (fragile, STILL, fragile, good_source, STILL, STILL, STILL)
+    model = Script(*map(code, answers))
+    run = write(model)
+    out = tmp_path / "run"
+    assert model.asked() == [
+        ("generate", 1, 0),
+        *(("improve", k, 0) for k in range(7, 13)),
+    ]
+
+    first, second, third = model.requests[1:4]
+    assert "LATE.append(True)" in first.prompt
+    assert (
+        "- goals reached: 0.000; the best controller so far has 0.000" in first.prompt
+    )
+    assert "disturbed episodes; 4 " in first.prompt
+    assert "What was tried" not in first.prompt
+    assert "must still pass all tests" in first.prompt
+    assert re.search(r"Failed: \d+ of \d+ tests failed.*:\n```diff\n", second.prompt)
+    assert second.prompt == third.prompt
+
+    assert (run.status, run.tau, run.censored) == ("verified", 1, False)
+    assert (out / "controller.py").read_text() == good_source
+    report, own = report_of(out), report_of(out / "iterations/k09/j0")
+    assert report == own
+    assert report.passed
+    for file in (out / "trajectories").glob("*.npz"):
+        there = out / "iterations/k09/j0/trajectories" / file.name
+        assert file.read_bytes() == there.read_bytes()
+
+    attempts = [(each.k, each.passed, each.parent) for each in run.attempts]
+    assert attempts[:4] == [
+        *((1, True, None), (7, False, (1, 0)), (8, True, (1, 0)), (9, True, (1, 0)))
+    ]
+    assert {each.parent for each in run.attempts[4:]} <= {(1, 0), (9, 0)}
+    assert run.attempts[2].unchanged
+    assert run.attempts[2].notes[-1] == "same code as k=1 j=0"
+    assert run.attempts[4].failed_tests == run.attempts[1].failed_tests
+    assert "4 of 4 disturbed episodes" in run.attempts[3].notes[-1]
+
+    found = read_improvement(out)
+    assert (found.first, found.selected) == ((1, 0), (9, 0))
+    assert [each.robustness for each in found.members] == [0.0, 1.0]
+    assert found.members[1].nominal > found.members[1].time > 0.5
+    assert found.members[1].clearance > 0.0
+    assert found.used == 2 * 4 + 2 * 4
+    assert (found.robustness.before, found.robustness.after) == (0.0, 1.0)
+    assert found.robustness.low > 0.0
+    # With four episodes, nothing can be shown.
+    assert found.robustness.p == 0.125
+    assert found.told.endswith(NOT_SHOWN)
+    seeds = {
+        name: [
+            each["seed"]
+            for each in json.loads(
+                (out / "iterations" / name / "disturbed.json").read_text()
+            )["episodes"]
+        ]
+        for k in ("k01/j0", "k09/j0")
+        for name in (f"{k}/improve", f"{k}/comparison")
+    }
+    assert seeds["k01/j0/improve"] == seeds["k09/j0/improve"]
+    assert seeds["k01/j0/comparison"] == seeds["k09/j0/comparison"]
+    assert not {*seeds["k01/j0/improve"]} & {*seeds["k01/j0/comparison"]}
+    assert min(map(min, seeds.values())) > 2**32  # the seeds of `verify --robust`
+
+    frames = frames_of([run])
+    assert frames.runs[["tau", "done", "censored"]].values.tolist() == [[1, 1, False]]
+    assert frames.candidates["k"].tolist() == [1]
+    row = row_of(out)
+    assert (row["k"], row["tau"]) == (1, 1)
+    page = make_page(out).html.decode()
+    assert "Variations of what works" in page
+    assert "varies k = 1, j = 0" in page
+
+
+@pytest.mark.slow
+def test_models_that_see_get_a_picture_of_a_failed_episode(write, fragile, good_source):
+    """None if all goals were reached."""
+    model = Script(*map(code, (fragile, good_source, *[STILL] * 12)))
+    write(model, vision=True)
+    generated, first, *others = model.requests
+    assert generated.images == ()
+    (picture,) = first.images
+    assert picture.caption == "disturbed episode 1: no motion"
+    assert "`improve.picture.png`" in first.prompt
+    for request in others:
+        failed = "LATE.append" in request.controller
+        assert len(request.images) == failed
+    assert any(not request.images for request in others)
+
+
+@pytest.mark.slow
+def test_without_a_better_one_the_first_stays(
+    write, task, fragile, good_source, tmp_path, warm
+):
+    """It is delivered before the search begins, and has driven as in `--robust`."""
+    model = Script(*map(code, (good_source, fragile, *[STILL] * 4)))
+    seen = []
+
+    def watch(record):
+        if record["event"] == "drive.start":
+            seen.append((tmp_path / "run" / "controller.py").read_text())
+
+    run = write(model, on_event=watch)
+    assert set(seen) == {good_source}
+    assert (run.folder / "controller.py").read_text() == good_source
+    found = read_improvement(run.folder)
+    assert found.selected == found.first == (1, 0)
+    assert (found.episodes, found.used, found.time) == (0, 8, None)
+    assert found.told.endswith("none was selected instead of k=1 j=0")
+    robust = verify_robust(
+        run.controller, task, 4, first_seed=found.first_seed, judge=warm
+    )
+    own = run.folder / "iterations/k01/j0/improve/disturbed.json"
+    driven = DisturbedEpisodes.model_validate_json(own.read_text()).episodes
+    for episode in robust.worst:
+        (same,) = (each for each in driven if each.seed == episode.seed)
+        assert (same.steps, same.d_min) == (episode.steps, episode.d_min)
+    assert len(robust.worst) == found.block == 4
+
+
+@pytest.mark.slow
+def test_all_verified_candidates_of_a_group_found_the_archive(
+    write, fragile, good_source
+):
+    """The run is still compared with its first one."""
+    answers = (fragile, good_source, fragile, *[STILL] * 4)
+    run = write(Script(*map(code, answers)), candidates=3)
+    found = read_improvement(run.folder)
+    assert [(each.k, each.parent) for each in found.members] == [(1, None), (2, None)]
+    assert (found.first, found.selected, run.tau) == ((1, 0), (2, 0), 1)
+    assert (run.folder / "controller.py").read_text() == good_source
+
+
+@pytest.mark.slow
+def test_the_end_of_the_budget_ends_the_search_alone(write, good_source):
+    """The verified controller stays verified."""
+    model = Script(code(good_source))
+    model.paid = True
+    run = write(model, max_tokens=ENOUGH_FOR_ONE)
+    assert (run.status, run.tau) == ("verified", 1)
+    assert model.asked() == [("generate", 1, 0)]
+    assert "tokens" in run.reason
+    found = read_improvement(run.folder)
+    assert (found.asked, found.stopped) == (0, run.reason)
+    assert (run.folder / "controller.py").read_text() == good_source
+
+
+@pytest.mark.slow
+def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
+    """With one seed, folders agree but for clocks: after a break, and as a replay."""
+
+    class Stop(Exception):
+        pass
+
+    def stop(record):
+        if record["event"] == "drive.end" and record["k"] == 8:
+            raise Stop
+
+    one = write(out=tmp_path / "a")
+    with pytest.raises(Stop):
+        write(out=tmp_path / "b", on_event=stop)
+    broken = load_run(tmp_path / "b")
+    assert (broken.status, broken.tau, broken.censored) == ("fault", 1, False)
+    assert frames_of([broken]).runs["censored"].tolist() == [False]
+    other = write(out=tmp_path / "b")
+    again = write(f"replay:{tmp_path / 'a'}", out=tmp_path / "c")
+    for run in (other, again):
+        assert run.verified
+        assert run.attempts == one.attempts
+        assert read_improvement(run.folder) == read_improvement(one.folder)
+        assert sources(run.folder) == sources(one.folder)
+    assert len(sources(one.folder)) > 4
+    with pytest.raises(RunError, match="number of improving episodes 32 instead of 40"):
+        write(out=tmp_path / "b", improve=40)
+
+
+def sources(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("controller.*")
+    }
+
+
+def test_too_few_episodes_on_a_task_are_refused(write):
+    with pytest.raises(TaskError, match="improve"):
+        write(improve=31)
+
+
+def test_a_seed_is_drawn_for_a_search(write, good_source):
+    """So that its record says which episodes it drove."""
+    run = write(Script(code(good_source), *[code(good_source)] * 3), seed=None)
+    assert isinstance(run.seed, int)
+    found = read_improvement(run.folder)
+    assert found.first_seed > 2**33
+
+
+@pytest.mark.slow
+def test_the_command_improves_a_task(tdac, tmp_path):
+    folder = write_small_task(tmp_path / "task", profile="policy")
+    words = ("synth", "--task", folder, "--improve", 32, "--seed", 1)
+    code_, out, err = tdac(*words, "--dry-run", "--json")
+    assert (code_, err) == (0, "")
+    told = json.loads(out)
+    assert told["variations"] == most_variations(32, on_set=False) == 10
+    assert told["questions"] == 20 * 3 + 10
+    code_, out, err = tdac(*words, "--out", "run")
+    assert (code_, err) == (0, "")
+    assert "~ k=21 j=0" in out
+    assert re.search(r"improving: \d+ variations?, \d of them verified; ", out)
+    assert "verified in iteration 1" in out
+    code_, out, _ = tdac("synth", "--resume", "run")
+    assert code_ == 0
+    assert "has already finished" in out
