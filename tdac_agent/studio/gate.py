@@ -93,13 +93,15 @@ class Gate:
         if found is None:
             return False
         given = found.value.partition(".")[0]
-        issued = int(given) if given.isascii() and given.isdecimal() else 0
+        is_number = given.isascii() and given.isdecimal() and len(given) < 16
+        issued = int(given) if is_number else 0
         is_recent = 0 <= time.time() - issued < LASTING
         return is_recent and equal(found.value, self._session(issued))
 
     def _session(self, issued: int) -> str:
         """The content of a cookie that is given at a time, in seconds since 1970."""
-        return f"{issued}.{keyed(f'{self._about}|{issued}'.encode()).hex()}"
+        about = f"{self._about}|{issued}".encode("utf-8", "surrogateescape")
+        return f"{issued}.{keyed(about).hex()}"
 
     def _has_token(self, scope: Scope) -> bool:
         query = parse_qs(scope["query_string"].decode("latin-1"))

@@ -97,17 +97,9 @@ class Starting:
 
     def _words(self) -> list[str]:
         """The words of the command line, without the folder."""
-        sets = ["--set", ",".join(self._sets.value)]
-        count = str(int(self._worlds.value or 0))
-        split = ["--split", self._split.value]
-        return [
-            "bench",
-            *named_entrants(self._entrants.value),
-            *sets,
-            *split,
-            "-n",
-            count,
-        ]
+        entrants = named_entrants(self._entrants.value)
+        worlds = ["--split", self._split.value, "-n", f"{self._worlds.value or 0:.0f}"]
+        return ["bench", *entrants, "--set", ",".join(self._sets.value), *worlds]
 
     def _refresh(self) -> None:
         ready = self._entrants.value and self._sets.value and self._worlds.value
@@ -159,7 +151,7 @@ class Watching:
 
     def _look(self) -> None:
         """Shows what has changed."""
-        job = job_of(self._place, self._at)
+        job = bench_job(self._place, self._at)
         running = job is not None and job.running
         page = self._folder / PAGE
         done = page.is_file() and not running
@@ -186,15 +178,27 @@ class Watching:
                     file_frame(f"{self._at}/{PAGE}", version, f"Bench {self._at}")
 
     def _interrupt(self) -> None:
-        job = job_of(self._place, self._at)
+        job = bench_job(self._place, self._at)
         if job is not None:
             job.stop()
 
     def _go_on(self) -> None:
         """Starts the same command again: it goes on with the next episode."""
-        job = job_of(self._place, self._at)
+        job = bench_job(self._place, self._at)
         if job is not None:
             start(self._place, job.words, self._at)
+
+
+def bench_job(place: Path, at: str) -> Job | None:
+    """The newest command of the form that works on a bench."""
+    job = job_of(place, at)
+    if (
+        job is None
+        or job.words[:1] != ("bench",)
+        or not {"--set", "-n"} <= {*job.words}
+    ):
+        return None
+    return job
 
 
 def named_entrants(chosen: Sequence[str]) -> list[str]:
@@ -240,7 +244,7 @@ def _choice(options: list[str], value: list[str], label: str) -> ui.select:
 
 
 def _is_bench(place: Path, at: str, folder: Path) -> bool:
-    return (folder / PAGE).is_file() or job_of(place, at) is not None
+    return (folder / PAGE).is_file() or bench_job(place, at) is not None
 
 
 def _show_benches(place: Path) -> None:

@@ -106,8 +106,7 @@ class Choosing:
             on_change=lambda event: self._open(event.value),
         ).classes("w-full")
         self._upload = ui.upload(
-            label="Drop a file here, or click: image, map.yaml + image, .map, .npy, "
-            ".wbt",
+            label=f"Drop a file here, or click: {ACCEPTED}",
             multiple=True,
             auto_upload=True,
             max_file_size=MOST_BYTES,

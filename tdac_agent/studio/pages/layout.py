@@ -162,6 +162,5 @@ def file_frame(at: str, version: str, title: str) -> None:
 
 def _frame(address: str, title: str) -> None:
     """A page in a frame without any rights."""
-    ui.element("iframe").classes("report").props(
-        f'src="{address}" sandbox="allow-scripts" title="{title}"'
-    )
+    rights = {"src": address, "sandbox": "allow-scripts", "title": title}
+    ui.element("iframe").classes("report").props.update(rights)
