@@ -7,7 +7,7 @@ import pytest
 STILL = "\n\ndef policy(obs):\n    return 0.0, 0.0\n"
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize(("more", "code"), [("", 0), (STILL, 1)], ids=["good", "bad"])
 def test_every_tier_gives_the_verdict_that_is_due(tdac, good, tier, more, code):
     """Named on the command line, it is the one used, and its verdict is the right one.
