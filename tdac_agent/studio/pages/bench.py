@@ -23,6 +23,8 @@ from tdac_agent.studio.pages.layout import (
     address_of,
     file_frame,
     framed,
+    job_buttons,
+    job_heading,
     shown_command,
     shown_first,
     status_badge,
@@ -131,17 +133,11 @@ class Watching:
 
     async def show(self) -> None:
         """Builds the page, and keeps it up to date."""
-        with ui.row().classes("w-full items-center gap-3"):
-            ui.label(self._at).classes("text-xl font-bold")
-            self._badge = ui.row()
-            self._now = ui.label().classes("note").props("role=status")
+        self._badge, self._now = job_heading(self._at)
         self._bar = ui.linear_progress(0.0, show_value=False).props("rounded")
         self._command = shown_command("")
         with ui.row().classes("gap-2"):
-            self._stop = ui.button("Stop", icon="stop", on_click=self._interrupt)
-            self._resume = ui.button(
-                "Continue", icon="play_arrow", on_click=self._go_on
-            )
+            self._stop, self._resume = job_buttons(self._interrupt, self._go_on)
         self._results = ui.column().classes("w-full")
         with ui.element("pre").classes("output") as self._printed:
             self._output = ui.label()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import quote
@@ -148,6 +148,23 @@ async def keep_upload(event: events.UploadEventArguments, place: Path) -> str:
 def status_badge(status: str) -> None:
     """A status in its colour."""
     ui.label(status).classes(f"status {status.replace(' ', '-')}")
+
+
+def job_heading(at: str) -> tuple[ui.row, ui.label]:
+    """The heading of a run or bench: places for its status and for what it does now."""
+    with ui.row().classes("w-full items-center gap-3"):
+        ui.label(at).classes("text-xl font-bold")
+        return ui.row(), ui.label().classes("note").props("role=status")
+
+
+def job_buttons(
+    stop: Callable[[], object], go_on: Callable[[], object]
+) -> tuple[ui.button, ui.button]:
+    """Buttons that stop a command and start it again."""
+    return (
+        ui.button("Stop", icon="stop", on_click=stop),
+        ui.button("Continue", icon="play_arrow", on_click=go_on),
+    )
 
 
 def report_frame(at: str, version: str) -> None:

@@ -18,6 +18,8 @@ from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
     framed,
+    job_buttons,
+    job_heading,
     report_frame,
     shown_command,
     shown_first,
@@ -64,16 +66,10 @@ class Watching:
 
     async def show(self) -> None:
         """Builds the page, and keeps it up to date."""
-        with ui.row().classes("w-full items-center gap-3"):
-            ui.label(self._at).classes("text-xl font-bold")
-            self._badge = ui.row()
-            self._now = ui.label().classes("note").props("role=status")
+        self._badge, self._now = job_heading(self._at)
         self._command = shown_command("")
         with ui.row().classes("gap-2 items-center"):
-            self._stop = ui.button("Stop", icon="stop", on_click=self._interrupt)
-            self._resume = ui.button(
-                "Continue", icon="play_arrow", on_click=self._go_on
-            )
+            self._stop, self._resume = job_buttons(self._interrupt, self._go_on)
             self._download = ui.button("Download the controller", on_click=self._save)
             self._judge = ui.button("Verify on hidden worlds", on_click=self._hidden)
             self._follow = ui.switch("show each new candidate", value=True)
