@@ -59,6 +59,10 @@ results-rl: $(VENV)/.installed
 	$(BIN)/python -m benchmarks.ladder_trainings runs/results-rl --keep results/ladder/learned
 
 docs: $(VENV)/.docs-installed
+	@# Sphinx alone runs one notebook after another. It names those that fail here.
+	@mkdir -p build/notebooks
+	$(BIN)/jcache notebook -p build/notebooks add notebooks/*.ipynb >/dev/null
+	-$(BIN)/jcache project -p build/notebooks execute -e local-parallel -t 900 -v WARNING
 	$(BIN)/sphinx-build -W --keep-going -q -j auto -b html -c docs . build/site
 	@echo "built: build/site/index.html"
 
