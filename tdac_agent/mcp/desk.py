@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,7 +15,9 @@ from tdac_agent.mcp.answers import (
     SubmissionsAnswer,
     SubmitAnswer,
 )
+from tdac_agent.mcp.instructions import instructions
 from tdac_agent.mcp.judging import Judging, Submission
+from tdac_agent.mcp.watch import Watch
 from tdac_agent.prompting.extract import read_answer
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import JOURNAL, Run
@@ -33,77 +32,6 @@ MOST_CLIENTS = 20
 LONGEST_NAME = 100
 SUBMIT, CHOOSE, CLIENT = "submit", "choose", "client"
 """Records of the journal."""
-
-
-class Stopped(Exception):
-    """The server ends while it judges; the submission is judged at the next start."""
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """How far the present request is.
-
-    Attributes:
-        progress: Increases with each step.
-        total: Its value at the end; None if it is not known.
-        message: The same in words.
-    """
-
-    progress: float
-    total: float | None
-    message: str
-
-
-class Watch:
-    """Follows the work of a request, and can stop it from another thread.
-
-    Attributes:
-        on_step: Called with each step of the present request; None for nobody.
-    """
-
-    def __init__(self) -> None:
-        self.on_step: Callable[[Step], None] | None = None
-        self._stopping = threading.Event()
-        self._total: float | None
-        self._began = time.monotonic()
-        self._counts, self._total = False, None
-
-    def begin(self, on_step: Callable[[Step], None] | None) -> None:
-        """A request begins."""
-        self.on_step, self._began = on_step, time.monotonic()
-        self._counts = False
-
-    def stop(self) -> None:
-        """Ends the present request, and all later ones, with `Stopped`."""
-        self._stopping.set()
-
-    def poll(self) -> None:
-        """Called repeatedly while the judge works; tells the time without episodes.
-
-        Raises:
-            Stopped: The server ends.
-        """
-        if self._stopping.is_set():
-            raise Stopped
-        if not self._counts:
-            seconds = int(time.monotonic() - self._began)
-            if seconds:
-                self._tell(Step(seconds, None, f"judging for {seconds} s"))
-
-    def record(self, record: dict[str, Any]) -> None:
-        """Called with each record of the run."""
-        if record["event"] == "drive.start":
-            self._counts = True
-            self._total = record["worlds"]
-        elif record["event"] == "hidden.start":
-            self._counts, self._total = True, None
-        elif record["event"] == "drive.step":
-            done = record["done"]
-            self._tell(Step(done, self._total, f"{done} episodes driven"))
-
-    def _tell(self, step: Step) -> None:
-        if self.on_step is not None:
-            self.on_step(step)
 
 
 @dataclass(slots=True)
@@ -178,12 +106,8 @@ class Desk:
 
     def read_task(self) -> str:
         """What is to be written, and how this server works."""
-        return _HOW.format(
-            about=self.judging.about,
-            left=self.left,
-            judged=_ON_TASK if self.left.episodes is None else _ON_SET,
-            question=self.judging.question(),
-        )
+        judging = self.judging
+        return instructions(judging.about, self.left, judging.question())
 
     def submit(self, text: str, client: str) -> SubmitAnswer:
         """Judges a controller.
@@ -396,30 +320,3 @@ def _source_of(text: str) -> str:
     if text.lstrip().startswith("```"):
         return read_answer(text).source or text
     return text
-
-
-_ON_TASK = """\
-Each submission is verified by the task's test suite. `verified` means that all tests
-passed; such a submission can be chosen."""
-_ON_SET = """\
-Each submission drives on the next few worlds of the split `dev`, none of which comes
-twice. That is feedback, and no verdict: only `choose` verifies, by driving one
-submission on hidden worlds that are drawn after the choice. Choose when you can do no
-better."""
-_HOW = """\
-You are asked for a robot controller for {about}, one Python file.
-
-1. Write the file as described below, and call `submit` with its whole text.
-2. `failures` tells what went wrong, `picture` shows an episode. Repair, submit again.
-3. Call `choose` with the best submission: it gives the verdict and ends the run.
-
-{judged}
-
-Left: {left}.
-
-Where the text below asks for an answer with a fenced block, call `submit` instead. The
-judge runs the file in a sandbox; only what it does in an episode counts.
-
----
-
-{question}"""

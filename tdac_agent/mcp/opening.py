@@ -9,9 +9,10 @@ from functools import partial
 from pathlib import Path
 
 from tdac_agent.errors import RunError
-from tdac_agent.mcp.desk import Desk, Watch
+from tdac_agent.mcp.desk import Desk
 from tdac_agent.mcp.on_set import OnSet
 from tdac_agent.mcp.on_task import EPISODES_EACH, OnTask
+from tdac_agent.mcp.watch import Watch
 from tdac_agent.models.budget import Budget
 from tdac_agent.prompting.prompt import FULL
 from tdac_agent.prompting.set_prompt import set_prompt

@@ -22,8 +22,9 @@ from pydantic import ValidationError
 
 from tdac_agent.errors import Fault
 from tdac_agent.mcp.answers import Refused
-from tdac_agent.mcp.desk import Desk, Step, Stopped
+from tdac_agent.mcp.desk import Desk
 from tdac_agent.mcp.tools import BY_NAME, TOOLS, ToolSpec, problem
+from tdac_agent.mcp.watch import Step, Stopped
 from tdac_envs.core.errors import TdacError, hint, one_line_reason
 
 Context = ServerRequestContext[dict[str, Any]]
