@@ -36,6 +36,7 @@ from tdac_envs.ladder.set_file import set_names
 RESULTS = Path(__file__).parents[1] / "results" / "ladder"
 KINDS = "programs", "answers", "learned"
 ANSWERS = "first-answers"
+LEARNED = "ppo", "ppo-with-map", "recurrent-ppo"
 
 
 def entrants(kind: str, level: str, out: Path) -> list[str]:
@@ -47,7 +48,7 @@ def entrants(kind: str, level: str, out: Path) -> list[str]:
         files = [str(file) for file in _answers(level, out / "answers" / level)]
         return [f"{ANSWERS}={','.join(files)}"] if files else []
     found = []
-    for algo in ("ppo", "recurrent-ppo"):
+    for algo in LEARNED:
         folders = sorted((RESULTS / "learned").glob(f"{algo}-{level}-*"))
         files = [str(folder / "policy.zip") for folder in folders]
         found += [f"{algo}={','.join(files)}"] if files else []

@@ -39,16 +39,16 @@ def wrap_for_rl(
     |---|---|---|
     | `goal` | 3 | direction of the goal in the robot's frame, and its distance |
     | `guidance` | 2 | the next waypoint of the shortest path with a margin |
-    | `map` | 512 | the given map around the robot; see `MapView` |
     | `ranges` or `ps` | n | reading / largest possible reading |
     | `wheel_speeds` | 2 | left, right, as last applied |
 
     Guidance is computed from the whole map; `names=("goal-relative", "flatten")` omits
     it, for policies that use only sensors and the goal. On a task set
-    (`TDAC-Ladder-v0`) there is no guidance. There, ranges are closeness by default, and
-    a set that gives the map adds the view of it; where the robot has no pose, the goal
-    is relative to the pose that its odometry adds up to. Rewards,
-    actions and the ends of episodes do not change. `tdac train` uses this function.
+    (`TDAC-Ladder-v0`) there is no guidance. There, ranges are closeness by default;
+    where the robot has no pose, the goal is relative to the pose that its odometry adds
+    up to. A view of the map, where the set gives one, is the wrapper `map-view`.
+    Rewards, actions and the ends of episodes do not change. `tdac train` uses this
+    function.
 
     Args:
         env: An environment, single or batched, with its original observations.
@@ -71,7 +71,7 @@ def default_wrappers(env: Env | VectorEnv[Any, Any, Any]) -> tuple[str, ...]:
 
     Returns:
         `FOR_RL`; on a task set `goal-relative` and `flatten`, with `closeness` if the
-        robot has ranges, and with `map-view` if it is given the map.
+        robot has ranges.
     """
     plain: Any = env.unwrapped
     setups = getattr(plain, "setups", None) or [getattr(plain, "setup", None)]
@@ -80,5 +80,4 @@ def default_wrappers(env: Env | VectorEnv[Any, Any, Any]) -> tuple[str, ...]:
         return FOR_RL
     seen: Any = getattr(env, "single_observation_space", env.observation_space)
     ranges = ("closeness",) if "ranges" in seen.spaces else ()
-    view = ("map-view",) if source.gives_map else ()
-    return "goal-relative", *ranges, *view, "flatten"
+    return "goal-relative", *ranges, "flatten"

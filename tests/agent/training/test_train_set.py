@@ -84,10 +84,9 @@ def trained(tmp_path, few, config):
 
 @pytest.mark.parametrize("level", ["known", "unknown", "lost"])
 def test_a_plan_has_what_robots_of_the_level_have(level):
-    """No guidance, closeness, a view of the map where one is given; 64 robots."""
+    """No guidance, closeness, no view of the map unless one asks for it; 64 robots."""
     plan = make_set_plan(level, steps=1000)
-    view = ("map-view",) if level == "known" else ()
-    assert plan.wrappers == ("goal-relative", "closeness", *view, "flatten")
+    assert plan.wrappers == ("goal-relative", "closeness", "flatten")
     assert (plan.set, plan.set_sha256) == (level, load_set(level).sha256)
     assert (plan.n_envs, plan.episodes, plan.tasks) == (64, 100, ())
 
