@@ -39,6 +39,7 @@ LOST = {
     "disturbances": {"odometry_scale": 0.05, "odometry_noise": 0.05, "delay": 1},
 }
 MAP = {"map": True, "frame": "map"}
+VIEWED = "goal-relative", "closeness", "map-view", "flatten"
 SHARES = ("goal-relative", "flatten")
 
 
@@ -61,7 +62,7 @@ def test_the_default_is_sensors_alone(level):
 @pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
 @pytest.mark.parametrize(
     ("values", "names"),
-    [({}, None), (LOST, None), (MAP, None), ({}, SHARES)],
+    [({}, None), (LOST, None), (MAP, VIEWED), ({}, SHARES)],
 )
 def test_a_batch_tells_what_single_environments_tell(few, mode, values, names):
     """To the last bit, also at the ends of episodes and after them."""
@@ -145,9 +146,9 @@ def test_a_given_map_is_seen_around_the_robot():
 
 
 def test_a_view_of_a_map_needs_a_map(few):
-    """The default wrappers have it where there is one, and only there."""
-    for level, size in (("known", 3 + 512 + 18 + 2), (few(), 3 + 18 + 2)):
-        env = wrap_for_rl(gym.make(LADDER, level=level, split="dev"))
+    """It may be added where there is one, and only there."""
+    for names, size in ((VIEWED, 3 + 512 + 18 + 2), (None, 3 + 18 + 2)):
+        env = wrap_for_rl(gym.make(LADDER, level="known", split="dev"), names)
         assert env.observation_space.shape == (size,)
         assert env.reset(seed=1)[0] in env.observation_space
     with pytest.raises(TaskError, match="leave out the wrapper 'map-view'"):
