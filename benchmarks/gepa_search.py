@@ -7,10 +7,10 @@ weak controller, propose by the same draws (`tdac_agent.builtin.variation`: one 
 constants are multiplied by random factors), and may simulate the same number of
 episodes: what `--improve` leaves after the final comparison. Both measure candidates on
 the same worlds of `dev`. Ours spends a sixth of the episodes on selecting among its
-finalists on further worlds of `dev`; GEPA tries each proposal on three worlds first, and
-drives on the others only if it was better there. GEPA has its defaults but for the
-proposer and for its cache: no episode is driven or counted twice. It gets the figures of
-our archive as objectives.
+finalists, on further worlds of `dev`. GEPA tries each proposal on three worlds first,
+and drives on the others only if it was better there. GEPA has its defaults but for the
+proposer, the cache and the end: no episode is driven or counted twice, and it ends when
+another candidate might exceed the number. Its objectives are figures of our archive.
 
 Start and winners then drive on the same worlds of `test`, which decided nothing. A pair
 is a start with a seed, with worlds of its own: the pairs are independent, and the
@@ -22,8 +22,8 @@ between two limits on eight worlds of `dev`. (The built-in controllers are no gr
 this: other constants hardly change their scores, or break them.) They are driven
 without the sandbox (`benchmarks/in_process.py`): there are thousands of episodes.
 
-`OUT/pairs.csv` has a row for each pair. After an interruption, the same command goes on.
-Needs `pip install gepa`.
+`OUT/pairs.csv` has a row for each pair. After an interruption, the same command
+continues. Needs the package `gepa`, as in the extra `bench`.
 """
 
 from __future__ import annotations
@@ -151,18 +151,22 @@ class _Trials(Trials):
         self._terms = terms
 
     def _drive(
-        self, candidate: Candidate, first: int, count: int, out: Path
+        self,
+        candidate: Candidate,
+        first: int,
+        count: int,
+        out: Path,  # noqa: ARG002
     ) -> SetReport:
         return self._terms.report(candidate.source, range(first, first + count))
 
 
 class _Proposals:
-    """In the place of the dialogue with a model."""
+    """Answers instead of a model."""
 
     def __init__(self, terms: Terms) -> None:
         self._terms, self.made = terms, 0
 
-    def improve(self, k: int, source: str, *_: object) -> ModelAnswer:
+    def improve(self, _: int, source: str, *__: object) -> ModelAnswer:
         self.made += 1
         return ModelAnswer(self._terms.variation(source, self.made))
 
@@ -228,7 +232,9 @@ def by_gepa(terms: Terms) -> Found:
         }
         return found.time_score, {"scores": figures}
 
-    def propose(candidate: dict[str, str], _: object, names: list[str]) -> dict[str, str]:
+    def propose(
+        candidate: dict[str, str], _: object, names: list[str]
+    ) -> dict[str, str]:
         nonlocal tried
         tried = next(numbers)
         return {name: terms.variation(candidate[name], tried) for name in names}
@@ -317,7 +323,9 @@ def show(table: pd.DataFrame) -> None:
         shown.add_row(name, f"{found.value:.3f}", between, p)
     console = Console()
     console.print(shown)
-    console.print(f"{len(table)} pairs, {table['worlds'].iloc[0]} worlds of `test` each")
+    console.print(
+        f"{len(table)} pairs, {table['worlds'].iloc[0]} worlds of `test` each"
+    )
     for name in SEARCHES:
         episodes, tried = (table[f"{name}_{what}"] for what in ("episodes", "tried"))
         said = f"{episodes.mean():.0f} episodes, {tried.mean():.1f} proposals a pair"
