@@ -1,6 +1,6 @@
 """Our search for better controllers beside GEPA's, at equal numbers of episodes.
 
-    python -m benchmarks.gepa_search OUT [--improve 384] [--pairs 8] [--worlds 40]
+    python -m benchmarks.gepa_search OUT [--improve 384] [--pairs 8] [--processes 1]
 
 `tdac synth --improve` and `optimize_anything` of the package `gepa` begin with the same
 weak controller, propose by the same draws (`tdac_agent.builtin.variation`: one or two
