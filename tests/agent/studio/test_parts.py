@@ -30,9 +30,9 @@ from tdac_agent.studio.comparison import (
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
+from tdac_agent.studio.findings import fitting_radius, sentence_of
 from tdac_agent.studio.jobs import Job, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
-from tdac_agent.studio.pages.home import fitting_radius, sentence_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run import about_given, in_words, is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
