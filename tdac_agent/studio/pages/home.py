@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import shlex
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 from urllib.parse import quote
 
 from nicegui import ui
 
 from tdac_agent.library.listing import next_folder
-from tdac_agent.studio.board import Board, Kind, Place, board_of, names_of
+from tdac_agent.studio.board import Board, Kind, Place, as_it_is, board_of, names_of
 from tdac_agent.studio.draft import Checked, Draft, check, snapped
 from tdac_agent.studio.findings import fitting_radius, sentence_of
 from tdac_agent.studio.jobs import start
@@ -26,18 +30,26 @@ from tdac_agent.studio.pages.overlay import overlay
 from tdac_agent.studio.pages.places import Places
 from tdac_agent.studio.pages.source_choice import SourceChoice
 from tdac_agent.studio.pages.writers import Writers
+from tdac_envs.core.compiled import compiling
 from tdac_envs.core.errors import PolarityError, TdacError
 
+T = TypeVar("T")
 FIRST = "map: maze"
+EITHER = (
+    "The obstacles of this map may be its dark or its light pixels: choose above which "
+    "ones they are."
+)
+PATIENCE = 0.5
+"""Seconds after which the page says what it waits for."""
 
 
 def add(place: Path) -> None:
     """Adds the page."""
 
     @ui.page("/")
-    async def page(source: str = FIRST, task: str = "") -> None:
+    async def page(source: str = FIRST, task: str = "", obstacles: str = "") -> None:
         with framed("New controller"):
-            await Choosing(place).show(source, task)
+            await Choosing(place).show(source, task, obstacles)
 
 
 class Choosing:
@@ -54,11 +66,11 @@ class Choosing:
         self._checked: Checked | None = None
         self._turn = 0  # number of the newest choice: the work on older ones is dropped
 
-    async def show(self, source: str, task: str) -> None:
-        """Builds the page."""
+    async def show(self, source: str, task: str, obstacles: str) -> None:
+        """Builds the page, with what its address says."""
         with ui.element("div").classes("choosing"):
             with ui.column().classes("min-w-0 gap-3"):
-                self._source = SourceChoice(self._place, source, self._open)
+                self._source = SourceChoice(self._place, source, obstacles, self._open)
                 ui.label("2. Start and goal").classes("text-lg font-bold")
                 self._places = Places(
                     self._typed, self._resized, self._move, self._shrink
@@ -75,6 +87,7 @@ class Choosing:
         ui.label("3. Who writes").classes("text-lg font-bold")
         self._writers = Writers(self._place, self._refresh_command, on_task=True)
         self._go = ui.button("Write and verify a controller", on_click=self._begin)
+        self._go.disable()
         ui.label("The same on the command line:").classes("note text-sm")
         self._command = shown_command("")
 
@@ -86,9 +99,11 @@ class Choosing:
         asked = self._source.polarity
         try:
             path = name if name in names_of(_kind(kind)) else str(self._place / name)
-            board = await asyncio.to_thread(board_of, _kind(kind), path, asked)
-        except PolarityError as error:
-            self._refuse(f"{error}. Choose which pixels are the obstacles.")
+            read = partial(board_of, _kind(kind), path, asked)
+            board = await self._waiting(f"Reading {name} …", read)
+        except PolarityError:
+            self._refuse(EITHER)
+            self._view.show(await asyncio.to_thread(as_it_is, path))
             return
         except (TdacError, OSError, ValueError) as error:
             self._refuse(str(error))
@@ -102,6 +117,17 @@ class Choosing:
         self._source.show_polarity(board.kind == "map")
         self._places.show(self._draft)
         await self._check()
+
+    async def _waiting(self, text: str, work: Callable[[], T]) -> T:
+        """What slow work gives; the page says what it waits for."""
+        turn = self._turn
+        task = asyncio.create_task(asyncio.to_thread(work))
+        self._go.disable()
+        while not (await asyncio.wait({task}, timeout=PATIENCE))[0]:
+            if turn == self._turn:
+                now = compiling()
+                self._places.tell(f"{text} ({now})" if now else text, good=True)
+        return task.result()
 
     def _refuse(self, text: str) -> None:
         self._checked, self._draft = None, None
@@ -135,7 +161,7 @@ class Choosing:
 
     async def _take(self, task: str) -> None:
         """Takes start, heading, goal and radius from the address of the page."""
-        values = [float(part) for part in task.split(",") if part]
+        values = numbers_in(task)
         if self._draft is None or len(values) != 6:
             return
         x, y, heading, goal_x, goal_y, radius = values
@@ -188,7 +214,8 @@ class Choosing:
             text = "Click the start, a point ahead of it, and the goal."
             self._places.tell(text, good=True)
         else:
-            checked = await asyncio.to_thread(check, draft, board, self._place)
+            work = partial(check, draft, board, self._place)
+            checked = await self._waiting("Looking for the shortest path …", work)
             if turn != self._turn:
                 return
             self._checked = checked
@@ -228,10 +255,21 @@ class Choosing:
 def address_with(draft: Draft) -> str:
     """Address of the page with a draft, which loads the page with it again."""
     address = f"/?source={quote(f'{draft.kind}: {draft.source}')}"
+    if draft.polarity is not None:
+        address += f"&obstacles={draft.polarity}"
     values = *(draft.start or ()), draft.heading, *(draft.goal or ()), draft.radius
     if len(values) < 6 or None in values:
         return address
     return f"{address}&task={','.join(f'{value:.6g}' for value in values)}"
+
+
+def numbers_in(task: str) -> list[float]:
+    """The numbers in the address of a draft; none if it is no such address."""
+    try:
+        values = [float(part) for part in task.split(",")]
+    except ValueError:
+        return []
+    return values if all(map(math.isfinite, values)) else []
 
 
 def _kind(kind: str) -> Kind:

@@ -24,11 +24,15 @@ code.command { display: block; background: #eceae3; padding: .6em .8em;
 .choosing { display: grid; gap: 1.5rem; width: 100%; }
 @media (min-width: 1024px) {
   .choosing { grid-template-columns: 26rem minmax(0, 1fr); }
-  .beside { position: sticky; top: 4rem; align-self: start; }
+  .beside { position: sticky; top: 4rem; align-self: start;
+    --room: (100vh - 9rem); } /* height for the map */
 }
 @media (max-width: 1023px) {
   .choosing { grid-template-columns: minmax(0, 1fr); }
-  .beside { order: -1; }
+  .beside { order: -1; --room: 55vh; }
+  /* What was found is in sight while the map above it is clicked. */
+  .found { position: sticky; bottom: 0; z-index: 2; padding: .4em 0; width: 100%;
+    background: #f6f6f3; border-top: 1px solid #d4d2c8; }
 }
 .world { width: min(100%, 78vh); }
 .problem { color: #a3280f; } .fine { color: #12694a; } .note { color: #5d6068; }

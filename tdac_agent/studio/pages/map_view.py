@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Sequence
+from io import BytesIO
 from typing import Literal
 
 from nicegui import events, ui
+from PIL import Image as PictureFile
 
 from tdac_agent.html_report.scene import data_address
 
@@ -47,10 +49,16 @@ class MapView:
         self._mode.value = "start"
 
     def show(self, png: bytes) -> None:
-        """Shows a picture."""
-        if png != self._shown:
-            self._shown = png
-            self._image.set_source(data_address(png, "image/png") if png else "")
+        """Shows a picture, so that all of it is in the window."""
+        if png == self._shown:
+            return
+        self._shown = png
+        if not png:
+            self._image.set_source("")
+            return
+        width, height = PictureFile.open(BytesIO(png)).size
+        self._image.style(f"width: min(100%, var(--room) * {width / height:.4f})")
+        self._image.set_source(data_address(png, "image/png"))
 
     def mark(self, svg: str) -> None:
         """Draws marks over the picture."""

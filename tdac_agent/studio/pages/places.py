@@ -48,7 +48,7 @@ class Places:
                 min=LEAST_RADIUS, max=40, step=RADIUS_STEP, value=RADIUS
             ).props("label aria-label='robot radius, px'")
             self._radius.on("change", resized)
-        self._told = ui.label().classes("text-sm").props("role=status")
+        self._told = ui.label().classes("found text-sm").props("role=status")
         self._snap = ui.button("Use the nearest free place", on_click=snap).props(
             "outline no-caps dense"
         )

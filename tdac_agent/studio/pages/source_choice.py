@@ -12,6 +12,7 @@ from tdac_agent.studio.sources import OWN, is_source, source_of, sources_in
 
 MOST_BYTES = 64 << 20
 ACCEPTED = "image, map.yaml + image, .map, .npy, .wbt"
+POLARITIES = {"": "detect", "dark": "are dark", "light": "are light"}
 # A file that is dropped beside the box would replace the page.
 DROP = """<script>
 addEventListener("dragover", (event) => event.preventDefault());
@@ -31,11 +32,16 @@ class SourceChoice:
     Args:
         place: Folder of the studio.
         source: What is chosen at first.
+        polarity: Which pixels of it are obstacles; empty to infer it.
         opened: Called with the choice after each change.
     """
 
     def __init__(
-        self, place: Path, source: str, opened: Callable[[str], Awaitable[None]]
+        self,
+        place: Path,
+        source: str,
+        polarity: str,
+        opened: Callable[[str], Awaitable[None]],
     ) -> None:
         self._place, self._opened = place, opened
         ui.add_body_html(DROP)
@@ -48,7 +54,7 @@ class SourceChoice:
             value=source,
             label="bundled, or a file of this folder",
             with_input=True,
-            on_change=self._chosen,
+            on_change=self._another,
         ).classes("w-full")
         self._upload = ui.upload(
             label=f"Drop a file here, or click: {ACCEPTED}",
@@ -64,8 +70,8 @@ class SourceChoice:
         with ui.row().classes("items-center gap-2") as self._read:
             ui.label("obstacles")
             self._polarity = ui.toggle(
-                {"": "detect", "dark": "are dark", "light": "are light"},
-                value="",
+                POLARITIES,
+                value=polarity if polarity in POLARITIES else "",
                 on_change=self._chosen,
             ).props("no-caps dense")
 
@@ -77,6 +83,13 @@ class SourceChoice:
     def show_polarity(self, shown: bool) -> None:
         """Shows or hides the choice that only maps have."""
         self._read.visible = shown
+
+    async def _another(self) -> None:
+        """Opens another map; what was said about the one before is forgotten."""
+        if self._polarity.value:
+            self._polarity.value = ""  # opens it
+        else:
+            await self._chosen()
 
     async def _chosen(self) -> None:
         await self._opened(self._source.value)

@@ -168,6 +168,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     says(page, "Drop the controller first.")
     upload(page, tmp_path / "blind.py", "Drop controller.py here")
     says(page, "--from .studio/files/blind.py")
+    says(page, "The controller is blind.py.")
     press(page, "Write and verify a controller")
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
     frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
@@ -322,6 +323,31 @@ def test_the_map_is_beside_its_controls(page, studio):
     resize(page, "desktop")
 
 
+def test_a_map_and_what_was_found_are_in_sight(page, studio, tmp_path):
+    """A tall one too, and on a phone, where the controls are below the map."""
+    picture = np.full((900, 300), 255, np.uint8)
+    picture[:8] = picture[-8:] = picture[:, :8] = picture[:, -8:] = 0
+    picture[446:454] = 0
+    cv2.imwrite(str(tmp_path / "tall.png"), picture)
+    upload(page, tmp_path / "tall.png")
+    says(page, "300 x 900 px")
+    for name in ("desktop", "phone"):
+        resize(page, name)
+        for place in ((60, 100), (60, 200), (200, 800)):
+            choice = {100: "click the start", 200: "its heading", 800: "the goal"}
+            press(page, choice[place[1]])
+            click_map(page, *place, (300, 900))
+        says(page, "are not connected")
+        height = SIZES[name][1]
+        page.execute_script("scrollTo(0, 0)")
+        board = page.find_element(By.CSS_SELECTOR, ".board").rect
+        assert board["width"] > 100
+        assert board["y"] + board["height"] < height
+        found = page.find_element(By.CSS_SELECTOR, ".found").rect
+        assert found["y"] + found["height"] <= height
+    resize(page, "desktop")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES)
 def test_nothing_is_cut_off(page, studio, size):
@@ -382,6 +408,25 @@ def test_an_address_has_the_chosen_task(page, plan):
     says(page, "A path of")
     assert number(page, "start x").get_attribute("value") == "60"
     assert number(page, "goal y").get_attribute("value") == "60"
+
+
+def test_a_map_that_may_be_read_in_two_ways(page, studio, tmp_path):
+    """The user sees it, and says which pixels are the obstacles."""
+    picture = np.full((300, 400), 128, np.uint8)
+    picture[:, :200] = 100
+    picture[100:200, 100:300] = 160
+    cv2.imwrite(str(tmp_path / "either.png"), picture)
+    upload(page, tmp_path / "either.png")
+    says(page, "may be its dark or its light pixels: choose above")
+    image = page.find_element(By.CSS_SELECTOR, ".board img")
+    wait(page, lambda b: image.rect["height"] > 200)
+    press(page, "are light")
+    says(page, "obstacles are light pixels")
+    wait(page, lambda b: "obstacles=light" in b.current_url)
+    page.refresh()
+    says(page, "obstacles are light pixels")
+    page.get(f"{studio.base}/?task=1,2,3,4,5,x")  # no such address
+    says(page, "A path of")
 
 
 def test_two_runs_are_compared(page, studio):
