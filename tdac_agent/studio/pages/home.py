@@ -14,11 +14,10 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from tdac_agent.library.listing import next_folder
 from tdac_agent.studio.board import Board, Kind, Place, as_it_is, board_of, names_of
 from tdac_agent.studio.draft import Checked, Draft, check, snapped
 from tdac_agent.studio.findings import fitting_radius, sentence_of
-from tdac_agent.studio.jobs import start
+from tdac_agent.studio.jobs import free_folder, start
 from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
@@ -239,15 +238,17 @@ class Choosing:
 
     async def _begin(self) -> None:
         """Starts the run, and opens its page."""
-        if self._checked is None or self._checked.task is None:
+        if self._checked is None or self._checked.task is None or not self._go.enabled:
             return
-        folder = str(next_folder(self._checked.task.name, self._place))
+        self._go.disable()  # for the second click of a double click
+        folder = free_folder(self._checked.task.name, self._place)
         words = [*self._words(), "--out", folder]
         words = self._writers.with_folder(words, folder)
         try:
             start(self._place, words, folder)
         except OSError as error:
             ui.notify(f"cannot start: {error.strerror}", type="negative")
+            self._go.enable()
             return
         ui.navigate.to(address_of("/run", folder))
 

@@ -161,14 +161,31 @@ def job_heading(at: str) -> tuple[ui.row, ui.label]:
         return ui.row(), ui.label().classes("note").props("role=status")
 
 
-def job_buttons(
-    stop: Callable[[], object], go_on: Callable[[], object]
-) -> tuple[ui.button, ui.button]:
-    """Buttons that stop a command and start it again."""
-    return (
-        ui.button("Stop", icon="stop", on_click=stop),
-        ui.button("Continue", icon="play_arrow", on_click=go_on),
-    )
+class JobButtons:
+    """Buttons that stop a command and start it again.
+
+    Args:
+        stop: Interrupts the command, which may take seconds to end.
+        go_on: Starts it again.
+    """
+
+    def __init__(self, stop: Callable[[], object], go_on: Callable[[], object]) -> None:
+        self._do = stop
+        self._stop = ui.button("Stop", icon="stop", on_click=self._begin_to_stop)
+        self._resume = ui.button("Continue", icon="play_arrow", on_click=go_on)
+
+    def show(self, *, running: bool, continues: bool) -> None:
+        """Shows the one that is of use now."""
+        if not running:
+            self._stop.text = "Stop"
+            self._stop.enable()
+        self._stop.visible = running
+        self._resume.visible = continues and not running
+
+    def _begin_to_stop(self) -> None:
+        self._stop.text = "Stopping …"
+        self._stop.disable()
+        self._do()
 
 
 def report_frame(at: str, version: str) -> None:

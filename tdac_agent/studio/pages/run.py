@@ -17,8 +17,8 @@ from tdac_agent.runs.run_record import RUN_FILE, load_run
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
+    JobButtons,
     framed,
-    job_buttons,
     job_heading,
     report_frame,
     shown_command,
@@ -69,7 +69,7 @@ class Watching:
         self._badge, self._now = job_heading(self._at)
         self._command = shown_command("")
         with ui.row().classes("gap-2 items-center"):
-            self._stop, self._resume = job_buttons(self._interrupt, self._go_on)
+            self._buttons = JobButtons(self._interrupt, self._go_on)
             self._download = ui.button("Download the controller", on_click=self._save)
             self._judge = ui.button("Verify on hidden worlds", on_click=self._hidden)
             self._follow = ui.switch("show each new candidate", value=True)
@@ -119,10 +119,9 @@ class Watching:
             status_badge(status)
         go_on = row.get("go_on", "") if row else ""
         self._command.text = job.command if job else go_on or f"tdac report {self._at}"
-        self._stop.visible = running
         # An agent starts its server itself.
-        continues = bool(go_on) and not row.get("agent")
-        self._resume.visible = continues and not running and status != "running"
+        continues = bool(go_on) and not row.get("agent") and status != "running"
+        self._buttons.show(running=running, continues=continues)
         self._follow.visible = running
         done = bool(row) and status in ("verified", "selected")
         self._download.visible = done

@@ -11,12 +11,12 @@ from urllib.parse import quote
 
 from nicegui import events, ui
 
-from tdac_agent.bench.bench import RESULTS
 from tdac_agent.campaign.drive import CONFIG_FILE
 from tdac_agent.library.listing import folders_of, row_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
 from tdac_agent.studio.jobs import jobs
+from tdac_agent.studio.pages.bench import show_benches
 from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
@@ -168,15 +168,12 @@ def _show_table(rows: list[dict[str, Any]]) -> None:
 
 def _show_others(place: Path) -> None:
     """Campaigns and benches, and commands that still run."""
-    for title, file, page in (
-        ("Campaigns", CONFIG_FILE, "/campaign"),
-        ("Benches", RESULTS, "/bench"),
-    ):
-        found = folders_with(place, file)
-        if found:
-            ui.label(title).classes("text-lg font-bold")
-        for at in found:
-            ui.link(at, address_of(page, at))
+    campaigns = folders_with(place, CONFIG_FILE)
+    if campaigns:
+        ui.label("Campaigns").classes("text-lg font-bold")
+    for at in campaigns:
+        ui.link(at, address_of("/campaign", at))
+    show_benches(place, "Benches")
     running = [job for job in jobs(place) if job.running]
     if running:
         ui.label("At work").classes("text-lg font-bold")

@@ -12,9 +12,8 @@ from nicegui import ui
 from tdac_agent.bench.rivals import rival_names
 from tdac_agent.evaluation.set_play import SHOWN
 from tdac_agent.html_report.scene import data_address
-from tdac_agent.library.listing import next_folder
 from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.jobs import FILES, STATE, start
+from tdac_agent.studio.jobs import FILES, STATE, free_folder, start
 from tdac_agent.studio.pages.films import show_film
 from tdac_agent.studio.pages.layout import (
     address_of,
@@ -200,7 +199,7 @@ class Looking:
     def _ask_writer(self) -> None:
         """Asks who writes, and starts a run on the set."""
         name = self._name.value
-        folder = str(next_folder(name, self._place))
+        folder = free_folder(name, self._place)
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[40rem] max-w-full"):
             ui.label(f"A controller for all worlds of {name}").classes(
                 "text-lg font-bold"

@@ -1,6 +1,7 @@
 """The pages in a real browser, as a user without the command line sees them."""
 
 import json
+import re
 import shutil
 import time
 
@@ -14,6 +15,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 from studio_process import Studio
 
 from tdac_agent.runs.replay import DEMO
+from tdac_agent.studio.jobs import jobs
 
 SECONDS = 60
 SIZES = {"desktop": (1440, 900), "laptop": (1180, 800), "phone": (390, 844)}
@@ -122,9 +124,12 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     assert number(page, "start x").get_attribute("value") == "60"
     assert abs(float(number(page, "heading, rad").get_attribute("value"))) < 0.05
     assert "tdac synth --map .studio/files/plan.png --start 60 150" in text_of(page)
-    press(page, "Write and verify a controller")
+    button = "//button[.//span[normalize-space()='Write and verify a controller']]"
+    ActionChains(page).double_click(page.find_element(By.XPATH, button)).perform()
     wait(page, lambda b: "/run?" in b.current_url)
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    begun = [job.about for job in jobs(studio.place)]
+    assert [about for about in begun if "plan" in about] == ["runs/plan-1"]
     assert "not begun here" not in text_of(page)
     frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
     page.switch_to.frame(frame)
@@ -263,7 +268,7 @@ def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
     field.send_keys("2")
     says(page, "--split test -n 2")
     press(page, "Start the bench")
-    says(page, "of 2 drives ended")
+    says(page, "of 4 episodes driven")
     address = page.current_url
     page.get(f"{studio.base}/benches")
     wait(page, lambda b: b.find_element(By.LINK_TEXT, "runs/bench-1"))
@@ -275,6 +280,35 @@ def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
     page.switch_to.default_content()
     found = json.loads((studio.place / "runs/bench-1/bench.json").read_text())
     assert found["entrants"] == ["builtin", "follow-the-gap"]
+
+
+@pytest.mark.slow
+def test_a_bench_is_stopped_and_continued(page, studio):
+    """It goes on with the next episode: what was driven before is kept."""
+    page.get(f"{studio.base}/benches")
+    field = number(page, "worlds of each set")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("6")
+    says(page, "--split test -n 6")
+    press(page, "Start the bench")
+    wait(page, lambda b: re.search(r"\b[1-5] of 12 episodes driven", text_of(b)))
+    press(page, "Stop")
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.not-finished"))
+    says(page, "; Continue goes on with the next one")
+    folder = studio.place / page.current_url.partition("?at=")[2]
+    (rows,) = folder.glob("driven/*/*/unfinished/episodes.jsonl")
+    before = [json.loads(line) for line in rows.read_text().splitlines()]
+    assert 0 < len(before) < 6
+    page.get(f"{studio.base}/runs")
+    says(page, "builtin, follow-the-gap on unknown")
+    page.find_element(By.LINK_TEXT, str(folder.relative_to(studio.place))).click()
+    press(page, "Continue")
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.running"))
+    assert f"{len(before)} of 12 episodes driven" in text_of(page)
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
+    report = json.loads((rows.parent.parent / "set.json").read_text())
+    # Its CPU time tells an episode from another one on the same world.
+    assert report["episodes"][: len(before)] == before
 
 
 def test_a_world_is_driven_by_the_keyboard(page, studio):

@@ -31,7 +31,7 @@ from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
 from tdac_agent.studio.findings import fitting_radius, sentence_of
-from tdac_agent.studio.jobs import Job, job_of, jobs, start
+from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run import about_given, in_words, is_from_elsewhere
@@ -161,6 +161,18 @@ def test_a_job_is_found_again(tmp_path):
     assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
 
 
+def test_a_command_at_work_is_not_started_twice(tmp_path):
+    """As by a double click; and its folder is given to no other one."""
+    job = start(tmp_path, ["runs", "."], free_folder("demo", tmp_path))
+    assert job.about == "runs/demo-1"
+    assert start(tmp_path, ["runs", "."], "runs/demo-1") == job
+    assert start(tmp_path, ["sets"], "runs/demo-1") != job
+    assert free_folder("demo", tmp_path) == "runs/demo-2"
+    for each in jobs(tmp_path):
+        wait_for(each)
+    assert start(tmp_path, ["runs", "."], "runs/demo-1") != job  # that one has ended
+
+
 def test_files_of_one_name_are_told_apart():
     """Two entrants of a bench cannot have the same name."""
     files = ["runs/a/controller.py", "x/runs/a/controller.py", "mine.py", "x/mine.py"]
@@ -188,7 +200,7 @@ def test_a_bench_tells_how_far_it_is(tmp_path):
         path.write_text("{}\n" * 5)
     share, text = progress_of(job, tmp_path)
     assert share == pytest.approx(1.5 / 4)
-    assert text.startswith("1 of 4 drives ended, the next one is at world 5 of 10 (")
+    assert text == "15 of 40 episodes driven"
 
 
 def packed(**files):
