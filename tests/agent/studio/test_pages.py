@@ -322,7 +322,29 @@ def test_a_world_is_driven_by_the_keyboard(page, studio):
     ActionChains(page).key_down(Keys.ARROW_UP, body).perform()
     wait(page, lambda b: "contact" in status.text)
     ActionChains(page).key_up(Keys.ARROW_UP, body).perform()
-    assert status.text.endswith(" s")
+    assert status.text.endswith(" s – press R to begin again")
+    ActionChains(page).send_keys("r").perform()
+    wait(page, lambda b: "contact" not in status.text)
+
+
+@pytest.mark.slow
+def test_a_controller_for_a_set_of_worlds(page, studio):
+    """With few episodes; the page says how many have been driven."""
+    page.get(f"{studio.base}/worlds?level=unknown")
+    says(page, "narrowest passage")
+    assert "without movers" not in text_of(page)
+    press(page, "Write one for the whole set …")
+    says(page, "tdac synth --set unknown --episodes 128")
+    field = number(page, "episodes at most")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("4")
+    wait(page, lambda b: "--episodes 4\n" in text_of(b))
+    press(page, "Write it")
+    wait(page, lambda b: "/run?" in b.current_url)
+    says(page, "of at most 4 episodes driven")
+    says(page, "The first candidate appears here as soon as it has been tested.")
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.selected"))
+    says(page, "Only hidden worlds, which nobody has seen, can verify it.")
 
 
 def test_a_phone_shows_all_columns_of_a_run(page, studio):
