@@ -37,10 +37,13 @@ WORLDS = 20
 SECONDS = 1.0
 """Between two looks at the folder."""
 FIRST = " ({:.0f} s): making the worlds, and the first drive"
-HIDDEN = (
-    "Hidden worlds are drawn now and revealed at the end, and the ledger counts this "
-    "evaluation of each file."
-)
+ABOUT = {
+    "dev": "Worlds of dev are for feedback and selection: those who were tuned on them "
+    "have an advantage.",
+    "test": "Worlds of test are public, and for comparisons.",
+    "hidden": "Hidden worlds are drawn now and revealed at the end, and the ledger "
+    "counts this evaluation of each file.",
+}
 
 
 def add(place: Path) -> None:
@@ -107,7 +110,7 @@ class Starting:
         ready = self._entrants.value and self._sets.value and self._worlds.value
         self._go.set_enabled(bool(ready))
         self._command.text = shlex.join(["tdac", *self._words()]) if ready else ""
-        self._note.text = HIDDEN if self._split.value == "hidden" else ""
+        self._note.text = ABOUT[self._split.value]
         if not ready:
             self._note.text = "Choose entrants, task sets and the number of worlds."
 
