@@ -20,11 +20,11 @@ from tdac_agent.evaluation.set_verify import MOST_EPISODES
 from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
     JobButtons,
+    ShownCommand,
     address_of,
     file_frame,
     framed,
     job_heading,
-    shown_command,
     shown_first,
     status_badge,
     within,
@@ -94,7 +94,7 @@ class Starting:
                 precision=0,
             ).classes("w-36")  # fmt: skip
         self._note = ui.label().classes("text-sm note")
-        self._command = shown_command("")
+        self._command = ShownCommand()
         self._go = ui.button("Start the bench", on_click=self._begin)
         for each in (self._entrants, self._sets, self._split, self._worlds):
             each.on_value_change(self._refresh)
@@ -109,7 +109,7 @@ class Starting:
     def _refresh(self) -> None:
         ready = self._entrants.value and self._sets.value and self._worlds.value
         self._go.set_enabled(bool(ready))
-        self._command.text = shlex.join(["tdac", *self._words()]) if ready else ""
+        self._command.show(shlex.join(["tdac", *self._words()]) if ready else "")
         self._note.text = ABOUT[self._split.value]
         if not ready:
             self._note.text = "Choose entrants, task sets and the number of worlds."
@@ -141,7 +141,7 @@ class Watching:
         """Builds the page, and keeps it up to date."""
         self._badge, self._now = job_heading(self._at)
         self._bar = ui.linear_progress(0.0, show_value=False).props("rounded")
-        self._command = shown_command("")
+        self._command = ShownCommand()
         with ui.row().classes("gap-2"):
             self._buttons = JobButtons(self._interrupt, self._go_on)
         self._results = ui.column().classes("w-full")
@@ -160,7 +160,7 @@ class Watching:
         self._badge.clear()
         with self._badge:
             status_badge(status_of(self._folder, job))
-        self._command.text = (
+        self._command.show(
             job.command if job is not None else f"tdac bench show {self._at}"
         )
         self._buttons.show(running=running, continues=job is not None and not done)

@@ -19,9 +19,9 @@ from tdac_agent.studio.draft import Checked, Draft, check, snapped
 from tdac_agent.studio.findings import fitting_radius, sentence_of
 from tdac_agent.studio.jobs import free_folder, start
 from tdac_agent.studio.pages.layout import (
+    ShownCommand,
     address_of,
     framed,
-    shown_command,
     shown_first,
 )
 from tdac_agent.studio.pages.map_view import MapView, Mode
@@ -88,7 +88,7 @@ class Choosing:
         self._go = ui.button("Write and verify a controller", on_click=self._begin)
         self._go.disable()
         ui.label("The same on the command line:").classes("note text-sm")
-        self._command = shown_command("")
+        self._command = ShownCommand()
 
     async def _open(self, source: str) -> None:
         """Reads another map or world."""
@@ -227,7 +227,7 @@ class Choosing:
 
     def _refresh_command(self) -> None:
         words = self._words()
-        self._command.text = "tdac " + shlex.join(words) if words else ""
+        self._command.show("tdac " + shlex.join(words) if words else "")
         ready = self._checked is not None and self._checked.task is not None
         self._go.set_enabled(ready and self._writers.problem() is None)
 

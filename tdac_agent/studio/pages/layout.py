@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
@@ -19,6 +20,7 @@ body { font-family: system-ui, sans-serif; background: #f6f6f3; color: #23262e; 
 code.command { display: block; background: #eceae3; padding: .6em .8em;
   border-radius: 6px; white-space: pre-wrap; overflow-wrap: anywhere;
   font-size: .85rem; width: 100%; }
+code.command span { display: inline-block; max-width: 100%; }
 .board { width: 100%; border: 1px solid #d4d2c8; border-radius: 6px; overflow: hidden; }
 .board img { width: 100%; cursor: crosshair; }
 .choosing { display: grid; gap: 1.5rem; width: 100%; }
@@ -105,17 +107,25 @@ async def shown_first() -> None:
     await ui.context.client.connected(timeout=PATIENCE)
 
 
-def shown_command(text: str) -> ui.label:
+class ShownCommand:
     """A command as it would be typed, with a button to copy it."""
-    with ui.row().classes("w-full items-center no-wrap gap-2") as row:
-        code = ui.element("code").classes("command")
-        with code:
-            label = ui.label(text)
-        ui.button(icon="content_copy", on_click=lambda: copied(label.text)).props(
-            "flat dense aria-label='Copy the command'"
-        )
-    row.bind_visibility_from(label, "text", bool)
-    return label
+
+    def __init__(self) -> None:
+        self._text = ""
+        with ui.row().classes("w-full items-center no-wrap gap-2") as self._row:
+            self._code = ui.html(sanitize=False, tag="code").classes("command")
+            ui.button(icon="content_copy", on_click=lambda: copied(self._text)).props(
+                "flat dense aria-label='Copy the command'"
+            )
+        self._row.visible = False
+
+    def show(self, text: str) -> None:
+        """Shows another command; an empty one hides all."""
+        self._text = text
+        self._row.visible = bool(text)
+        # A line ends between two words, not between the hyphens of a flag.
+        words = (f"<span>{escape(word)}</span>" for word in text.split(" "))
+        self._code.content = " ".join(words)
 
 
 def copied(text: str) -> None:

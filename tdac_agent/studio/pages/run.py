@@ -16,10 +16,10 @@ from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
     JobButtons,
+    ShownCommand,
     framed,
     job_heading,
     report_frame,
-    shown_command,
     shown_first,
     status_badge,
     within,
@@ -75,7 +75,7 @@ class Watching:
     async def show(self) -> None:
         """Builds the page, and keeps it up to date."""
         self._badge, self._now = job_heading(self._at)
-        self._command = shown_command("")
+        self._command = ShownCommand()
         with ui.row().classes("gap-2 items-center"):
             self._buttons = JobButtons(self._interrupt, self._go_on)
             self._download = ui.button("Download the controller", on_click=self._save)
@@ -127,7 +127,7 @@ class Watching:
         with self._badge:
             status_badge(status)
         go_on = row.get("go_on", "") if row else ""
-        self._command.text = job.command if job else go_on or f"tdac report {self._at}"
+        self._command.show(job.command if job else go_on or f"tdac report {self._at}")
         # An agent starts its server itself.
         continues = bool(go_on) and not row.get("agent") and status != "running"
         self._buttons.show(running=running, continues=continues)

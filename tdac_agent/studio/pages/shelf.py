@@ -187,6 +187,7 @@ def _show_table(rows: list[dict[str, Any]]) -> ui.table | None:
         search.bind_value_to(table, "filter")
     with table.add_slot("top-right"):
         button = ui.button(icon="compare_arrows").props("outline no-caps")
+        button.classes("max-sm:mt-3")
 
     def chosen() -> list[str]:
         return [row["run"] for row in table.selected if row["address"]]

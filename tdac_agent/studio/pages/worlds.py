@@ -19,9 +19,9 @@ from tdac_agent.studio.driving import Drive
 from tdac_agent.studio.jobs import FILES, STATE, free_folder, start
 from tdac_agent.studio.pages.films import show_film
 from tdac_agent.studio.pages.layout import (
+    ShownCommand,
     address_of,
     framed,
-    shown_command,
     shown_first,
 )
 from tdac_agent.studio.pages.writers import Writers
@@ -116,7 +116,7 @@ class Looking:
                 options, value="follow-the-gap", label="right"
             ).classes("w-64")
             ui.button("Watch", on_click=self._watch)
-        self._command = shown_command("")
+        self._command = ShownCommand()
         self._films = ui.element("div").classes(
             "w-full grid grid-cols-1 sm:grid-cols-2 gap-3"
         )
@@ -224,14 +224,14 @@ class Looking:
             def changed() -> None:
                 ready = writers.problem() is None and (episodes.value or 0) >= LEAST
                 go.set_enabled(ready)
-                command.text = shlex.join(["tdac", *words()]) if ready else ""
+                command.show(shlex.join(["tdac", *words()]) if ready else "")
 
             writers = Writers(self._place, changed)
             episodes = ui.number(
                 "episodes at most", value=EPISODES, min=LEAST, max=MOST_EPISODES,
                 precision=0, on_change=changed,
             ).classes("w-40")  # fmt: skip
-            command = shown_command("")
+            command = ShownCommand()
 
             def begin() -> None:
                 all_words = writers.with_folder([*words(), "--out", folder], folder)
@@ -256,7 +256,7 @@ class Looking:
             world = ["--set", name, "--split", split, "--index", index]
             words = ["play", who, *world, "--video", film]
             job = start(self._place, words, film)
-            self._command.text = job.command
+            self._command.show(job.command)
             with self._films, ui.column().classes("min-w-0 gap-1"):
                 show_film(self._place, film, who)
 
