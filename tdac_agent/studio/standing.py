@@ -15,6 +15,8 @@ from tdac_envs.core.errors import TdacError
 
 COUNTED = "feedback", "validation", "improve"
 """What the limit of episodes of a run on a task set is for."""
+NOTE = "tdac: "
+"""Before what a command says about itself."""
 SELECTED = (
     "Selected: the best candidate on worlds of the split dev. Only hidden worlds, "
     "which nobody has seen, can verify it."
@@ -46,8 +48,12 @@ def progress_of(row: dict[str, Any], running: bool) -> str:
 def last_step(output: str) -> str:
     """The last step of a candidate that a command printed; empty if there is none.
 
-    It has `iteration 2, repair 1` for the `k=2 j=1` of the command.
+    It has `iteration 2, repair 1` for the `k=2 j=1` of the command. While code is
+    compiled, that is the step.
     """
+    last = output.strip().splitlines()[-1:]
+    if last and last[0].startswith(NOTE):
+        return last[0].removeprefix(NOTE)
     found = re.findall(r"^ *([^\w\s])? *k=(\d+) j=(\d+) +(\S.*)$", output, re.MULTILINE)
     if not found:
         return ""
@@ -104,6 +110,7 @@ def about_given(folder: Path) -> str:
         return ""
     failed = len(first.failed_tests)
     text = f"Your controller failed {failed} test{'' if failed == 1 else 's'}"
+    text += ": see iteration 1 below"
     if not run.verified:
         return f"{text}."
     author = "the built-in template" if run.optimizer == "builtin" else run.optimizer

@@ -301,7 +301,10 @@ def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
     (folder / "run.json").write_text(given.model_dump_json())
     failed = len(run.attempts[0].failed_tests)
     text = about_given(folder)
-    assert text.startswith(f"Your controller failed {failed} tests. The verified")
+    begin = (
+        f"Your controller failed {failed} tests: see iteration 1 below. The verified"
+    )
+    assert text.startswith(begin)
     assert text.endswith("is another one, by the built-in template.")
 
 
@@ -357,6 +360,8 @@ def test_the_last_step_of_a_run_is_in_words():
     passed = last_step("✔ k=1 j=0  all tests passed\n")
     assert passed == "✔ iteration 1: all tests passed"
     assert last_step("error: k=1 is too small\n") == ""
+    compiling = "compiling for this machine, cached for later runs: kernel 3 of 56"
+    assert last_step(f"{output}tdac: {compiling}\n") == compiling
 
 
 def test_a_run_on_a_set_tells_how_far_it_is(tmp_path):
