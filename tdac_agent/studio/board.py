@@ -104,7 +104,9 @@ def as_it_is(source: str) -> bytes:
     Raises:
         MapError: The map cannot be read.
     """
-    return png(load_image(Path(source)).colour)
+    image = load_image(Path(source))
+    none = np.zeros(image.colour.shape[:2], bool)
+    return png(_laid_over(image, none, _zoom(none)))
 
 
 def _of_map(source: str, polarity: str | None) -> Board:

@@ -101,11 +101,13 @@ class Choosing:
             read = partial(board_of, _kind(kind), path, asked)
             board = await self._waiting(f"Reading {name} …", read)
         except PolarityError:
-            self._refuse(EITHER)
-            self._view.show(await asyncio.to_thread(as_it_is, path))
+            picture = await asyncio.to_thread(as_it_is, path)
+            if turn == self._turn:
+                self._refuse(EITHER, picture)
             return
         except (TdacError, OSError, ValueError) as error:
-            self._refuse(str(error))
+            if turn == self._turn:
+                self._refuse(str(error))
             return
         if turn != self._turn:  # something else has been chosen meanwhile
             return
@@ -128,10 +130,13 @@ class Choosing:
                 self._places.tell(f"{text} ({now})" if now else text, good=True)
         return task.result()
 
-    def _refuse(self, text: str) -> None:
+    def _refuse(self, text: str, picture: bytes = b"") -> None:
+        """Says why there is no draft; with a picture, how to read it must be chosen."""
         self._checked, self._draft = None, None
         self._places.clear()
-        self._view.show(b"")
+        self._view.show(picture)
+        if picture:
+            self._source.show_polarity(True)
         self._view.mark("")
         self._view.begin("", "", ())
         self._places.tell(text, good=False)

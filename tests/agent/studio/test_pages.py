@@ -472,6 +472,8 @@ def test_a_map_that_may_be_read_in_two_ways(page, studio, tmp_path):
     picture[:, :200] = 100
     picture[100:200, 100:300] = 160
     cv2.imwrite(str(tmp_path / "either.png"), picture)
+    page.get(f"{studio.base}/?source=world: maze")  # of which nothing is to be said
+    says(page, "Webots")
     upload(page, tmp_path / "either.png")
     says(page, "may be its dark or its light pixels: choose above")
     image = page.find_element(By.CSS_SELECTOR, ".board img")
