@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import os
 import shlex
+from collections.abc import Collection
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -134,10 +135,16 @@ def resume_command(run: Run) -> str:
     return f"{resume_words(run, run.folder)}{more}"
 
 
-def next_folder(name: str, place: Path = Path()) -> Path:
-    """`runs/NAME-N` with the first free number N, relative to `place`."""
+def next_folder(name: str, place: Path = Path(), taken: Collection[str] = ()) -> Path:
+    """`runs/NAME-N` with the first free number N, relative to `place`.
+
+    Args:
+        name: What the folder is about.
+        place: Where the folder `runs` is.
+        taken: Folders that will be made by others.
+    """
     for number in itertools.count(1):
         folder = Path("runs") / f"{name}-{number}"
-        if not (place / folder).exists():
+        if str(folder) not in taken and not (place / folder).exists():
             return folder
     raise AssertionError("unreachable")

@@ -98,6 +98,17 @@ def board_of(kind: Kind, source: str, polarity: str | None = None) -> Board:
     return _of_map(source, polarity)
 
 
+def as_it_is(source: str) -> bytes:
+    """The picture of a map file, of which nothing is known to be an obstacle.
+
+    Raises:
+        MapError: The map cannot be read.
+    """
+    image = load_image(Path(source))
+    none = np.zeros(image.colour.shape[:2], bool)
+    return png(_laid_over(image, none, _zoom(none)))
+
+
 def _of_map(source: str, polarity: str | None) -> Board:
     bundled = bundled_map(source) if source in bundled_maps() else None
     image = load_image(bundled.image if bundled else Path(source))

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from tdac_agent.library.listing import next_folder
 from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.intake import read_file
 
@@ -108,7 +109,7 @@ class Job:
 
 
 def start(place: Path, words: Sequence[str], about: str) -> Job:
-    """Starts `tdac` with some words.
+    """Starts `tdac` with some words, unless the same command is at work already.
 
     Args:
         place: Folder of the studio, and of the process.
@@ -118,6 +119,9 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
     Raises:
         OSError: The folder cannot be written.
     """
+    before = job_of(place, about)
+    if before is not None and before.running and before.words == tuple(words):
+        return before
     folder = _new_folder(place / STATE / JOBS)
     command = [sys.executable, "-m", "tdac_agent", *words]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "100"}
@@ -171,6 +175,12 @@ def _read(file: Path) -> Job | None:
 def job_of(place: Path, about: str) -> Job | None:
     """The newest job that works on something."""
     return next((job for job in jobs(place) if job.about == about), None)
+
+
+def free_folder(name: str, place: Path) -> str:
+    """The next `runs/NAME-N` that neither exists nor was given to a command."""
+    given = {job.about for job in jobs(place)}
+    return str(next_folder(name, place, given))
 
 
 def _new_folder(parent: Path) -> Path:

@@ -67,23 +67,32 @@ class _Progress(event.Listener):  # type: ignore[misc]
 
     def __init__(self) -> None:
         self._reported = -REPORT_SECONDS
+        self.message = ""
 
     def on_start(self, event: Any) -> None:
         if event.data["dispatcher"] not in KERNELS:
             return
+        done = sum(bool(each.signatures) for each in KERNELS)
+        count = f"kernel {done + 1} of at most {len(KERNELS)}"
+        self.message = f"compiling for this machine, cached for later runs: {count}"
         now = time.monotonic()
         if now - self._reported >= REPORT_SECONDS:
             self._reported = now
-            done = sum(bool(each.signatures) for each in KERNELS)
-            count = f"kernel {done + 1} of at most {len(KERNELS)}"
-            message = f"compiling for this machine, cached for later runs: {count}"
-            print(f"tdac: {message}", file=sys.stderr, flush=True)
+            print(f"tdac: {self.message}", file=sys.stderr, flush=True)
 
     def on_end(self, event: Any) -> None:
-        pass
+        if event.data["dispatcher"] in KERNELS:
+            self.message = ""
 
 
-event.register("numba:compile", _Progress())
+_progress = _Progress()
+event.register("numba:compile", _progress)
+
+
+def compiling() -> str:
+    """What is being compiled now, in a line; empty if nothing is."""
+    return _progress.message
+
 
 if config.DISABLE_JIT:
     warning = "NUMBA_DISABLE_JIT is set: nothing is compiled, steps are much slower"

@@ -17,15 +17,14 @@ from tdac_agent.evaluation.entrants import BUILTIN
 from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE, UNFINISHED
 from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_verify import MOST_EPISODES
-from tdac_agent.library.listing import next_folder
-from tdac_agent.studio.jobs import Job, job_of, jobs, start
+from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
+    JobButtons,
+    ShownCommand,
     address_of,
     file_frame,
     framed,
-    job_buttons,
     job_heading,
-    shown_command,
     shown_first,
     status_badge,
     within,
@@ -37,10 +36,14 @@ from tdac_envs.ladder.set_file import shipped_names
 WORLDS = 20
 SECONDS = 1.0
 """Between two looks at the folder."""
-HIDDEN = (
-    "Hidden worlds are drawn now and revealed at the end, and the ledger counts this "
-    "evaluation of each file."
-)
+FIRST = " ({:.0f} s): making the worlds, and the first drive"
+ABOUT = {
+    "dev": "Worlds of dev are for feedback and selection: those who were tuned on them "
+    "have an advantage.",
+    "test": "Worlds of test are public, and for comparisons.",
+    "hidden": "Hidden worlds are drawn now and revealed at the end, and the ledger "
+    "counts this evaluation of each file.",
+}
 
 
 def add(place: Path) -> None:
@@ -50,7 +53,7 @@ def add(place: Path) -> None:
     async def benches() -> None:
         with framed("Benches"):
             Starting(place).show()
-            _show_benches(place)
+            show_benches(place, "Benches of this folder")
 
     @ui.page("/bench")
     async def bench(at: str = "") -> None:
@@ -91,7 +94,7 @@ class Starting:
                 precision=0,
             ).classes("w-36")  # fmt: skip
         self._note = ui.label().classes("text-sm note")
-        self._command = shown_command("")
+        self._command = ShownCommand()
         self._go = ui.button("Start the bench", on_click=self._begin)
         for each in (self._entrants, self._sets, self._split, self._worlds):
             each.on_value_change(self._refresh)
@@ -106,14 +109,17 @@ class Starting:
     def _refresh(self) -> None:
         ready = self._entrants.value and self._sets.value and self._worlds.value
         self._go.set_enabled(bool(ready))
-        self._command.text = shlex.join(["tdac", *self._words()]) if ready else ""
-        self._note.text = HIDDEN if self._split.value == "hidden" else ""
+        self._command.show(shlex.join(["tdac", *self._words()]) if ready else "")
+        self._note.text = ABOUT[self._split.value]
         if not ready:
             self._note.text = "Choose entrants, task sets and the number of worlds."
 
     def _begin(self) -> None:
         """Starts the bench, and opens its page."""
-        folder = str(next_folder("bench", self._place))
+        if not self._go.enabled:
+            return
+        self._go.disable()  # for the second click of a double click
+        folder = free_folder("bench", self._place)
         start(self._place, [*self._words(), "--out", folder], folder)
         ui.navigate.to(address_of("/bench", folder))
 
@@ -135,9 +141,9 @@ class Watching:
         """Builds the page, and keeps it up to date."""
         self._badge, self._now = job_heading(self._at)
         self._bar = ui.linear_progress(0.0, show_value=False).props("rounded")
-        self._command = shown_command("")
+        self._command = ShownCommand()
         with ui.row().classes("gap-2"):
-            self._stop, self._resume = job_buttons(self._interrupt, self._go_on)
+            self._buttons = JobButtons(self._interrupt, self._go_on)
         self._results = ui.column().classes("w-full")
         with ui.element("pre").classes("output") as self._printed:
             self._output = ui.label()
@@ -151,20 +157,21 @@ class Watching:
         running = job is not None and job.running
         page = self._folder / PAGE
         done = page.is_file() and not running
-        status = "running" if running else "finished" if done else "not finished"
         self._badge.clear()
         with self._badge:
-            status_badge(status)
-        self._command.text = (
+            status_badge(status_of(self._folder, job))
+        self._command.show(
             job.command if job is not None else f"tdac bench show {self._at}"
         )
-        self._stop.visible = self._bar.visible = running
-        self._resume.visible = job is not None and not running and not done
+        self._buttons.show(running=running, continues=job is not None and not done)
         self._printed.visible = not done
+        self._bar.visible = job is not None and not done
         self._output.text = job.output() if job is not None else ""
         self._now.text = ""
-        if job is not None and running:
+        if job is not None and not done:
             self._bar.value, self._now.text = progress_of(job, self._folder)
+            if not running:
+                self._now.text += "; Continue goes on with the next one"
         version = str(page.stat().st_mtime_ns) if done else ""
         if version != self._shown:
             self._shown = version
@@ -183,6 +190,7 @@ class Watching:
         job = bench_job(self._place, self._at)
         if job is not None:
             start(self._place, job.words, self._at)
+            self._look()
 
 
 def bench_job(place: Path, at: str) -> Job | None:
@@ -216,22 +224,23 @@ def progress_of(job: Job, folder: Path) -> tuple[float, str]:
     """The share of a bench that has been driven, from 0 to 1, and a line about it.
 
     Args:
-        job: The running command.
+        job: Its command.
         folder: Folder of the bench.
     """
     command = list(job.words)
     at = command.index("--set")
     worlds = int(command[command.index("-n") + 1])
-    drives = (at - 1) * len(command[at + 1].split(","))
-    ended, now = 0, 0
+    most = worlds * (at - 1) * len(command[at + 1].split(","))
+    driven = 0
     for kept in (DRIVEN, SEALED):
-        ended += len(list(folder.glob(f"{kept}/*/*/{REPORT_FILE}")))
+        driven += worlds * len(list(folder.glob(f"{kept}/*/*/{REPORT_FILE}")))
         for rows in folder.glob(f"{kept}/*/*/{UNFINISHED}/{ROWS_FILE}"):
-            now += len(rows.read_bytes().splitlines())
-    text = f"{ended} of {drives} drives ended"
-    text += f", the next one is at world {now} of {worlds}" if ended < drives else ""
-    share = (ended + min(now / worlds, 1.0)) / drives
-    return min(share, 1.0), f"{text} ({job.seconds:.0f} s)"
+            driven += len(rows.read_bytes().splitlines())
+    driven = min(driven, most)
+    text = f"{driven} of {most} episodes driven"
+    if job.running:
+        text += f" ({job.seconds:.0f} s)" if driven else FIRST.format(job.seconds)
+    return driven / most, text
 
 
 def _choice(options: list[str], value: list[str], label: str) -> ui.select:
@@ -243,15 +252,36 @@ def _is_bench(place: Path, at: str, folder: Path) -> bool:
     return (folder / PAGE).is_file() or bench_job(place, at) is not None
 
 
-def _show_benches(place: Path) -> None:
-    """Links to the benches of the folder."""
-    begun = {job.about: job for job in jobs(place) if job.words[:1] == ("bench",)}
+def show_benches(place: Path, title: str) -> None:
+    """Links to the benches of the folder, if there are any."""
+    begun = {job.about: job for job in reversed(jobs(place)) if bench_words(job)}
     names = {*folders_with(place, RESULTS), *begun}
     if not names:
         return
-    ui.label("Benches of this folder").classes("text-lg font-bold")
+    ui.label(title).classes("text-lg font-bold")
     for name in sorted(names):
+        job = begun.get(name)
         with ui.row().classes("items-center gap-3"):
             ui.link(name, address_of("/bench", name))
-            if name in begun and begun[name].running:
-                status_badge("running")
+            status_badge(status_of(place / name, job))
+            ui.label(bench_words(job) if job else "").classes("note text-sm")
+
+
+def bench_words(job: Job) -> str:
+    """What drives where in a bench; empty for another command."""
+    if job.words[:1] != ("bench",) or "--set" not in job.words:
+        return ""
+    at = job.words.index("--set")
+    return f"{', '.join(job.words[1:at])} on {job.words[at + 1]}"
+
+
+def status_of(folder: Path, job: Job | None) -> str:
+    """Status of a bench.
+
+    Args:
+        folder: Its folder.
+        job: The newest command that works on it, if the studio has begun it.
+    """
+    if job is not None and job.running:
+        return "running"
+    return "finished" if (folder / PAGE).is_file() else "not finished"

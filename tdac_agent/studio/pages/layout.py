@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
@@ -19,16 +20,21 @@ body { font-family: system-ui, sans-serif; background: #f6f6f3; color: #23262e; 
 code.command { display: block; background: #eceae3; padding: .6em .8em;
   border-radius: 6px; white-space: pre-wrap; overflow-wrap: anywhere;
   font-size: .85rem; width: 100%; }
+code.command span { display: inline-block; max-width: 100%; }
 .board { width: 100%; border: 1px solid #d4d2c8; border-radius: 6px; overflow: hidden; }
 .board img { width: 100%; cursor: crosshair; }
 .choosing { display: grid; gap: 1.5rem; width: 100%; }
 @media (min-width: 1024px) {
   .choosing { grid-template-columns: 26rem minmax(0, 1fr); }
-  .beside { position: sticky; top: 4rem; align-self: start; }
+  .beside { position: sticky; top: 4rem; align-self: start;
+    --room: (100vh - 9rem); } /* height for the map */
 }
 @media (max-width: 1023px) {
   .choosing { grid-template-columns: minmax(0, 1fr); }
-  .beside { order: -1; }
+  .beside { order: -1; --room: 55vh; }
+  /* What was found is in sight while the map above it is clicked. */
+  .found { position: sticky; bottom: 0; z-index: 2; padding: .4em 0; width: 100%;
+    background: #f6f6f3; border-top: 1px solid #d4d2c8; }
 }
 .world { width: min(100%, 78vh); }
 .problem { color: #a3280f; } .fine { color: #12694a; } .note { color: #5d6068; }
@@ -101,17 +107,25 @@ async def shown_first() -> None:
     await ui.context.client.connected(timeout=PATIENCE)
 
 
-def shown_command(text: str) -> ui.label:
+class ShownCommand:
     """A command as it would be typed, with a button to copy it."""
-    with ui.row().classes("w-full items-center no-wrap gap-2") as row:
-        code = ui.element("code").classes("command")
-        with code:
-            label = ui.label(text)
-        ui.button(icon="content_copy", on_click=lambda: copied(label.text)).props(
-            "flat dense aria-label='Copy the command'"
-        )
-    row.bind_visibility_from(label, "text", bool)
-    return label
+
+    def __init__(self) -> None:
+        self._text = ""
+        with ui.row().classes("w-full items-center no-wrap gap-2") as self._row:
+            self._code = ui.html(sanitize=False, tag="code").classes("command")
+            ui.button(icon="content_copy", on_click=lambda: copied(self._text)).props(
+                "flat dense aria-label='Copy the command'"
+            )
+        self._row.visible = False
+
+    def show(self, text: str) -> None:
+        """Shows another command; an empty one hides all."""
+        self._text = text
+        self._row.visible = bool(text)
+        # A line ends between two words, not between the hyphens of a flag.
+        words = (f"<span>{escape(word)}</span>" for word in text.split(" "))
+        self._code.content = " ".join(words)
 
 
 def copied(text: str) -> None:
@@ -157,14 +171,31 @@ def job_heading(at: str) -> tuple[ui.row, ui.label]:
         return ui.row(), ui.label().classes("note").props("role=status")
 
 
-def job_buttons(
-    stop: Callable[[], object], go_on: Callable[[], object]
-) -> tuple[ui.button, ui.button]:
-    """Buttons that stop a command and start it again."""
-    return (
-        ui.button("Stop", icon="stop", on_click=stop),
-        ui.button("Continue", icon="play_arrow", on_click=go_on),
-    )
+class JobButtons:
+    """Buttons that stop a command and start it again.
+
+    Args:
+        stop: Interrupts the command, which may take seconds to end.
+        go_on: Starts it again.
+    """
+
+    def __init__(self, stop: Callable[[], object], go_on: Callable[[], object]) -> None:
+        self._do = stop
+        self._stop = ui.button("Stop", icon="stop", on_click=self._begin_to_stop)
+        self._resume = ui.button("Continue", icon="play_arrow", on_click=go_on)
+
+    def show(self, *, running: bool, continues: bool) -> None:
+        """Shows the one that is of use now."""
+        if not running:
+            self._stop.text = "Stop"
+            self._stop.enable()
+        self._stop.visible = running
+        self._resume.visible = continues and not running
+
+    def _begin_to_stop(self) -> None:
+        self._stop.text = "Stopping …"
+        self._stop.disable()
+        self._do()
 
 
 def report_frame(at: str, version: str) -> None:

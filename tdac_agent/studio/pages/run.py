@@ -3,34 +3,42 @@
 from __future__ import annotations
 
 import asyncio
-import re
 import shlex
 from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
-from tdac_agent.html_report.names import candidate_name
 from tdac_agent.library.listing import row_of
 from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
 from tdac_agent.runs.run_record import RUN_FILE, load_run
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
+    JobButtons,
+    ShownCommand,
     framed,
-    job_buttons,
     job_heading,
     report_frame,
-    shown_command,
     shown_first,
     status_badge,
     within,
 )
 from tdac_agent.studio.pages.questions import Questions
 from tdac_agent.studio.pages.robustness import Robustness
+from tdac_agent.studio.standing import (
+    SELECTED,
+    about_given,
+    candidates_of,
+    episodes_driven,
+    is_from_elsewhere,
+    last_step,
+    progress_of,
+)
 from tdac_envs.core.errors import TdacError
 
 ELSEWHERE = "This run was not begun here: its verdict is what its files say."
+FIRST = "The first candidate appears here as soon as it has been tested."
 LETTERS = "k: the iteration; j: the repair of its candidate, 0 for the first version."
 SECONDS = 1.0
 """Between two looks at the folder."""
@@ -67,9 +75,9 @@ class Watching:
     async def show(self) -> None:
         """Builds the page, and keeps it up to date."""
         self._badge, self._now = job_heading(self._at)
-        self._command = shown_command("")
+        self._command = ShownCommand()
         with ui.row().classes("gap-2 items-center"):
-            self._stop, self._resume = job_buttons(self._interrupt, self._go_on)
+            self._buttons = JobButtons(self._interrupt, self._go_on)
             self._download = ui.button("Download the controller", on_click=self._save)
             self._judge = ui.button("Verify on hidden worlds", on_click=self._hidden)
             self._follow = ui.switch("show each new candidate", value=True)
@@ -78,6 +86,7 @@ class Watching:
             self._verdict_text = ui.label()
         self._wishes = ui.column().classes("w-full gap-1")
         self._questions = Questions(self._place / f"{self._at}-questions", self._folder)
+        self._awaited = ui.label().classes("note text-sm whitespace-pre-line")
         self._report = ui.column().classes("w-full")
         self._robust = Robustness(self._place, self._at)
         printed = ui.expansion("What the command printed").classes("w-full")
@@ -99,7 +108,7 @@ class Watching:
         if state == self._seen:
             return
         self._seen = state
-        row, running, version, output = state
+        row, running, _, version, output = state
         self._show_row(row, running, job)
         self._output.text = output
         if (
@@ -118,11 +127,10 @@ class Watching:
         with self._badge:
             status_badge(status)
         go_on = row.get("go_on", "") if row else ""
-        self._command.text = job.command if job else go_on or f"tdac report {self._at}"
-        self._stop.visible = running
+        self._command.show(job.command if job else go_on or f"tdac report {self._at}")
         # An agent starts its server itself.
-        continues = bool(go_on) and not row.get("agent")
-        self._resume.visible = continues and not running and status != "running"
+        continues = bool(go_on) and not row.get("agent") and status != "running"
+        self._buttons.show(running=running, continues=continues)
         self._follow.visible = running
         done = bool(row) and status in ("verified", "selected")
         self._download.visible = done
@@ -132,6 +140,9 @@ class Watching:
         if given:
             with self._wishes:
                 ui.label(given).classes("problem")
+        if status == "selected":
+            with self._wishes:
+                ui.label(SELECTED).classes("note text-sm")
         if row and is_from_elsewhere(self._folder):
             with self._wishes:
                 ui.label(ELSEWHERE).classes("note text-sm")
@@ -142,12 +153,13 @@ class Watching:
 
     def _show_clock(self, state: _State, job: Job | None) -> None:
         """Where the run stands, and for how long its command has run."""
-        row, running, _, output = state
-        text = _progress(row, running)
+        row, running, driven, version, output = state
+        text = progress_of(row, running)
         if running and job is not None:
-            text += f" ({job.seconds:.0f} s)"
-            last = output.strip().splitlines()[-1:]
-            text += f": {in_words(last[0].strip())}" if last else ""
+            text = "; ".join(filter(None, (text, driven))) + f" ({job.seconds:.0f} s)"
+            said = last_step(output), "" if version else FIRST
+            self._awaited.text = "\n".join(filter(None, said))
+        self._awaited.visible = running
         self._now.text = text
         judged = job_of(self._place, self._verdict_about)
         self._verdict.visible = judged is not None
@@ -203,66 +215,18 @@ class Watching:
             ).props("color=negative")
 
 
-_State = tuple[dict[str, Any], bool, str, str]
+_State = tuple[dict[str, Any], bool, str, str, str]
 
 
 def _state(folder: Path, job: Job | None) -> _State:
-    """Row of the list, whether it runs, version of its report, and output."""
+    """Row of the list, whether it runs, how far, version of its report, and output."""
     running = job is not None and job.running
     output = job.output() if job is not None else ""
     if not (folder / RUN_FILE).is_file():
-        return {}, running, "", output
+        return {}, running, "", "", output
     row = row_of(folder)
     running = running or row["status"] == "running"
-    judged = len(list(folder.glob("iterations/*/*/report.json")))
+    judged = candidates_of(folder)
     version = f"{judged}-{row['status']}" if judged or not running else ""
-    return row, running, version, output
-
-
-def is_from_elsewhere(folder: Path) -> bool:
-    """Whether another installation, or nobody known, began a run."""
-    try:
-        return not is_own_folder(load_run(folder))
-    except (TdacError, OSError):
-        return False
-
-
-def _progress(row: dict[str, Any], running: bool) -> str:
-    """One line about where the run stands."""
-    if not row or "k" not in row:
-        return "preparing the task …" if running else ""
-    text = f"iteration {row['k']} of at most {row['iterations']}"
-    tokens = row["tokens_in"] + row["tokens_out"]
-    if tokens:
-        cost = row["cost"]
-        text += f"; {tokens:,} tokens"
-        text += "" if cost is None else f", {cost:.4f} USD"
-    if row.get("reason"):
-        text += f"; {row['reason']}"
-    return text
-
-
-def in_words(line: str) -> str:
-    """A printed line with `iteration 2, repair 1` for `k=2 j=1`."""
-    return re.sub(r"\bk=(\d+) j=(\d+)", lambda found: _called(*found.groups()), line)
-
-
-def _called(k: str, j: str) -> str:
-    return candidate_name(int(k), int(j))
-
-
-def about_given(folder: Path) -> str:
-    """What came of the controller that the run began with, if it failed."""
-    try:
-        run = load_run(folder)
-    except (TdacError, OSError):
-        return ""
-    first = next((each for each in run.attempts if (each.k, each.j) == (1, 0)), None)
-    if run.given_sha256 is None or first is None or first.passed:
-        return ""
-    failed = len(first.failed_tests)
-    text = f"Your controller failed {failed} test{'' if failed == 1 else 's'}"
-    if not run.verified:
-        return f"{text}."
-    author = "the built-in template" if run.optimizer == "builtin" else run.optimizer
-    return f"{text}. The verified controller is another one, by {author}."
+    driven = episodes_driven(folder) if running else ""
+    return row, running, driven, version, output

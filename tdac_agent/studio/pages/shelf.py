@@ -11,12 +11,12 @@ from urllib.parse import quote
 
 from nicegui import events, ui
 
-from tdac_agent.bench.bench import RESULTS
 from tdac_agent.campaign.drive import CONFIG_FILE
 from tdac_agent.library.listing import folders_of, row_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
-from tdac_agent.studio.jobs import jobs
+from tdac_agent.studio.jobs import Job, jobs
+from tdac_agent.studio.pages.bench import show_benches
 from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
@@ -28,6 +28,8 @@ from tdac_agent.studio.sources import folders_with
 from tdac_envs.core.intake import read_zip
 
 NONE = "–"
+SECONDS = 5.0
+"""Between two looks at the folder."""
 MOST_ROWS = 2_000
 MOST_UPLOAD = 256 << 20
 MOST_UNPACKED = 1 << 30
@@ -60,16 +62,11 @@ def add(place: Path) -> None:
     async def page() -> None:
         with framed("Runs"):
             ui.add_css(f"@media (max-width: 699px) {{ {CARDS} }}")
-            found = ui.column().classes("w-full")
-            with found:
-                ui.label("reading the folder …").classes("note")
-            _show_others(place)
+            shelf = Shelf(place)
             _show_upload(place)
             await shown_first()
-            rows = await asyncio.to_thread(rows_in, place)
-            found.clear()
-            with found:
-                _show_table(rows)
+            await shelf.look()
+            ui.timer(SECONDS, shelf.look)
 
     @ui.page("/campaign")
     async def campaign(at: str = "") -> None:
@@ -80,6 +77,41 @@ def add(place: Path) -> None:
                 return
             ui.label(at).classes("text-xl font-bold")
             report_frame(at, str(time.time_ns()))
+
+
+class Shelf:
+    """The list of one opened page, and what is at work.
+
+    Args:
+        place: Folder of the studio.
+    """
+
+    def __init__(self, place: Path) -> None:
+        self._place = place
+        self._rows: list[dict[str, Any]] | None = None
+        self._table: ui.table | None = None
+        self._others: list[Job] | None = None
+        self._list = ui.column().classes("w-full")
+        with self._list:
+            ui.label("reading the folder …").classes("note")
+        self._beside = ui.column().classes("w-full gap-3")
+
+    async def look(self) -> None:
+        """Shows what has changed in the folder."""
+        rows = await asyncio.to_thread(rows_in, self._place)
+        if self._table is not None and rows != self._rows:
+            self._table.update_rows(rows, clear_selection=False)
+        elif self._table is None and (rows or self._rows is None):
+            self._list.clear()
+            with self._list:
+                self._table = _show_table(rows)
+        self._rows = rows
+        at_work = [job for job in jobs(self._place) if job.running]
+        if at_work != self._others:
+            self._others = at_work
+            self._beside.clear()
+            with self._beside:
+                _show_others(self._place, at_work)
 
 
 def rows_in(place: Path) -> list[dict[str, Any]]:
@@ -106,7 +138,9 @@ def _row(folder: Path) -> dict[str, Any]:
 
 def _cells(place: Path, row: dict[str, Any]) -> dict[str, Any]:
     run = str(Path(row["run"]).resolve().relative_to(place))
-    iteration = f"iteration {row['k']} of {row['iterations']}" if "k" in row else NONE
+    iteration = f"iteration {row['k']}" if "k" in row else NONE
+    if row["status"] not in ("verified", "selected") and "k" in row:
+        iteration += f" of {row['iterations']}"
     cost = row.get("cost")
     return {
         "run": run,
@@ -127,10 +161,10 @@ def _when(started: str) -> str:
         return started[:16]
 
 
-def _show_table(rows: list[dict[str, Any]]) -> None:
+def _show_table(rows: list[dict[str, Any]]) -> ui.table | None:
     if not rows:
         ui.label("No runs in this folder yet.")
-        return
+        return None
     table = ui.table(
         columns=COLUMNS,
         rows=rows,
@@ -152,36 +186,42 @@ def _show_table(rows: list[dict[str, Any]]) -> None:
         search = ui.input("search").props("dense clearable")
         search.bind_value_to(table, "filter")
     with table.add_slot("top-right"):
+        button = ui.button(icon="compare_arrows").props("outline no-caps")
+        button.classes("max-sm:mt-3")
 
-        def compare() -> None:
-            chosen = [row["run"] for row in table.selected if row["address"]]
-            if len(chosen) == 2:
-                one, other = map(quote, chosen)
-                ui.navigate.to(f"/compare?one={one}&other={other}")
-            else:
-                ui.notify("select two runs", type="info")
+    def chosen() -> list[str]:
+        return [row["run"] for row in table.selected if row["address"]]
 
-        ui.button("Compare two", icon="compare_arrows", on_click=compare).props(
-            "outline no-caps"
-        )
+    def compare() -> None:
+        one, other = map(quote, chosen())
+        ui.navigate.to(f"/compare?one={one}&other={other}")
+
+    def selected() -> None:
+        ready = len(chosen()) == 2
+        button.text = "Compare them" if ready else "Select two runs to compare them"
+        button.set_enabled(ready)
+
+    button.on_click(compare)
+    table.on_select(selected)
+    selected()
+    return table
 
 
-def _show_others(place: Path) -> None:
+def _show_others(place: Path, at_work: list[Job]) -> None:
     """Campaigns and benches, and commands that still run."""
-    for title, file, page in (
-        ("Campaigns", CONFIG_FILE, "/campaign"),
-        ("Benches", RESULTS, "/bench"),
-    ):
-        found = folders_with(place, file)
-        if found:
-            ui.label(title).classes("text-lg font-bold")
-        for at in found:
-            ui.link(at, address_of(page, at))
-    running = [job for job in jobs(place) if job.running]
-    if running:
+    campaigns = folders_with(place, CONFIG_FILE)
+    if campaigns:
+        ui.label("Campaigns").classes("text-lg font-bold")
+    for at in campaigns:
+        ui.link(at, address_of("/campaign", at))
+    show_benches(place, "Benches")
+    if at_work:
         ui.label("At work").classes("text-lg font-bold")
-    for job in running:
+    for job in at_work:
         with ui.row().classes("items-center"):
+            page = {"synth": "/run", "bench": "/bench"}.get(job.words[0])
+            if page:
+                ui.link(job.about, address_of(page, job.about))
             ui.label(job.command).classes("font-mono text-sm")
             ui.button("Stop", on_click=job.stop).props("flat dense")
 

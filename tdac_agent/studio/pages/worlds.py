@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import shlex
 from pathlib import Path
 
 import cv2
@@ -12,14 +13,15 @@ from nicegui import ui
 from tdac_agent.bench.rivals import rival_names
 from tdac_agent.evaluation.set_play import SHOWN
 from tdac_agent.html_report.scene import data_address
-from tdac_agent.library.listing import next_folder
+from tdac_agent.set_synthesis.synthesize import EPISODES
+from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.jobs import FILES, STATE, start
+from tdac_agent.studio.jobs import FILES, STATE, free_folder, start
 from tdac_agent.studio.pages.films import show_film
 from tdac_agent.studio.pages.layout import (
+    ShownCommand,
     address_of,
     framed,
-    shown_command,
     shown_first,
 )
 from tdac_agent.studio.pages.writers import Writers
@@ -30,6 +32,8 @@ from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
 
+LEAST = 2
+"""Episodes of a run on a set: one for a test, one for the selection."""
 SECONDS = 0.05
 """Between two frames of a drive, at least."""
 KEYS = "Arrow keys or W A S D drive; R begins again."
@@ -93,9 +97,8 @@ class Looking:
 
     def _build_use(self) -> None:
         ui.label("Use it").classes("font-bold")
-        ui.button(
-            "Write a controller for this map (without movers)", on_click=self._as_map
-        ).props("outline no-caps").bind_enabled_from(
+        self._one_map = ui.button(on_click=self._as_map).props("outline no-caps")
+        self._one_map.bind_enabled_from(
             self._name, "value", lambda name: name != "epuck"
         )
         ui.button("Write one for the whole set …", on_click=self._ask_writer).props(
@@ -113,7 +116,7 @@ class Looking:
                 options, value="follow-the-gap", label="right"
             ).classes("w-64")
             ui.button("Watch", on_click=self._watch)
-        self._command = shown_command("")
+        self._command = ShownCommand()
         self._films = ui.element("div").classes(
             "w-full grid grid-cols-1 sm:grid-cols-2 gap-3"
         )
@@ -139,6 +142,8 @@ class Looking:
             return
         self._tasks = tasks
         self._about.text = tasks.file.description
+        without = " (without movers)" if tasks.file.movers else ""
+        self._one_map.text = f"Write a controller for this map{without}"
         self._show(picture)
         self._facts.clear()
         with self._facts:
@@ -179,6 +184,7 @@ class Looking:
         self._show(picture)
         self._told.text = drive.status
         if drive.over:
+            self._told.text += " – press R to begin again"
             self._timer.deactivate()
 
     def _as_map(self) -> None:
@@ -200,28 +206,43 @@ class Looking:
     def _ask_writer(self) -> None:
         """Asks who writes, and starts a run on the set."""
         name = self._name.value
-        folder = str(next_folder(name, self._place))
+        folder = free_folder(name, self._place)
+        self._timer.deactivate()  # no robot drives behind the question
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[40rem] max-w-full"):
             ui.label(f"A controller for all worlds of {name}").classes(
                 "text-lg font-bold"
             )
             ui.label(
-                "Candidates drive on worlds of the split dev: 64 for tests, 64 for the "
-                "selection. That takes minutes."
+                "Candidates drive on worlds of the split dev: half of the episodes are "
+                "for tests, half for the selection. 128 take minutes."
             ).classes("note")
 
+            def words() -> list[str]:
+                most = ["--episodes", f"{episodes.value or 0:.0f}"]
+                return ["synth", "--set", name, *most, *writers.words()]
+
             def changed() -> None:
-                go.set_enabled(writers.problem() is None)
+                ready = writers.problem() is None and (episodes.value or 0) >= LEAST
+                go.set_enabled(ready)
+                command.show(shlex.join(["tdac", *words()]) if ready else "")
 
             writers = Writers(self._place, changed)
+            episodes = ui.number(
+                "episodes at most", value=EPISODES, min=LEAST, max=MOST_EPISODES,
+                precision=0, on_change=changed,
+            ).classes("w-40")  # fmt: skip
+            command = ShownCommand()
 
             def begin() -> None:
-                words = ["synth", "--set", name, *writers.words(), "--out", folder]
-                start(self._place, writers.with_folder(words, folder), folder)
+                all_words = writers.with_folder([*words(), "--out", folder], folder)
+                start(self._place, all_words, folder)
                 dialog.close()
                 ui.navigate.to(address_of("/run", folder))
 
-            go = ui.button("Write it", on_click=begin)
+            with ui.row():
+                go = ui.button("Write it", on_click=begin)
+                ui.button("Cancel", on_click=dialog.close).props("flat")
+            changed()
 
     def _watch(self) -> None:
         """Lets two policies drive this world, and shows their videos."""
@@ -235,7 +256,7 @@ class Looking:
             world = ["--set", name, "--split", split, "--index", index]
             words = ["play", who, *world, "--video", film]
             job = start(self._place, words, film)
-            self._command.text = job.command
+            self._command.show(job.command)
             with self._films, ui.column().classes("min-w-0 gap-1"):
                 show_film(self._place, film, who)
 

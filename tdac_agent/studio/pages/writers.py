@@ -102,7 +102,7 @@ class Writers:
         who = self._who.value
         self._paid.visible, self._own.visible = who in KEYS, who == "file"
         self._short.visible = self._on_task and who in {*KEYS, "manual"}
-        self._note.text = self.problem() or self._price()
+        self._note.text = self.problem() or self._about()
         self._changed_if_ready()
 
     def _changed_if_ready(self) -> None:
@@ -111,9 +111,11 @@ class Writers:
             self._changed()
         self._built = True
 
-    def _price(self) -> str:
-        """The price of the chosen model, as far as it is known."""
+    def _about(self) -> str:
+        """The given file, or the price of the chosen model, as far as it is known."""
         who = self._who.value
+        if who == "file":
+            return f"The controller is {Path(self._file).name}."
         if who not in KEYS:
             return ""
         name = f"{who}:{self._model.value.strip()}"

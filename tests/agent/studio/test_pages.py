@@ -1,6 +1,7 @@
 """The pages in a real browser, as a user without the command line sees them."""
 
 import json
+import re
 import shutil
 import time
 
@@ -14,6 +15,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 from studio_process import Studio
 
 from tdac_agent.runs.replay import DEMO
+from tdac_agent.studio.jobs import jobs
 
 SECONDS = 60
 SIZES = {"desktop": (1440, 900), "laptop": (1180, 800), "phone": (390, 844)}
@@ -122,9 +124,12 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     assert number(page, "start x").get_attribute("value") == "60"
     assert abs(float(number(page, "heading, rad").get_attribute("value"))) < 0.05
     assert "tdac synth --map .studio/files/plan.png --start 60 150" in text_of(page)
-    press(page, "Write and verify a controller")
+    button = "//button[.//span[normalize-space()='Write and verify a controller']]"
+    ActionChains(page).double_click(page.find_element(By.XPATH, button)).perform()
     wait(page, lambda b: "/run?" in b.current_url)
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    begun = [job.about for job in jobs(studio.place)]
+    assert [about for about in begun if "plan" in about] == ["runs/plan-1"]
     assert "not begun here" not in text_of(page)
     frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
     page.switch_to.frame(frame)
@@ -168,6 +173,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     says(page, "Drop the controller first.")
     upload(page, tmp_path / "blind.py", "Drop controller.py here")
     says(page, "--from .studio/files/blind.py")
+    says(page, "The controller is blind.py.")
     press(page, "Write and verify a controller")
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
     frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
@@ -262,7 +268,7 @@ def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
     field.send_keys("2")
     says(page, "--split test -n 2")
     press(page, "Start the bench")
-    says(page, "of 2 drives ended")
+    says(page, "of 4 episodes driven")
     address = page.current_url
     page.get(f"{studio.base}/benches")
     wait(page, lambda b: b.find_element(By.LINK_TEXT, "runs/bench-1"))
@@ -276,6 +282,35 @@ def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
     assert found["entrants"] == ["builtin", "follow-the-gap"]
 
 
+@pytest.mark.slow
+def test_a_bench_is_stopped_and_continued(page, studio):
+    """It goes on with the next episode: what was driven before is kept."""
+    page.get(f"{studio.base}/benches")
+    field = number(page, "worlds of each set")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("6")
+    says(page, "--split test -n 6")
+    press(page, "Start the bench")
+    wait(page, lambda b: re.search(r"\b[1-5] of 12 episodes driven", text_of(b)))
+    press(page, "Stop")
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.not-finished"))
+    says(page, "; Continue goes on with the next one")
+    folder = studio.place / page.current_url.partition("?at=")[2]
+    (rows,) = folder.glob("driven/*/*/unfinished/episodes.jsonl")
+    before = [json.loads(line) for line in rows.read_text().splitlines()]
+    assert 0 < len(before) < 6
+    page.get(f"{studio.base}/runs")
+    says(page, "builtin, follow-the-gap on unknown")
+    page.find_element(By.LINK_TEXT, str(folder.relative_to(studio.place))).click()
+    press(page, "Continue")
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.running"))
+    assert f"{len(before)} of 12 episodes driven" in text_of(page)
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
+    report = json.loads((rows.parent.parent / "set.json").read_text())
+    # Its CPU time tells an episode from another one on the same world.
+    assert report["episodes"][: len(before)] == before
+
+
 def test_a_world_is_driven_by_the_keyboard(page, studio):
     """Straight ahead, the robot of this world meets a wall within seconds."""
     page.get(f"{studio.base}/worlds?level=unknown")
@@ -287,7 +322,29 @@ def test_a_world_is_driven_by_the_keyboard(page, studio):
     ActionChains(page).key_down(Keys.ARROW_UP, body).perform()
     wait(page, lambda b: "contact" in status.text)
     ActionChains(page).key_up(Keys.ARROW_UP, body).perform()
-    assert status.text.endswith(" s")
+    assert status.text.endswith(" s – press R to begin again")
+    ActionChains(page).send_keys("r").perform()
+    wait(page, lambda b: "contact" not in status.text)
+
+
+@pytest.mark.slow
+def test_a_controller_for_a_set_of_worlds(page, studio):
+    """With few episodes; the page says how many have been driven."""
+    page.get(f"{studio.base}/worlds?level=unknown")
+    says(page, "narrowest passage")
+    assert "without movers" not in text_of(page)
+    press(page, "Write one for the whole set …")
+    says(page, "tdac synth --set unknown --episodes 128")
+    field = number(page, "episodes at most")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("4")
+    wait(page, lambda b: "--episodes 4\n" in text_of(b))
+    press(page, "Write it")
+    wait(page, lambda b: "/run?" in b.current_url)
+    says(page, "of at most 4 episodes driven")
+    says(page, "The first candidate appears here as soon as it has been tested.")
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.selected"))
+    says(page, "Only hidden worlds, which nobody has seen, can verify it.")
 
 
 def test_a_phone_shows_all_columns_of_a_run(page, studio):
@@ -319,6 +376,31 @@ def test_the_map_is_beside_its_controls(page, studio):
     assert image.rect["y"] < controls.rect["y"]
     assert image.rect["x"] > controls.rect["x"] + controls.rect["width"]
     assert image.rect["width"] > 600
+    resize(page, "desktop")
+
+
+def test_a_map_and_what_was_found_are_in_sight(page, studio, tmp_path):
+    """A tall one too, and on a phone, where the controls are below the map."""
+    picture = np.full((900, 300), 255, np.uint8)
+    picture[:8] = picture[-8:] = picture[:, :8] = picture[:, -8:] = 0
+    picture[446:454] = 0
+    cv2.imwrite(str(tmp_path / "tall.png"), picture)
+    upload(page, tmp_path / "tall.png")
+    says(page, "300 x 900 px")
+    for name in ("desktop", "phone"):
+        resize(page, name)
+        for place in ((60, 100), (60, 200), (200, 800)):
+            choice = {100: "click the start", 200: "its heading", 800: "the goal"}
+            press(page, choice[place[1]])
+            click_map(page, *place, (300, 900))
+        says(page, "are not connected")
+        height = SIZES[name][1]
+        page.execute_script("scrollTo(0, 0)")
+        board = page.find_element(By.CSS_SELECTOR, ".board").rect
+        assert board["width"] > 100
+        assert board["y"] + board["height"] < height
+        found = page.find_element(By.CSS_SELECTOR, ".found").rect
+        assert found["y"] + found["height"] <= height
     resize(page, "desktop")
 
 
@@ -384,8 +466,31 @@ def test_an_address_has_the_chosen_task(page, plan):
     assert number(page, "goal y").get_attribute("value") == "60"
 
 
+def test_a_map_that_may_be_read_in_two_ways(page, studio, tmp_path):
+    """The user sees it, and says which pixels are the obstacles."""
+    picture = np.full((300, 400), 128, np.uint8)
+    picture[:, :200] = 100
+    picture[100:200, 100:300] = 160
+    cv2.imwrite(str(tmp_path / "either.png"), picture)
+    page.get(f"{studio.base}/?source=world: maze")  # of which nothing is to be said
+    says(page, "Webots")
+    upload(page, tmp_path / "either.png")
+    says(page, "may be its dark or its light pixels: choose above")
+    image = page.find_element(By.CSS_SELECTOR, ".board img")
+    wait(page, lambda b: image.rect["height"] > 200)
+    press(page, "are light")
+    says(page, "obstacles are light pixels")
+    wait(page, lambda b: "obstacles=light" in b.current_url)
+    page.refresh()
+    says(page, "obstacles are light pixels")
+    page.get(f"{studio.base}/?task=1,2,3,4,5,x")  # no such address
+    says(page, "A path of")
+
+
 def test_two_runs_are_compared(page, studio):
-    """What differs is marked, and the controllers' lines are beside each other."""
+    """Chosen from the list, which shows new runs by itself; what differs is marked."""
+    page.get(f"{studio.base}/runs")
+    says(page, "A run from elsewhere")
     for name, source in (("one", "A = 1\n<b>B</b>\n"), ("other", "A = 2\n<b>B</b>\n")):
         folder = studio.place / "runs" / f"compared-{name}"
         shutil.copytree(DEMO, folder)
@@ -393,8 +498,12 @@ def test_two_runs_are_compared(page, studio):
     record = folder / "run.json"
     run = json.loads(record.read_text())
     record.write_text(json.dumps({**run, "seconds": 12345.0}))
-    at = "one=runs/compared-one&other=runs/compared-other"
-    page.get(f"{studio.base}/compare?{at}")
+    for name in ("one", "other"):
+        row = f"//tr[contains(., 'compared-{name}')]//*[@role='checkbox']"
+        box = wait(page, lambda b, row=row: b.find_elements(By.XPATH, row))[0]
+        page.execute_script("arguments[0].click()", box)
+    press(page, "Compare them")
+    wait(page, lambda b: "/compare?one=" in b.current_url)
     says(page, "settings are the same")
     rows = page.find_elements(By.CSS_SELECTOR, ".compared tr.differs")
     assert [row.text.split()[:2] for row in rows] == [["≠", "time"]]

@@ -20,6 +20,7 @@ import tdac_agent
 from tdac_agent.cli.flags import TaskFlags
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
+from tdac_agent.storage.journal import append_record
 from tdac_agent.studio.board import board_of, names_of
 from tdac_agent.studio.comparison import (
     difference,
@@ -30,12 +31,17 @@ from tdac_agent.studio.comparison import (
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.draft import Checked, Draft, check
 from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.jobs import Job, job_of, jobs, start
+from tdac_agent.studio.findings import fitting_radius, sentence_of
+from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
-from tdac_agent.studio.pages.home import fitting_radius, sentence_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
-from tdac_agent.studio.pages.run import about_given, in_words, is_from_elsewhere
 from tdac_agent.studio.pages.shelf import unpack
+from tdac_agent.studio.standing import (
+    about_given,
+    episodes_driven,
+    is_from_elsewhere,
+    last_step,
+)
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 SECONDS = 120
@@ -161,6 +167,20 @@ def test_a_job_is_found_again(tmp_path):
     assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
 
 
+def test_a_command_at_work_is_not_started_twice(tmp_path):
+    """As by a double click; and its folder is given to no other one."""
+    job = start(tmp_path, ["runs", "."], free_folder("demo", tmp_path))
+    assert job.about == "runs/demo-1"
+    assert start(tmp_path, ["runs", "."], "runs/demo-1") == job
+    assert start(tmp_path, ["sets"], "runs/demo-1") != job
+    assert free_folder("demo", tmp_path) == "runs/demo-2"
+    for each in jobs(tmp_path):
+        wait_for(each)
+    again = start(tmp_path, ["runs", "."], "runs/demo-1")
+    assert again != job  # that one has ended
+    wait_for(again)
+
+
 def test_files_of_one_name_are_told_apart():
     """Two entrants of a bench cannot have the same name."""
     files = ["runs/a/controller.py", "x/runs/a/controller.py", "mine.py", "x/mine.py"]
@@ -188,7 +208,7 @@ def test_a_bench_tells_how_far_it_is(tmp_path):
         path.write_text("{}\n" * 5)
     share, text = progress_of(job, tmp_path)
     assert share == pytest.approx(1.5 / 4)
-    assert text.startswith("1 of 4 drives ended, the next one is at world 5 of 10 (")
+    assert text == "15 of 40 episodes driven"
 
 
 def packed(**files):
@@ -281,7 +301,10 @@ def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
     (folder / "run.json").write_text(given.model_dump_json())
     failed = len(run.attempts[0].failed_tests)
     text = about_given(folder)
-    assert text.startswith(f"Your controller failed {failed} tests. The verified")
+    begin = (
+        f"Your controller failed {failed} tests: see iteration 1 below. The verified"
+    )
+    assert text.startswith(begin)
     assert text.endswith("is another one, by the built-in template.")
 
 
@@ -324,8 +347,35 @@ def test_what_differs_between_two_runs(tmp_path):
     assert difference(one, other) is None
 
 
-def test_letters_are_in_words():
-    """What the command prints in a line is explained above the report."""
-    line = in_words("✘ k=12 j=3  8 failed: test_progress")
-    assert line == "✘ iteration 12, repair 3  8 failed: test_progress"
-    assert in_words("k=1 j=0  neutral parameters") == "iteration 1  neutral parameters"
+def test_the_last_step_of_a_run_is_in_words():
+    """Not the end of a long line, which says nothing alone."""
+    output = (
+        "task plan: shortest path 920 px, body radius 30 px, at most\n2500 steps\n"
+        "✘ k=12 j=0  8 failed: test_progress\n"
+        "  k=12 j=3  test_end_to_end.py::test_progress -> lookahead 120 -> 60\n"
+        "note: the file\ngives no resolution\n"
+    )
+    said = "iteration 12, repair 3: test_progress -> lookahead 120 -> 60"
+    assert last_step(output) == said
+    passed = last_step("✔ k=1 j=0  all tests passed\n")
+    assert passed == "✔ iteration 1: all tests passed"
+    assert last_step("error: k=1 is too small\n") == ""
+    compiling = "compiling for this machine, cached for later runs: kernel 3 of 56"
+    assert last_step(f"{output}tdac: {compiling}\n") == compiling
+
+
+def test_a_run_on_a_set_tells_how_far_it_is(tmp_path):
+    """Episodes of the limit alone: those of a comparison at the end are others."""
+    assert episodes_driven(DEMO) == ""  # it is on one task
+    folder = tmp_path / "run"
+    shutil.copytree(DEMO, folder)
+    run = load_run(folder).model_copy(update={"episodes": 40, "improve": 8})
+    (folder / "run.json").write_text(run.model_dump_json())
+    for what, driven in (("feedback", 8), ("validation", 5), ("comparison", 30)):
+        record = {"event": "drive.end", "what": what, "driven": driven}
+        append_record(folder / "journal.jsonl", record)
+    for name in ("feedback-2", "comparison-1"):
+        rows = folder / "iterations/k01/j0" / name / "unfinished/episodes.jsonl"
+        rows.parent.mkdir(parents=True)
+        rows.write_text("{}\n" * 3)
+    assert episodes_driven(folder) == "16 of at most 48 episodes driven"

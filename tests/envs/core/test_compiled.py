@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core import event
 
 import tdac_envs
 from tdac_envs.core.code_cache import cache_folder
-from tdac_envs.core.compiled import read_only
+from tdac_envs.core.compiled import KERNELS, compiling, read_only
 from tdac_envs.grid import grid, plan
 from tdac_envs.grid.grid import clearance
 from tdac_envs.map2d import contact, kernels, rays
@@ -327,3 +328,11 @@ def test_compiled_and_plain_agree(seed):
         way = (leaps, read_only(field, np.float32), x, y, 5.0)
         exact = kernels._path_distance.py_func(*way)
         assert kernels.path_distance(*way) == pytest.approx(exact, rel=1e-5)
+
+
+def test_a_program_can_show_what_is_compiled():
+    """A page that waits for it, for example."""
+    assert compiling() == ""
+    with event.trigger_event("numba:compile", data={"dispatcher": KERNELS[0]}):
+        assert "compiling for this machine" in compiling()
+    assert compiling() == ""

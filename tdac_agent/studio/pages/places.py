@@ -1,0 +1,105 @@
+"""The second section of the start page: start, heading, goal and the robot's size."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+
+from nicegui import ui
+
+from tdac_agent.studio.board import Board
+from tdac_agent.studio.draft import Checked, Draft
+from tdac_agent.studio.findings import LEAST_RADIUS, RADIUS_STEP, fitting_radius
+
+NAMES = "start x", "start y", "heading, rad", "goal x", "goal y"
+RADIUS = 15.0
+"""Of the robot on a map that names none, px."""
+
+
+class Places:
+    """The numbers of a draft, what was found about it, and help if it is refused.
+
+    Args:
+        typed: Called when a number was typed.
+        resized: Called when the slider was moved.
+        snap: Called to move start and goal to free places.
+        fit: Called to take a radius that gets through.
+    """
+
+    def __init__(
+        self,
+        typed: Callable[[], Awaitable[None]],
+        resized: Callable[[], Awaitable[None]],
+        snap: Callable[[], Awaitable[None]],
+        fit: Callable[[], Awaitable[None]],
+    ) -> None:
+        self._numbers: dict[str, ui.number] = {}
+        with ui.grid(columns=3).classes("w-full gap-2"):
+            for name in NAMES:
+                self._numbers[name] = (
+                    ui.number(name, format="%g")
+                    .on("change", typed)
+                    .on("keydown.enter", typed)
+                    .props("dense")
+                )
+        with ui.column().classes("w-full gap-0") as self._sized:
+            self._radius_text = ui.label("robot radius")
+            self._radius = ui.slider(
+                min=LEAST_RADIUS, max=40, step=RADIUS_STEP, value=RADIUS
+            ).props("label aria-label='robot radius, px'")
+            self._radius.on("change", resized)
+        self._told = ui.label().classes("found text-sm").props("role=status")
+        self._snap = ui.button("Use the nearest free place", on_click=snap).props(
+            "outline no-caps dense"
+        )
+        self._fit = ui.button(on_click=fit).props("outline no-caps dense")
+        self._snap.visible = self._fit.visible = False
+
+    def written(self, draft: Draft) -> Draft:
+        """A draft with the numbers of the page."""
+        x, y, heading, goal_x, goal_y = (self._numbers[name].value for name in NAMES)
+        start = None if x is None or y is None else (x, y)
+        goal = None if goal_x is None or goal_y is None else (goal_x, goal_y)
+        return replace(draft, start=start, goal=goal, heading=heading)
+
+    @property
+    def radius(self) -> float:
+        """Where the slider is, px."""
+        return float(self._radius.value)
+
+    def show(self, draft: Draft) -> None:
+        """Shows the numbers of a draft."""
+        places = (*(draft.start or (None, None)), draft.heading)
+        shown = (*places, *(draft.goal or (None, None)))
+        for number, value in zip(self._numbers.values(), shown, strict=True):
+            number.value = value
+        self._sized.visible = draft.kind == "map"
+        self._radius.value = draft.radius or RADIUS
+
+    def show_checked(self, draft: Draft, checked: Checked | None, board: Board) -> None:
+        """Shows the widest radius, and what helps if the draft is refused."""
+        stuck = checked is not None and checked.task is None
+        fitting = fitting_radius(draft, checked) if stuck else None
+        self._snap.visible = stuck and board.kind == "map" and fitting is None
+        self._fit.visible = fitting is not None
+        if fitting is not None:
+            self._fit.text = f"Use a radius of {fitting:g} px"
+        text = f"robot radius {draft.radius:g} px" if draft.radius else ""
+        widest = checked.widest if checked else None
+        if widest is not None and widest > 0:
+            text += f"; the widest that gets through has {widest:g} px"
+        self._radius_text.text = text
+
+    def clear(self) -> None:
+        """Empties the numbers: there is no draft."""
+        self._snap.visible = self._fit.visible = False
+        for number in self._numbers.values():
+            number.value = None
+        self._radius_text.text = ""
+
+    def tell(self, text: str, good: bool) -> None:
+        """Shows a sentence in its colour."""
+        self._told.text = text
+        self._told.classes(
+            add="fine" if good else "problem", remove="problem" if good else "fine"
+        )

@@ -1,0 +1,117 @@
+"""Where a run stands, in words."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.evaluation.kept_sets import ROWS_FILE, UNFINISHED
+from tdac_agent.html_report.names import candidate_name
+from tdac_agent.runs.ownership import is_own_folder
+from tdac_agent.runs.run_record import JOURNAL, load_run
+from tdac_agent.storage.journal import read_records
+from tdac_envs.core.errors import TdacError
+
+COUNTED = "feedback", "validation", "improve"
+"""What the limit of episodes of a run on a task set is for."""
+NOTE = "tdac: "
+"""Before what a command says about itself."""
+SELECTED = (
+    "Selected: the best candidate on worlds of the split dev. Only hidden worlds, "
+    "which nobody has seen, can verify it."
+)
+
+
+def progress_of(row: dict[str, Any], running: bool) -> str:
+    """One line about where a run stands.
+
+    Args:
+        row: Its row of the list of runs; empty if it has not begun.
+        running: Whether its command runs.
+    """
+    if not row or "k" not in row:
+        return "preparing the task …" if running else ""
+    text = f"iteration {row['k']} of at most {row['iterations']}"
+    if row["status"] in ("verified", "selected"):
+        text = f"in iteration {row['k']}, {row['seconds']:.0f} s"
+    tokens = row["tokens_in"] + row["tokens_out"]
+    if tokens:
+        cost = row["cost"]
+        text += f"; {tokens:,} tokens"
+        text += "" if cost is None else f", {cost:.4f} USD"
+    if row.get("reason"):
+        text += f"; {row['reason']}"
+    return text
+
+
+def last_step(output: str) -> str:
+    """The last step of a candidate that a command printed; empty if there is none.
+
+    It has `iteration 2, repair 1` for the `k=2 j=1` of the command. While code is
+    compiled, that is the step.
+    """
+    last = output.strip().splitlines()[-1:]
+    if last and last[0].startswith(NOTE):
+        return last[0].removeprefix(NOTE)
+    found = re.findall(r"^ *([^\w\s])? *k=(\d+) j=(\d+) +(\S.*)$", output, re.MULTILINE)
+    if not found:
+        return ""
+    mark, k, j, text = found[-1]
+    text = re.sub(r"\S+\.py::", "", text.strip())
+    return f"{mark} {candidate_name(int(k), int(j))}: {text}".strip()
+
+
+def episodes_driven(folder: Path) -> str:
+    """How far a run on a task set is; empty for a run on one task.
+
+    Args:
+        folder: Its folder.
+    """
+    try:
+        run = load_run(folder)
+        records = read_records(folder / JOURNAL)
+    except (TdacError, OSError):
+        return ""
+    if run.episodes is None:
+        return ""
+    ended = [each for each in records if each.get("event") == "drive.end"]
+    driven = sum(each.get("driven", 0) for each in ended if each.get("what") in COUNTED)
+    for rows in folder.glob(f"iterations/*/*/*/{UNFINISHED}/{ROWS_FILE}"):
+        if rows.parent.parent.name.startswith(COUNTED):
+            driven += len(rows.read_bytes().splitlines())
+    return f"{driven} of at most {run.episodes + run.improve} episodes driven"
+
+
+def candidates_of(folder: Path) -> int:
+    """How many candidates of a run have been tested."""
+    try:
+        return len(load_run(folder).attempts)
+    except (TdacError, OSError):
+        return 0
+
+
+def is_from_elsewhere(folder: Path) -> bool:
+    """Whether another installation, or nobody known, began a run."""
+    try:
+        return not is_own_folder(load_run(folder))
+    except (TdacError, OSError):
+        return False
+
+
+def about_given(folder: Path) -> str:
+    """What came of the controller that the run began with, if it failed."""
+    try:
+        run = load_run(folder)
+    except (TdacError, OSError):
+        return ""
+    first = next((each for each in run.attempts if (each.k, each.j) == (1, 0)), None)
+    if run.given_sha256 is None or first is None or first.passed:
+        return ""
+    failed = len(first.failed_tests)
+    text = f"Your controller failed {failed} test{'' if failed == 1 else 's'}"
+    text += ": see iteration 1 below"
+    if not run.verified:
+        return f"{text}."
+    author = "the built-in template" if run.optimizer == "builtin" else run.optimizer
+    return f"{text}. The verified controller is another one, by {author}."
