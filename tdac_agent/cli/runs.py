@@ -59,7 +59,8 @@ def run(folder: Path, as_json: bool) -> int:
             if row.get("agent"):
                 print_sentences(console, _agent(row))
             if row["go_on"]:
-                console.print(f"to continue: {escape(row['go_on'])}", soft_wrap=True)
+                text = f"{_what_goes_on(row)}: {row['go_on']}"
+                console.print(escape(text), soft_wrap=True)
     else:
         console.print(f"no runs in {folder}; `tdac synth` makes one", soft_wrap=True)
     return 0
@@ -70,6 +71,12 @@ def _training_progress(row: dict[str, Any]) -> str:
     rate = row["success_rate"]
     best = "" if rate is None else f", the best policy reached {rate:.0%} of the goals"
     return f"{row['run']}: {row['steps']:,} of {row['of_steps']:,} steps{best}"
+
+
+def _what_goes_on(row: dict[str, Any]) -> str:
+    if row["status"] != "verified":
+        return "to continue"
+    return f"{row['run']} is verified; to go on improving it"
 
 
 def _agent(row: dict[str, Any]) -> str:

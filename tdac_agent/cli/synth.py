@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +141,14 @@ def _so_far(folder: Path) -> str:
     """Where the unfinished run is, and the command to continue it."""
     if not (folder / TASK_FILE).is_file():
         return "the run had not begun"
-    return f"the run so far is in {folder}; to continue: tdac synth --resume {folder}"
+    command = f"tdac synth --resume {shlex.quote(str(folder))}"
+    # The first error is the one to report.
+    with suppress(RunError):
+        run = load_run(folder)
+        if run.verified:
+            told = f"verified in iteration {run.tau}: {run.controller}"
+            return f"{told}; to go on improving it: {command}"
+    return f"the run so far is in {folder}; to continue: {command}"
 
 
 def read_text(path: Path) -> str:

@@ -52,6 +52,7 @@ class CandidateHistory:
         diff: Unified diff from the previous candidate.
         learnt: Rules in force when it was written, and later changes to them.
         on_set: Whether it is for a task set.
+        varies: Whether it is a variation of what works.
     """
 
     k: int
@@ -64,6 +65,7 @@ class CandidateHistory:
     diff: str
     learnt: RuleChanges
     on_set: bool = False
+    varies: bool = False
 
     @property
     def failed(self) -> tuple[str, ...]:
@@ -191,6 +193,7 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
             read_text(folder / "controller.diff") or "",
             learnt.get((k, j), RuleChanges()),
             run.on_set,
+            _varies(run, k, attempt),
         )
 
 
@@ -198,6 +201,12 @@ def _numbers(folder: Path) -> tuple[int, int]:
     """(k, j) of a candidate's folder; (0, 0) for any other path."""
     k, j = folder.parent.name[1:], folder.name[1:]
     return (int(k), int(j)) if k.isdecimal() and j.isdecimal() else (0, 0)
+
+
+def _varies(run: Run, k: int, attempt: Attempt | None) -> bool:
+    if attempt is None:
+        return run.improve > 0 and k > run.iterations
+    return attempt.parent is not None
 
 
 def _state(attempt: Attempt | None) -> State:

@@ -62,6 +62,7 @@ class Recorder:
     run: Run
     past: JournalState = field(default_factory=JournalState)
     on_event: Event | None = None
+    _before: Run | None = None
     _clock: float = field(default_factory=time.monotonic)
     _previous: str = ""
     _turns: Counter[tuple[str, int, int]] = field(default_factory=Counter)
@@ -122,13 +123,9 @@ class Recorder:
             before: The record of the last process; it stays in `run.json` for now.
             **facts: Further fields of the journal record.
         """
-        past = self.past
-        kept = ("max_cost", "max_tokens", "mark")
-        limits = {name: getattr(self.run, name) for name in kept}
-        running = {"status": "running", "censored": False}
-        ended = dict.fromkeys(("reason", "enough", "outlook"), "")
-        self._write(before.model_copy(update={**running, **ended, **limits}))
-        self.run.cost_lost = past.lost_usd
+        past, self._before = self.past, before
+        self.run.seconds, self.run.cost_lost = before.seconds, past.lost_usd
+        self._write(self._with_earlier_progress(before))
         self.event(
             "run.resume",
             task=self.run.task,
@@ -326,15 +323,31 @@ class Recorder:
         self.run.reason = str(facts.get("reason", ""))
         self.run.enough = str(facts.get("enough", ""))
         self.run.outlook = str(facts.get("outlook", ""))
-        solved = self.run.tau is not None and not self.run.on_set
-        self.run.censored = not (self.run.finished or solved)
+        self.run.censored = not (self.run.finished or self.run.verified)
         self.event("run.end", status=status, **facts)
         self.save()
 
     def save(self) -> None:
-        """Writes `run.json`."""
+        """Writes `run.json`; a resumed run that is not as far as before keeps it."""
         self.run.seconds = round(self._elapsed(), 3)
-        self._write(self.run)
+        before = self._before
+        if (
+            before is None
+            or self.run.finished
+            or len(self.run.attempts) >= len(before.attempts)
+        ):
+            self._write(self.run)
+        else:
+            self._write(self._with_earlier_progress(before))
+
+    def _with_earlier_progress(self, before: Run) -> Run:
+        """The run as an earlier process left it, with its present status and limits."""
+        kept = ("max_cost", "max_tokens", "mark", "status", "seconds", "cost_lost")
+        ended = ("reason", "enough", "outlook")
+        present = {name: getattr(self.run, name) for name in (*kept, *ended)}
+        run = before.model_copy(update=present)
+        cut_short = run.status != "running" and not run.verified
+        return run.model_copy(update={"censored": cut_short})
 
     def _write(self, run: Run) -> None:
         write_atomic(run.folder / RUN_FILE, run.model_dump_json(indent=2) + "\n")

@@ -153,8 +153,9 @@ class Run(PrintableRecord):
 
     @property
     def verified(self) -> bool:
-        """Whether a controller passed."""
-        return self.status == "verified"
+        """Whether a controller passed, though the search may go on."""
+        delivered = self.tau is not None and not (self.finished or self.on_set)
+        return self.status == "verified" or delivered
 
     @property
     def finished(self) -> bool:
@@ -205,6 +206,9 @@ def at_work(folder: Path) -> bool:
 def status_now(run: Run, *, before: bool) -> str:
     """Its present status; `killed` if the process that wrote `running` is gone.
 
+    A run that has ended early with a verified controller is `verified`, though it may
+    go on to improve it.
+
     Args:
         run: The run.
         before: Whether a process was at work before the record was read; otherwise a
@@ -214,6 +218,8 @@ def status_now(run: Run, *, before: bool) -> str:
         return run.status
     if before or at_work(run.folder):
         return "running"
+    if run.verified:
+        return "verified"
     return "killed" if run.status == "running" else run.status
 
 

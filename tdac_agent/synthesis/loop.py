@@ -340,9 +340,10 @@ class _Loop:
         if not recorder.run.improve:
             deliver(recorder, task, first.k, *first_at)
             return
-        recorder.run.tau = first.k
         # An interrupted search leaves a verified controller.
         place(recorder, task, *first_at)
+        recorder.run.tau = first.k
+        recorder.save()
         founders = [
             TaskCandidate(each.k, each.j, each.source, each.folder, each.report)
             for each in (first, *self._others)

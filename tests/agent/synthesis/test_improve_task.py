@@ -2,6 +2,7 @@
 
 import json
 import re
+import sys
 
 import pytest
 from hypothesis import given
@@ -42,6 +43,18 @@ def policy(obs):
 """
 """It stops for ever if an action takes effect a step late, as in disturbed episodes."""
 
+
+INTERRUPTING = """
+import os, pathlib, signal, sys, time
+
+reply = pathlib.Path(__file__).with_name("reply.md")
+if not reply.exists():
+    os.kill(os.getppid(), signal.SIGINT)
+    time.sleep(60)
+print(reply.read_text())
+reply.unlink()
+"""
+"""A model that presses Ctrl-C when it is asked again."""
 
 ENOUGH_FOR_ONE = 40_000
 """Tokens that are enough for one question and not for two."""
@@ -261,6 +274,60 @@ def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
     assert len(sources(one.folder)) > 4
     with pytest.raises(RunError, match="number of improving episodes 32 instead of 40"):
         write(out=tmp_path / "b", improve=40)
+
+
+def test_an_interrupted_search_leaves_a_verified_run(
+    write, good_source, tmp_path, tdac
+):
+    """All places say so, and how to go on; also after a break in resuming it."""
+    out = tmp_path / "run"
+    model = Script(code(good_source), code(STILL), KeyboardInterrupt())
+    with pytest.raises(KeyboardInterrupt):
+        write(model)
+
+    def check():
+        run = load_run(out)
+        assert (run.verified, run.finished, run.censored) == (True, False, False)
+        assert (run.tau, [each.k for each in run.attempts]) == (1, [1, 7])
+        assert run.controller.read_text() == good_source
+        assert row_of(out)["status"] == "verified"
+        words = f"{out} is verified; to go on improving it: tdac synth --resume {out}"
+        assert words in tdac("runs", tmp_path)[1]
+        page = make_page(out)
+        assert page.verified == 1
+        html = page.html.decode()
+        assert "the search for a better one has not ended" in html
+        assert "The verified controller: controller.py" in html
+        assert "Iteration 8</b>, a variation of what works" in html
+
+    check()
+
+    def interrupt(record):
+        if record["event"] == "verify.start":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write(Script(), on_event=interrupt)
+    check()
+    run = write(Script(*[code(STILL)] * 3))
+    assert (run.status, len(run.attempts)) == ("verified", 5)
+
+
+@pytest.mark.slow
+def test_ctrl_c_in_a_search_tells_of_the_verified_controller(
+    tdac, good_source, tmp_path
+):
+    folder, program = write_small_task(tmp_path / "task"), tmp_path / "model.py"
+    (tmp_path / "reply.md").write_text(code(good_source).text)
+    program.write_text(INTERRUPTING)
+    learner = f"command:{sys.executable} {program}"
+    words = ("synth", "--task", folder, "--learner", learner, "--improve", 32)
+    exit_code, told, err = tdac(*words, "--out", "run")
+    assert (exit_code, err.splitlines()[-1]) == (130, "interrupted")
+    assert told.splitlines()[-1] == (
+        "verified in iteration 1: run/controller.py; to go on improving it: "
+        "tdac synth --resume run"
+    )
 
 
 def sources(folder):
