@@ -75,6 +75,8 @@ class Progress:
             self._spinner.update(text=f"{at}  testing controller.py in the sandbox")
         elif kind == "verify.end":
             self._print_attempt(at, record)
+        elif kind == "improve.begin":
+            self.say(f"  {at}", escape(record["said"]), "dim")
         elif kind.startswith("drive."):
             self._show_episodes(at, record)
 

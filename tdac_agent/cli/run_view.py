@@ -12,21 +12,22 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.library.listing import resume_command
 from tdac_agent.models.budget import format_usd
-from tdac_agent.runs.improvement_record import read_improvement
+from tdac_agent.runs.improvement_record import TaskImprovement, read_improvement
 from tdac_agent.runs.run_record import Attempt, Run
 
 
 def show_run(run: Run, console: Console) -> None:
     """Prints the attempts in a table, then the result and the next commands."""
-    if run.attempts:
-        console.print(_attempts(run))
     usage, folder = usage_of(run), run.folder
+    found = read_improvement(folder) if run.improve else None
+    if run.attempts:
+        console.print(_attempts(run, found))
     if run.verified:
-        ending = (
-            f"[bold green]verified[/] in iteration {run.tau}, {run.seconds:.1f} s: "
-        )
-        console.print(f"{ending}{escape(str(run.controller))}", soft_wrap=True)
-        found = read_improvement(folder) if run.improve else None
+        ending = f"[bold green]verified[/] in iteration {run.tau}, "
+        if found is not None and found.selected != found.first:
+            ending += f"improved in iteration {found.k}, "
+        ending += f"{run.seconds:.1f} s: {escape(str(run.controller))}"
+        console.print(ending, soft_wrap=True)
         if found is not None:
             _print_indented(console, found.told)
         if run.reason:
@@ -81,7 +82,7 @@ def usage_of(run: Run) -> str:
     return f"{tokens}; {cost}"
 
 
-def _attempts(run: Run) -> Table:
+def _attempts(run: Run, found: TaskImprovement | None) -> Table:
     table = Table(title=escape(f"{run.task}: {run.learner}"), title_justify="left")
     table.add_column("k", justify="right")
     table.add_column("j", justify="right")
@@ -94,6 +95,8 @@ def _attempts(run: Run) -> Table:
     table.caption_justify = "left"
     for attempt in run.attempts:
         failed = list_tests(attempt.failed_tests, 4) or _remark(attempt)
+        if found is not None:
+            failed = failed or found.told_of(attempt.k, attempt.j)
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
 

@@ -107,6 +107,8 @@ def _table(rows: list[dict[str, Any]], folder: Path, width: int) -> Table:
     if wide:
         table.add_column("started", no_wrap=True)
     legend = ["k: iterations begun / allowed"] if "k" in figures else []
+    if any("+" in cell for cell in figures.get("k", ())):
+        legend[0] += ", + variations of what works"
     if any("–" in column for column in figures.values()):
         legend.append("–: no model was asked, or it does not report this")
     table.caption = "; ".join(legend)
@@ -148,8 +150,9 @@ def _figures_of(row: dict[str, Any]) -> tuple[str, str, str]:
     tokens = row["tokens_in"] + row["tokens_out"]
     cost = "unknown" if row["cost"] is None else format_usd(row["cost"])
     asked = tokens or row["cost"] != 0.0
+    varied = f" +{row['variations']}" if row["variations"] else ""
     return (
-        f"{row['k']}/{row['iterations']}",
+        f"{row['k']}/{row['iterations']}{varied}",
         str(tokens) if tokens else "–",
         cost if asked else "–",
     )

@@ -79,8 +79,8 @@ def synth(
         Optional[int],  # noqa: UP045
         number_flag(
             min=32,
-            help="Further simulated episodes, disturbed ones on a task: vary what "
-            "works, and select the best of all.",
+            help="After a success, vary what works in N further simulated episodes "
+            "(disturbed ones on a task), and deliver the best of all.",
         ),
     ] = None,
     suite: Suite = None,

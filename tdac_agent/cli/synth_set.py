@@ -252,7 +252,7 @@ def _improvement(found: Improvement) -> str:
     about = f"{found.variations} variation{'' if found.variations == 1 else 's'}"
     base = f"k={found.k} j={found.j}"
     if not found.worlds:
-        return f"improving: {about}; none was selected instead of {base}"
+        return f"improving: {about}; none was better than {base}, which stays"
     assert found.before is not None
     assert found.after is not None
     assert found.low is not None
@@ -261,7 +261,8 @@ def _improvement(found: Improvement) -> str:
     return (
         f"improving: {about}; time score {found.before:.3f} ({base}) -> "
         f"{found.after:.3f} on {found.worlds} other worlds: "
-        f"{found.after - found.before:+.3f} ({found.low:+.3f} to {found.high:+.3f})"
+        f"{found.after - found.before:+.3f} "
+        f"(95 % interval {found.low:+.3f} to {found.high:+.3f})"
         f"{told}"
     )
 

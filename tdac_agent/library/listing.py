@@ -102,6 +102,7 @@ def row_of(folder: Path) -> dict[str, Any]:
         "status": status,
         "k": _begun(run),
         "iterations": run.iterations,
+        "variations": sum(each.parent is not None for each in run.attempts),
         "tau": run.tau,
         "tokens_in": run.tokens_in,
         "tokens_out": run.tokens_out,
@@ -113,6 +114,12 @@ def row_of(folder: Path) -> dict[str, Any]:
         "reason": run.reason,
         "go_on": "" if status == "running" else resume_command(run),
     }
+
+
+def variations_told(row: dict[str, Any]) -> str:
+    """What is added to the iteration in the row of a run, if it varies what works."""
+    varied = row["variations"]
+    return f", {varied} variation{'s' * (varied > 1)}" if varied else ""
 
 
 def _begun(run: Run) -> int:

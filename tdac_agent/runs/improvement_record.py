@@ -29,6 +29,22 @@ def is_shown(low: float, p: float | None) -> bool:
     return low > 0.0 and (p is None or p <= MOST_P)
 
 
+def told_drive(time: float, reached: int, count: int) -> str:
+    """How a candidate drove, in one line.
+
+    Args:
+        time: Its mean time score.
+        reached: Number of disturbed episodes that reached the goal.
+        count: Their number.
+    """
+    return f"time score {time:.3f}; {told_goals(reached, count)}"
+
+
+def told_goals(reached: int, count: int) -> str:
+    """How many disturbed episodes reached the goal."""
+    return f"the goal reached in {reached} of {count} disturbed episodes"
+
+
 class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -76,7 +92,7 @@ class PairedChange(_Record):
         change = self.after - self.before
         return (
             f"{self.before:.3f} -> {self.after:.3f}, {change:+.3f} "
-            f"({self.low:+.3f} to {self.high:+.3f})"
+            f"(95 % interval {self.low:+.3f} to {self.high:+.3f})"
         )
 
 
@@ -110,6 +126,14 @@ class TaskImprovement(_Record):
         """(k, j) of the selected candidate."""
         return self.k, self.j
 
+    def told_of(self, k: int, j: int) -> str:
+        """How a candidate drove that the search began with; empty for any other."""
+        for each in self.members:
+            if (each.k, each.j, each.parent) == (k, j, None):
+                reached = round(each.robustness * self.block)
+                return told_drive(each.time, reached, self.block)
+        return ""
+
     @property
     def told(self) -> str:
         """What the search brought, in one line."""
@@ -120,7 +144,7 @@ class TaskImprovement(_Record):
             "k={} j={}".format(*one) for one in (self.first, self.selected)
         )
         if self.robustness is None or self.time is None:
-            return f"{about}; none was selected instead of {first}"
+            return f"{about}; none was better than {first}, which stays"
         shown = self.robustness.shown or self.time.shown
         return (
             f"{about}; {selected} was selected instead of {first}; in "

@@ -11,6 +11,7 @@ from pathlib import Path
 from pydantic import ConfigDict, Field, ValidationError
 
 from tdac_agent.prompting.feedback import cut
+from tdac_agent.runs.improvement_record import told_goals
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
@@ -72,8 +73,7 @@ class DisturbedEpisodes(PrintableRecord):
     @property
     def told(self) -> str:
         """The result in one line."""
-        count = len(self.episodes)
-        return f"the goal reached in {self.reached} of {count} disturbed episodes"
+        return told_goals(self.reached, len(self.episodes))
 
     @property
     def failed(self) -> dict[str, int]:

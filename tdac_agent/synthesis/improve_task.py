@@ -18,6 +18,7 @@ from tdac_agent.runs.improvement_record import (
     MemberFigures,
     PairedChange,
     TaskImprovement,
+    told_drive,
 )
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.storage.files import write_atomic
@@ -146,6 +147,7 @@ class TaskExplorer:
     def explore(self, candidate: TaskCandidate) -> Explored:
         """See `Explorer`."""
         report = candidate.report
+        varied = report is None
         if report is None:
             at = candidate.k, candidate.j, candidate.source, candidate.folder
             report = verify_candidate(self.recorder, *at, self.trials.tests)
@@ -158,6 +160,10 @@ class TaskExplorer:
             return Explored(None, found.line, failed=failed, drove=drove, seed=seed)
         driven = candidate.driven = self.trials.explore(candidate)
         figures = TaskFigures.of(self.trials.tests.task, report, driven)
+        if not varied:
+            said = told_drive(figures.time, driven.reached, len(driven.episodes))
+            about = {"k": candidate.k, "j": candidate.j, "said": said}
+            self.recorder.tell({"event": "improve.begin", **about})
         return Explored(figures, driven.told, passed=True, seed=seed)
 
     def figures(

@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -13,7 +14,7 @@ from small import write_small_task
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.html_report.page import make_page
-from tdac_agent.library.listing import row_of
+from tdac_agent.library.listing import row_of, variations_told
 from tdac_agent.metrics import frames_of
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
@@ -168,7 +169,8 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
     assert frames.runs[["tau", "done", "censored"]].values.tolist() == [[1, 1, False]]
     assert frames.candidates["k"].tolist() == [1]
     row = row_of(out)
-    assert (row["k"], row["tau"]) == (1, 1)
+    assert (row["k"], row["variations"], row["tau"]) == (1, 6, 1)
+    assert variations_told(row) == ", 6 variations"
     page = make_page(out).html.decode()
     assert "Variations of what works" in page
     assert "varies iteration 1" in page
@@ -208,7 +210,7 @@ def test_without_a_better_one_the_first_stays(
     found = read_improvement(run.folder)
     assert found.selected == found.first == (1, 0)
     assert (found.episodes, found.used, found.time) == (0, 8, None)
-    assert found.told.endswith("none was selected instead of k=1 j=0")
+    assert found.told.endswith("none was better than k=1 j=0, which stays")
     robust = verify_robust(
         run.controller, task, 4, first_seed=found.first_seed, judge=warm
     )
@@ -351,9 +353,13 @@ def test_a_seed_is_drawn_for_a_search(write, good_source):
 
 
 @pytest.mark.slow
-def test_the_command_improves_a_task(tdac, tmp_path):
-    folder = write_small_task(tmp_path / "task", profile="policy")
-    words = ("synth", "--task", folder, "--improve", 32, "--seed", 1)
+def test_the_command_improves_a_task(tdac, tmp_path, good_source):
+    """It tells what the given controller reached, and what the best one is."""
+    folder, slow = write_small_task(tmp_path / "task"), tmp_path / "slow.py"
+    fast = "CRUISE_SPEED = 1.0"
+    assert good_source.count(fast) == 1
+    slow.write_text(good_source.replace(fast, "CRUISE_SPEED = 0.4"))
+    words = ("synth", "--task", folder, "--from", slow, "--improve", 32, "--seed", 1)
     code_, out, err = tdac(*words, "--dry-run", "--json")
     assert (code_, err) == (0, "")
     told = json.loads(out)
@@ -362,8 +368,16 @@ def test_the_command_improves_a_task(tdac, tmp_path):
     code_, out, err = tdac(*words, "--out", "run")
     assert (code_, err) == (0, "")
     assert "~ k=21 j=0" in out
+    found = read_improvement(Path("run"))
+    first, best = found.members[0], max(found.members, key=lambda each: each.time)
+    said = f"time score {first.time:.3f}; the goal reached in 4 of 4 disturbed episodes"
+    assert out.count(said) == 2  # before the variations, and in the table
     assert re.search(r"improving: \d+ variations?, \d of them verified; ", out)
-    assert "verified in iteration 1" in out
+    assert (found.k, found.j) == (best.k, best.j) != (1, 0)
+    assert f"verified in iteration 1, improved in iteration {best.k}, " in out
+    listed = tdac("runs", ".")[1]
+    assert f"1/20 +{found.asked}" in listed
+    assert "k: iterations begun / allowed, + variations of what works" in listed
     code_, out, _ = tdac("synth", "--resume", "run")
     assert code_ == 0
     assert "has already finished" in out
