@@ -135,13 +135,12 @@ class Progress:
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         if record.get("parent") is not None:
             self.say_varied(at, record)
+        elif not record["valid"]:
+            self.say(f"– {at}", escape("; ".join(record["notes"][-1:])), "yellow")
+        elif record["unchanged"]:
+            self.say(f"= {at}", escape("; ".join(record["notes"][-1:])), "yellow")
         elif record["passed"]:
             self.say(f"✔ {at}", "all tests passed", "green")
-        elif not record["valid"]:
-            why = "; ".join(record["notes"][-1:])
-            self.say(f"– {at}", escape(why), "yellow")
-        elif record["unchanged"]:
-            self.say(f"= {at}", "same code as before", "yellow")
         else:
             failed = record["failed_tests"]
             names = escape(list_tests(failed, 3))

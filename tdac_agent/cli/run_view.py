@@ -94,7 +94,9 @@ def _attempts(run: Run, found: TaskImprovement | None) -> Table:
         table.caption += f"; k above {run.iterations}: a variation"
     table.caption_justify = "left"
     for attempt in run.attempts:
-        failed = list_tests(attempt.failed_tests, 4) or _remark(attempt)
+        failed = list_tests(attempt.failed_tests, 4)
+        if attempt.unchanged or not failed:
+            failed = _remark(attempt)
         if found is not None:
             failed = failed or found.told_of(attempt.k, attempt.j)
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
@@ -109,8 +111,8 @@ def list_tests(tests: Sequence[str], most: int) -> str:
 
 
 def _remark(attempt: Attempt) -> str:
-    """The last note on an attempt without valid code, or on a variation."""
-    told = not attempt.valid or attempt.parent is not None
+    """The last note on an attempt without valid or new code, or on a variation."""
+    told = not attempt.valid or attempt.unchanged or attempt.parent is not None
     return "; ".join(attempt.notes[-1:]) if told else ""
 
 
@@ -118,5 +120,5 @@ def _result(attempt: Attempt) -> str:
     if not attempt.valid:
         return "[yellow]invalid[/]"
     if attempt.unchanged:
-        return "[yellow]no change[/]"
+        return "[yellow]same code[/]"
     return "[green]verified[/]" if attempt.passed else "[red]failed[/]"

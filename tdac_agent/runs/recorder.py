@@ -282,7 +282,7 @@ class Recorder:
             j: Edit of the candidate.
             report: Its report; None if the model gave no code.
             notes: Notes on the model's answer.
-            unchanged: Whether the report is that of the previous attempt.
+            unchanged: Whether the report is that of an earlier candidate with its code.
         """
         failed = () if report is None else tuple(f.test for f in report.failures)
         attempt = Attempt(

@@ -53,7 +53,7 @@ class Attempt(PrintableRecord):
     seed: int | None = Field(None, description="Seed of its jittered starts.")
     notes: tuple[str, ...] = ()
     unchanged: bool = Field(
-        False, description="Same code as the previous attempt, whose report is reused."
+        False, description="Same code as an earlier candidate, whose report is reused."
     )
     parent: tuple[int, int] | None = Field(
         None, description="(k, j) of the candidate that it improves; k is then above K."

@@ -7,6 +7,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from tdac_agent.errors import Fault
 from tdac_agent.models.budget import Budget
@@ -232,6 +233,24 @@ class _Tested:
     folder: Path
 
 
+class _New(NamedTuple):
+    """A new candidate (k, 0).
+
+    Attributes:
+        k: Its iteration.
+        source: Its source.
+        notes: Notes on the answer.
+        folder: Its folder.
+        same: Iteration of an earlier one of its group with the same code.
+    """
+
+    k: int
+    source: str
+    notes: tuple[str, ...]
+    folder: Path
+    same: int | None
+
+
 class _Loop:
     """The state of the loop.
 
@@ -272,7 +291,8 @@ class _Loop:
             source, self._empty = edited, 0
             folder = self._recorder.candidate(k, j, source)
             if same_code(source, parent):
-                self._recorder.judged(k, j, report, notes, unchanged=True)
+                said = _same_as(k, j - 1)
+                self._recorder.judged(k, j, report, (*notes, said), unchanged=True)
                 dialogue.saw_no_change(k, j)
                 continue
             report = verify_candidate(self._recorder, k, j, source, folder, self._tests)
@@ -290,22 +310,36 @@ class _Loop:
     def _begin(
         self, ks: Sequence[int], answers: Sequence[ModelAnswer]
     ) -> _Tested | None:
-        """Tests new candidates; returns the best one, or None if there is no code."""
-        begun = []
+        """Tests new candidates; returns the best one, or None if there is no code.
+
+        Those with the same code are tested once.
+        """
+        begun: list[_New] = []
         for k, (source, notes) in zip(ks, answers, strict=True):
             if source is None:
                 self._no_code(k, 0, notes)
                 continue
             self._empty = 0
-            begun.append((k, source, notes, self._recorder.candidate(k, 0, source)))
-        jobs = [(k, 0, source, folder) for k, source, _, folder in begun]
-        tested = []
-        reports = verify_all(self._recorder, jobs, self._tests)
-        for (k, source, notes, folder), report in zip(begun, reports, strict=True):
-            self._recorder.judged(k, 0, report, notes)
-            tested.append(_Tested(k, 0, source, report, folder))
-        if not tested:
+            folder = self._recorder.candidate(k, 0, source)
+            first = (each.k for each in begun if same_code(source, each.source))
+            begun.append(_New(k, source, notes, folder, next(first, None)))
+        new = [each for each in begun if each.same is None]
+        if not new:
             return None
+        jobs = [(each.k, 0, each.source, each.folder) for each in new]
+        reports = verify_all(self._recorder, jobs, self._tests)
+        tested = [
+            _Tested(each.k, 0, each.source, report, each.folder)
+            for each, report in zip(new, reports, strict=True)
+        ]
+        by_k = {each.k: each.report for each in tested}
+        for k, _, notes, _, same in begun:
+            if same is None:
+                self._recorder.judged(k, 0, by_k[k], notes)
+                continue
+            said = _same_as(same, 0)
+            self._recorder.judged(k, 0, by_k[same], (*notes, said), unchanged=True)
+            self._dialogue.saw_again(k, 0, (same, 0))
         best = min(tested, key=lambda each: (len(each.report.failures), each.k))
         self._others = [one for one in tested if one.report.passed and one is not best]
         # The next question is about the last one that was seen.
@@ -353,6 +387,11 @@ class _Loop:
             assert chosen.report is not None
             place(recorder, task, chosen.source, chosen.report, chosen.folder)
         recorder.finish("verified", k=chosen.k, j=chosen.j, reason=stopped)
+
+
+def _same_as(k: int, j: int) -> str:
+    """What is noted on a candidate with the code of another one."""
+    return f"same code as k={k} j={j}"
 
 
 def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:

@@ -2,6 +2,7 @@
 
 import gc
 import json
+import re
 import sys
 import threading
 from functools import partial
@@ -13,6 +14,7 @@ from script import NO_RULES, STILL, code
 from small import write_small_task
 
 from tdac_agent.errors import RunError
+from tdac_agent.html_report.page import make_page
 from tdac_agent.metrics import frames_of
 from tdac_agent.models.provider import PermanentFault
 from tdac_agent.models.retry import RetryPolicy
@@ -100,6 +102,35 @@ def test_the_best_of_three_is_repaired(write, good_source, tmp_path):
     assert frames.runs["done"].tolist() == [3]
     with pytest.raises(RunError, match="number of candidates 3 instead of 1"):
         synthesize(load_task(tmp_path / "task"), model, out=run.folder, iterations=6)
+
+
+def test_equal_answers_are_tested_once(write, good_source):
+    """Each is an iteration with the result of the first one, and it is said."""
+    answers = {
+        ("generate", 1, 0): code(STILL),
+        ("generate", 2, 0): code(f"# another comment\n{STILL}"),
+        ("generate", 3, 0): code(f"{STILL}\n"),
+        ("edit", 1, 1): code(good_source),
+    }
+    model, tested = Table(answers, together=3), []
+
+    def watch(record):
+        if record["event"] == "verify.start":
+            tested.append((record["k"], record["j"]))
+
+    run = write(model, on_event=watch)
+    assert tested == [(1, 0), (1, 1)]
+    first, *others, last = run.attempts
+    assert (first.unchanged, first.notes, last.passed) == (False, (), True)
+    assert first.failed_tests
+    for k, attempt in zip((2, 3), others, strict=True):
+        assert (attempt.k, attempt.valid, attempt.unchanged) == (k, True, True)
+        assert attempt.notes == ("same code as k=1 j=0",)
+        assert attempt.failed_tests == first.failed_tests
+        assert f"- k={k} j=0: same code as k=1 j=0" in model.prompts["edit", 1, 1]
+    assert frames_of([run]).runs[["tau", "done"]].values.tolist() == [[1, 3]]
+    page = make_page(run.folder).html.decode()
+    assert page.count("Not tested again: an earlier candidate has the same code") == 2
 
 
 @pytest.mark.slow
@@ -197,8 +228,10 @@ def test_the_command_takes_candidates(tdac, tmp_path):
     code_, out, err = tdac(*words, "--dry-run", "--json")
     assert (code_, err) == (0, "")
     assert json.loads(out)["questions"] == 6 + 2 * 2
-    code_, _, err = tdac(*words, "--out", tmp_path / "run")
+    code_, out, err = tdac(*words, "--out", tmp_path / "run")
     assert (code_, err) == (0, "")
+    assert "= k=3 j=0  same code as k=1 j=0" in out
+    assert re.search(r"3 │ 0 │ same code +│ same code as k=1 j=0 ", out)
     assert load_run(tmp_path / "run").candidates == 3
 
 
