@@ -41,6 +41,11 @@ FAILURES = "failures"
 """Folder with the trajectories of failed episodes."""
 
 
+def named(number: int) -> str:
+    """Name of an episode in texts and pictures, by its number from 1."""
+    return f"disturbed episode {number}"
+
+
 class DisturbedEpisodes(PrintableRecord):
     """Episodes with consecutive seeds, as those of `tdac verify --robust`."""
 
@@ -88,7 +93,11 @@ class DisturbedEpisodes(PrintableRecord):
         causes = [f"{count} {cause}" for cause, count in self.failed.items()]
         if not causes:
             return None
-        texts = [each.diagnosis.text for each in self.episodes if each.diagnosis]
+        texts = [
+            each.diagnosis.text.replace(f"seed {each.seed}", named(number), 1)
+            for number, each in enumerate(self.episodes, 1)
+            if each.diagnosis
+        ]
         parts = [f"{self.told[0].upper()}{self.told[1:]}; {', '.join(causes)}."]
         parts += [f"{n}. {cut(text)}" for n, text in enumerate(texts[:MOST_TOLD], 1)]
         return "\n\n".join(parts)

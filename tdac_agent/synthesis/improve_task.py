@@ -30,6 +30,7 @@ from tdac_agent.synthesis.disturbed import (
     FAILURES,
     DisturbedEpisodes,
     DisturbedTrials,
+    named,
 )
 from tdac_agent.synthesis.improve import FOUNDERS, Explored, ImprovingSearch
 from tdac_agent.synthesis.workload import most_variations, task_shares
@@ -204,7 +205,7 @@ class TaskExplorer:
                 trajectory = Trajectory.load(folder / f"{episode.seed}.npz")
             except RunError:  # it did not drive
                 continue
-            name = f"disturbed episode {number}"
+            name = named(number)
             figures = EpisodeFigures(name, episode.outcome, episode.d0, episode.d_min)
             found = episode.diagnosis
             task = self.trials.tests.task

@@ -1,7 +1,8 @@
-"""Robustness of a verified controller, on request, with the worst seeds to watch."""
+"""Robustness of a verified controller, on request, with the worst episodes to watch."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from nicegui import ui
@@ -71,11 +72,10 @@ class Robustness:
             with ui.row().classes("items-center gap-2"):
                 ui.label("Failures first, then the slowest; click one to watch it:")
                 for episode in report.worst[:SHOWN]:
-                    text = (
-                        f"seed {episode.seed}: {episode.outcome}, {episode.steps} steps"
-                    )
+                    name = f"episode {episode.seed - report.provenance.first_seed + 1}"
                     ui.button(
-                        text, on_click=lambda _, seed=episode.seed: self._watch(seed)
+                        f"{name}: {episode.outcome}, {episode.steps} steps",
+                        on_click=partial(self._watch, episode.seed, name),
                     ).props("outline no-caps dense")
 
     def _begin(self) -> None:
@@ -88,7 +88,7 @@ class Robustness:
         if job is not None:
             job.stop()
 
-    def _watch(self, seed: int) -> None:
+    def _watch(self, seed: int, name: str) -> None:
         """Draws a video of an episode, and shows it."""
         film = f"{self._out}/seed-{seed}.mp4"
         if not (self._place / film).is_file():
@@ -97,7 +97,7 @@ class Robustness:
             start(self._place, words, film)
         self._film.clear()
         with self._film:
-            show_film(self._place, film, f"seed {seed}")
+            show_film(self._place, film, name)
 
 
 def _is_verified(folder: Path) -> bool:

@@ -14,8 +14,9 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 from studio_process import Studio
 
+from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.runs.replay import DEMO
-from tdac_agent.studio.jobs import jobs
+from tdac_agent.studio.jobs import STATE, jobs
 
 SECONDS = 60
 SIZES = {"desktop": (1440, 900), "laptop": (1180, 800), "phone": (390, 844)}
@@ -515,3 +516,20 @@ def test_two_runs_are_compared(page, studio):
     says(page, "Choose two different runs.")
     for name in ("one", "other"):
         shutil.rmtree(studio.place / "runs" / f"compared-{name}")
+
+
+def test_disturbed_episodes_have_short_names(page, studio, small_task, good, warm):
+    """Not the ten digits of a seed; a click draws the episode."""
+    shutil.copytree(DEMO, studio.place / "runs" / "robust")
+    out = studio.place / STATE / "robust" / "runs-robust"
+    source, first = good / "controller.py", 2873645123
+    verify_robust(source, small_task, 3, first_seed=first, out=out, judge=warm)
+    page.get(f"{studio.base}/run?at=runs/robust")
+    says(page, "3 of 3 episodes reached the goal")
+    shown = wait(page, lambda b: re.findall(r"episode \d+: reached", text_of(b)))
+    assert sorted(shown) == [f"episode {number}: reached" for number in (1, 2, 3)]
+    assert str(first)[:8] not in text_of(page)
+    button = "//button[.//span[contains(., 'episode 2: reached')]]"
+    page.execute_script("arguments[0].click()", page.find_element(By.XPATH, button))
+    says(page, "episode 2: drawing …")
+    shutil.rmtree(studio.place / "runs" / "robust")
