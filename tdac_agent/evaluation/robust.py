@@ -17,16 +17,15 @@ from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.provenance import origin
-from tdac_agent.tasks.task import Task, lay_out
-from tdac_agent.verification.judge.drivers import PolicySpec
-from tdac_agent.verification.judge.seeded import SeededEpisode, SeededJob
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.judge.seeded import SeededEpisode
 from tdac_agent.verification.judge.sequential import (
     MARGIN,
     MOST_EPISODES,
     SequentialTest,
 )
 from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.seeded_run import run_seeds
+from tdac_agent.verification.seeded_run import controller_job, run_seeds
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import whole_number
 
@@ -86,19 +85,15 @@ def verify_robust(
     source = read_source(controller)
     first = seed_of(source, task) if first_seed is None else first_seed
     with tempfile.TemporaryDirectory(prefix="tdac-robust-") as name:
-        folder = Path(name)
-        controller_file = folder / "controller.py"
-        write_atomic(controller_file, source)
-        job = SeededJob(
-            task=lay_out(task, folder / "work"),
-            policy=PolicySpec("controller", controller_file),
-            disturbance=disturbance,
-            variation="jitter",
-            seeds=tuple(range(first, first + episodes)),
-            test=test,
+        job = controller_job(
+            Path(name),
+            source,
+            task,
+            disturbance,
+            range(first, first + episodes),
             tier=tier,
-            limits=limits or Limits(),
-            out=folder / "results",
+            limits=limits,
+            test=test,
         )
         ended, ending = run_seeds(job, task.nominal, SeededEpisode, judge, watch)
         provenance = RobustProvenance(

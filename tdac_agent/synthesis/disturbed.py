@@ -13,7 +13,6 @@ from pydantic import ConfigDict, Field, ValidationError
 from tdac_agent.prompting.feedback import cut
 from tdac_agent.runs.improvement_record import told_goals
 from tdac_agent.runs.recorder import Recorder
-from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.synthesis.archive import Candidate
@@ -21,10 +20,8 @@ from tdac_agent.synthesis.candidates import Tests
 from tdac_agent.synthesis.workload import Shares
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.provenance import sha256_of, versions
-from tdac_agent.tasks.task import lay_out
-from tdac_agent.verification.judge.drivers import PolicySpec
-from tdac_agent.verification.judge.seeded import ScoredEpisode, SeededJob
-from tdac_agent.verification.seeded_run import run_seeds
+from tdac_agent.verification.judge.seeded import ScoredEpisode
+from tdac_agent.verification.seeded_run import controller_job, run_seeds
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 PURPOSES = ("improve", "comparison")
@@ -163,20 +160,14 @@ class DisturbedTrials:
         source = candidate.source.encode("utf-8", "surrogatepass")
         out.mkdir(exist_ok=True)
         with tempfile.TemporaryDirectory(prefix="tdac-improve-") as name:
-            folder = Path(name)
-            file = folder / "controller.py"
-            write_atomic(file, source)
-            job = SeededJob(
-                task=lay_out(task, folder / "work"),
-                policy=PolicySpec("controller", file),
-                disturbance=Disturbance(),
-                variation="jitter",
-                seeds=tuple(seeds),
-                test=None,
-                failures=(out / FAILURES).resolve(),
+            job = controller_job(
+                Path(name),
+                source,
+                task,
+                Disturbance(),
+                seeds,
                 tier=self.tests.tier,
-                limits=Limits(),
-                out=folder / "results",
+                failures=(out / FAILURES).resolve(),
             )
             ended, ending = run_seeds(
                 job,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -11,8 +11,13 @@ from typing import Generic, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from tdac_agent.errors import Fault
+from tdac_agent.sandbox import Limits
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.setting import Nominal
+from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.verification.diagnosis.measures import Measured
+from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.jobs import write_job
 from tdac_agent.verification.judge.seeded import (
     ENDING_FILE,
@@ -22,6 +27,7 @@ from tdac_agent.verification.judge.seeded import (
     SeededEpisode,
     SeededJob,
 )
+from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_job import WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import DEADLINE_SECONDS
@@ -30,6 +36,47 @@ from tdac_envs.core.errors import TaskError
 E = TypeVar("E", SeededEpisode, ScoredEpisode, Measured, WorldEpisode)
 # Wall time / simulated time: a policy is stopped at 2, a time-out is repeated once.
 SLOWEST = 4.0
+
+
+def controller_job(
+    folder: Path,
+    source: bytes,
+    task: Task,
+    disturbance: Disturbance,
+    seeds: Sequence[int],
+    *,
+    tier: str,
+    limits: Limits | None = None,
+    test: SequentialTest | None = None,
+    failures: Path | None = None,
+) -> SeededJob:
+    """Lays out a controller and its task in a folder; returns the job to drive it.
+
+    Args:
+        folder: An empty folder; the results go there, too.
+        source: Source of the controller.
+        task: What it must do.
+        disturbance: Disturbance of the environment.
+        seeds: A seed for each episode; the starts are jittered.
+        tier: Sandbox tier.
+        limits: Limits of the controller's process.
+        test: Stops early, once it has decided.
+        failures: Folder for the trajectories of failed episodes, which are then scored.
+    """
+    file = folder / "controller.py"
+    write_atomic(file, source)
+    return SeededJob(
+        task=lay_out(task, folder / "work"),
+        policy=PolicySpec("controller", file),
+        disturbance=disturbance,
+        variation="jitter",
+        seeds=tuple(seeds),
+        test=test,
+        failures=failures,
+        tier=tier,
+        limits=limits or Limits(),
+        out=folder / "results",
+    )
 
 
 def run_seeds(
