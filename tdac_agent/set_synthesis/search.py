@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.models.provider import is_fixed
 from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.feedback import Feedback
@@ -43,10 +44,9 @@ def search(
         OutOfBudget: The budget of money or tokens is used up.
         Fault: A model does not answer, or gives no code again and again.
     """
-    loop = _Search(dialogue, trials, candidates)
+    loop = _Search(dialogue, trials, candidates, is_given=given is not None)
     for ks, answers in dialogue.new_candidates(given):
-        is_given = given is not None and ks[0] == 1
-        ending = loop.iteration(ks, answers, given=is_given)
+        ending = loop.iteration(ks, answers)
         if ending:
             return ending
     return ""
@@ -82,25 +82,28 @@ class _Search:
         dialogue: The models.
         trials: Tests candidates.
         candidates: Receives the candidates.
+        is_given: Whether the first one is the initial controller.
     """
 
     def __init__(
-        self, dialogue: Dialogue, trials: Trials, candidates: list[Candidate]
+        self,
+        dialogue: Dialogue,
+        trials: Trials,
+        candidates: list[Candidate],
+        *,
+        is_given: bool,
     ) -> None:
         self._dialogue, self._trials = dialogue, trials
         self._recorder = trials.recorder
-        self._candidates = candidates
+        self._candidates, self._is_given = candidates, is_given
         self._empty = 0
 
-    def iteration(
-        self, ks: Sequence[int], answers: Sequence[ModelAnswer], *, given: bool
-    ) -> str:
+    def iteration(self, ks: Sequence[int], answers: Sequence[ModelAnswer]) -> str:
         """Tests new candidates and repairs the best one.
 
         Args:
             ks: Their iterations.
             answers: Their sources.
-            given: Whether the first one is the initial controller.
 
         Returns:
             Why the writing ends, or nothing.
@@ -128,10 +131,10 @@ class _Search:
                     same = candidate is parent
                     failure = self._again(k, j, candidate, notes, same)
                 parent = candidate
+            if self._is_last(parent):
+                return f"{dialogue.learner.name} has one controller"
             if failure is None or not self._trials.feedback_left:
                 return NO_EPISODES
-            if self._fixed() and not (given and j == 0):
-                return f"{dialogue.learner.name} has one controller"
         if run.refine and failure is not None:
             dialogue.summarise(k, run.patience, source, failure)
         return "" if new else f"iteration {k} brought no new code"
@@ -182,9 +185,22 @@ class _Search:
             return None
         return world_picture(self._trials.tasks, report, folder)
 
-    def _fixed(self) -> bool:
-        """Whether the models have nothing else to answer."""
-        return is_fixed(self._dialogue.learner) and is_fixed(self._dialogue.optimizer)
+    def _is_last(self, candidate: Candidate) -> bool:
+        """Whether the models have nothing else to answer, however it drives."""
+        dialogue, first = self._dialogue, (candidate.k, candidate.j) == (1, 0)
+        fixed = is_fixed(dialogue.learner) and is_fixed(dialogue.optimizer)
+        return fixed and not (self._is_given and first)
+
+    def _test(self, candidate: Candidate) -> SetReport | None:
+        """The first report with a failure, if there is one.
+
+        The last candidate has one test, since nobody uses what more of them tell.
+        """
+        if not self._is_last(candidate):
+            return self._trials.test(candidate)
+        if self._trials.feedback_left and not candidate.feedback:
+            self._trials.drive_next(candidate)
+        return candidate.first_failure
 
     def _known(self, source: str) -> Candidate | None:
         """The candidate with this code, if there is one."""
@@ -210,7 +226,7 @@ class _Search:
         k, j = candidate.k, candidate.j
         report = candidate.first_failure
         if report is None and goes_on:
-            report = self._trials.test(candidate)
+            report = self._test(candidate)
         drives = [each for each in candidate.feedback if each.worlds]
         worlds = sum(each.worlds for each in drives)
         reached = sum(each.successes for each in drives)
@@ -255,7 +271,7 @@ class _Search:
             notes: Notes on the answer.
             unedited: Whether the answer should have edited this candidate.
         """
-        report = self._trials.test(candidate)
+        report = self._test(candidate)
         failure = None if report is None else set_feedback(report)
         said = f"same code as k={candidate.k} j={candidate.j}"
         self._recorder.candidate(k, j, candidate.source)

@@ -5,6 +5,7 @@ import os
 import stat
 
 import pytest
+from few_worlds import KNOWN
 from script import NO_RULES, STILL, Script, code
 
 from tdac_agent.errors import Fault, RunError
@@ -67,6 +68,30 @@ def test_a_repaired_candidate_is_selected(write, solver, out, few):
     assert load_set(out / "set.yaml").sha256 == few.sha256
     assert json.loads((out / "params.json").read_text())["map"] is True
     assert load_run(out).status == "selected"
+
+
+def test_the_only_controller_of_a_learner_has_one_test(write, out):
+    """Nothing else can be asked of it, so more feedback tells nobody anything."""
+    _, run = write(model="builtin", candidates=3)
+    report = selection(out)
+    assert (run.status, report.stopped) == ("selected", "builtin has one controller")
+    assert [each.feedback_worlds for each in report.candidates] == [2]
+    assert (report.feedback_used, report.candidates[0].feedback_reached) == (2, 2)
+    assert report.validation_used == 6
+    assert [each.unchanged for each in run.attempts].count(True) == 2
+
+
+@pytest.mark.slow
+def test_a_given_controller_is_tested_until_it_fails(write, out):
+    """Only then is the one of `builtin` driven, once."""
+    write(model="builtin", start_from=KNOWN.read_text() + "\nGIVEN = True\n")
+    report = selection(out)
+    assert report.stopped == "all feedback episodes were driven"
+    assert [each.feedback_worlds for each in report.candidates] == [6]
+    write(model="builtin", start_from=STILL, out=out.parent / "other")
+    report = selection(out.parent / "other")
+    assert report.stopped == "builtin has one controller"
+    assert [each.feedback_worlds for each in report.candidates] == [2, 2]
 
 
 @pytest.mark.slow
