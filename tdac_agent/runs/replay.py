@@ -16,7 +16,7 @@ from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import PermanentFault, Reply, Request
 from tdac_agent.prompting.rules import BEGIN
 from tdac_agent.runs.journal_state import reply_of
-from tdac_agent.runs.ownership import is_own_folder
+from tdac_agent.runs.ownership import OURS, is_own_folder
 from tdac_agent.runs.run_record import JOURNAL, load_run
 from tdac_agent.storage.journal import JournalRecord, read_records
 from tdac_agent.tasks.provenance import sha256_of
@@ -45,7 +45,9 @@ def make(words: str, options: Options) -> Replay:
         raise ProviderError(f"cannot replay {folder}: {error.strerror}") from error
     shipped = folder == DEMO
     seed = recorded.seed if shipped or is_own_folder(recorded) else None
-    return Replay(words, folder, records, reworded=shipped, seed=seed)
+    replay = Replay(words, folder, records, reworded=shipped, seed=seed)
+    replay.fixed = recorded.on_set and recorded.learner == recorded.optimizer == OURS
+    return replay
 
 
 class Replay:
@@ -58,9 +60,13 @@ class Replay:
         reworded: Whether a question may have additional text before the recorded one,
             and may differ from the repair rules onwards; differences are noted.
         seed: Seed of its jittered starts; None if it has none, or is not trusted.
+
+    Attributes:
+        fixed: Whether the recorded learner had one controller only.
     """
 
     paid = False
+    fixed = False
 
     def __init__(
         self,

@@ -5,7 +5,7 @@ import os
 import stat
 
 import pytest
-from few_worlds import KNOWN
+from few_worlds import KNOWN, write_set
 from script import NO_RULES, STILL, Script, code
 
 from tdac_agent.errors import Fault, RunError
@@ -79,6 +79,18 @@ def test_the_only_controller_of_a_learner_has_one_test(write, out):
     assert (report.feedback_used, report.candidates[0].feedback_reached) == (2, 2)
     assert report.validation_used == 6
     assert [each.unchanged for each in run.attempts].count(True) == 2
+
+
+@pytest.mark.slow
+def test_a_replay_asks_no_more_than_the_recorded_run(tmp_path, out, warm):
+    """Of a controller that fails, too, when nobody was there to repair it."""
+    horizon = {"factor": 1, "least": 20, "most": 20}
+    short = load_set(write_set(tmp_path / "short.yaml", horizon=horizon))
+    given = {"episodes": 8, "feedback_episodes": 2, "seed": 3, "judge": warm}
+    run = synthesize_on_set(short, "builtin", out=out, **given)
+    assert (run.status, len(run.attempts)) == ("not verified", 1)
+    again = synthesize_on_set(short, f"replay:{out}", out=tmp_path / "again", **given)
+    assert (again.status, again.attempts) == (run.status, run.attempts)
 
 
 @pytest.mark.slow
