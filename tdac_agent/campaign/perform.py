@@ -20,7 +20,7 @@ from tdac_agent.models.choice import choose_models
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run
-from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT
+from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.installation import seed_from
@@ -41,7 +41,7 @@ RUNS = "runs"
 """Folder of the runs, inside the campaign folder."""
 KEPT = frozenset(
     {RUN_FILE, JOURNAL, TASK_FILE, "controller.py", "report.json"}
-    | {SET_FILE, HIDDEN_REPORT}
+    | {SET_FILE, HIDDEN_FILE}
 )
 
 

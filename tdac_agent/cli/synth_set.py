@@ -27,8 +27,12 @@ from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.improvement_record import NOT_SHOWN, is_shown
 from tdac_agent.runs.resume import check_own, existing_run
 from tdac_agent.runs.run_record import Run
-from tdac_agent.runs.selection_record import CandidateFigures, Improvement, Selection
-from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT
+from tdac_agent.runs.selection_record import (
+    HIDDEN_FILE,
+    CandidateFigures,
+    Improvement,
+    Selection,
+)
 from tdac_agent.set_synthesis.resume import resume_set_arguments
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.tasks.task_file import SET_FILE
@@ -234,7 +238,7 @@ def _show_selected(run: Run, console: Console) -> None:
         )
     if selection.improvement is not None:
         console.print(f"  {_improvement(selection.improvement)}", highlight=False)
-    hidden = run.folder / HIDDEN_REPORT
+    hidden = run.folder / HIDDEN_FILE
     if run.status != "selected" and hidden.is_file():
         text = read_file(hidden, RECORD_BYTES)
         verify_set.show(SetReport.model_validate_json(text), console)

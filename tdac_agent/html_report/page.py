@@ -178,8 +178,11 @@ def shortened(text: str) -> str:
 
 
 def short_test(test: str) -> str:
-    """A test's name without its file and `test_`, with spaces for underscores."""
-    name, bracket, case = test.partition("::")[2].partition("[")
+    """A test's name without its file and `test_`, with spaces for underscores.
+
+    On a task set, it is a cause of failures, and stays as it is.
+    """
+    name, bracket, case = (test.partition("::")[2] or test).partition("[")
     return name.removeprefix("test_").replace("_", " ") + bracket + case
 
 

@@ -12,6 +12,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.html_report.animation import animations
 from tdac_agent.html_report.overview import drawn, format_seconds
 from tdac_agent.html_report.scene import TaskPicture, data_address
+from tdac_agent.html_report.set_part import set_part_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.models.picture import MEDIA_TYPE, PNG_SIGNATURE
 from tdac_agent.models.picture import MOST_BYTES as MOST_PICTURE_BYTES
@@ -85,6 +86,7 @@ def section_of(
         "spent": spent(told),
         "origin": list(_origin(told)),
         "commands": list(_commands(told, name)),
+        "set_part": set_part_of(told),
         "improvement": read_improvement(told.run.folder) if told.run.improve else None,
         "units": None if told.report is None else UNITS[told.report.provenance.unit],
     }

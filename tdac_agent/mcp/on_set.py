@@ -20,9 +20,10 @@ from tdac_agent.prompting.prompt import FULL
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import Attempt
+from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.set_synthesis.delivery import deliver_selected
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
-from tdac_agent.set_synthesis.hidden import HIDDEN_REPORT, verify_hidden
+from tdac_agent.set_synthesis.hidden import verify_hidden
 from tdac_agent.set_synthesis.trials import SET_REPORT, Candidate, Trials
 from tdac_agent.verification.diagnosis.figures import contact_of
 from tdac_agent.verification.judge.set_job import WorldEpisode
@@ -125,7 +126,7 @@ class OnSet:
 
     def verdict(self, number: int) -> ChooseAnswer:
         """See `Judging`."""
-        report = _report(self.recorder.run.folder / HIDDEN_REPORT)
+        report = _report(self.recorder.run.folder / HIDDEN_FILE)
         parts = [
             f"the goal reached in {report.successes} of {report.worlds} hidden worlds"
         ]

@@ -10,6 +10,8 @@ from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 SELECTION_FILE = "report.json"
+HIDDEN_FILE = "hidden.json"
+"""Report on the selected controller on hidden worlds: sums alone."""
 
 
 class _Record(PrintableRecord):
@@ -104,5 +106,23 @@ def read_selection(folder: Path) -> Selection | None:
     try:
         content = parse_json(read_file(folder / SELECTION_FILE, RECORD_BYTES))
         return Selection.model_validate(content)
+    except (OSError, ValueError, ValidationError):
+        return None
+
+
+class HiddenCounts(PrintableRecord):
+    """How often the selected controller reached the goal on hidden worlds."""
+
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+    worlds: int
+    successes: int
+
+
+def read_hidden(folder: Path) -> HiddenCounts | None:
+    """The counts of a run on hidden worlds; None if there is no readable record."""
+    try:
+        content = parse_json(read_file(folder / HIDDEN_FILE, RECORD_BYTES))
+        return HiddenCounts.model_validate(content)
     except (OSError, ValueError, ValidationError):
         return None

@@ -10,13 +10,12 @@ from tdac_agent.evaluation.salt import SEALED, drawn_salt
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.runs.recorder import Recorder
+from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet
-
-HIDDEN_REPORT = "hidden.json"
 
 
 def verify_hidden(
@@ -36,7 +35,7 @@ def verify_hidden(
     folder, raw = recorder.run.folder, source.encode("utf-8", "surrogatepass")
     about = {"controller_sha256": sha256_of(raw), "set_sha256": tasks.sha256}
     recorder.event("hidden.start", **about)
-    report = _recorded(folder / HIDDEN_REPORT, about) if recorder.run.mark else None
+    report = _recorded(folder / HIDDEN_FILE, about) if recorder.run.mark else None
     if report is None:
         report = verify_on_set(
             raw,
@@ -52,7 +51,7 @@ def verify_hidden(
                 | {"reached": reached}
             ),
         )
-        write_atomic(folder / HIDDEN_REPORT, report.model_dump_json(indent=2) + "\n")
+        write_atomic(folder / HIDDEN_FILE, report.model_dump_json(indent=2) + "\n")
     recorder.event("hidden.end", passed=report.passed, worlds=report.worlds, **about)
     return report
 

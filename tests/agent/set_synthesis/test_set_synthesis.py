@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import stat
 
 import pytest
@@ -9,6 +10,8 @@ from few_worlds import KNOWN, write_set
 from script import NO_RULES, STILL, Script, code
 
 from tdac_agent.errors import Fault, RunError
+from tdac_agent.html_report.page import make_page
+from tdac_agent.html_report.set_part import MOST_DRAWN
 from tdac_agent.models.provider import PermanentFault
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
@@ -207,10 +210,10 @@ def test_a_run_without_success_goes_on_with_more_tokens(few, write, out, warm):
     assert run.status == "not verified"
 
 
-@pytest.mark.slow
-def test_the_best_is_selected_when_the_budget_ends(write, solver, out):
-    """One that reaches some goals is worth a selection."""
-    half = f"""{solver}
+@pytest.fixture
+def half(solver):
+    """Reaches some goals."""
+    return f"""{solver}
 
 drive = policy
 
@@ -218,6 +221,33 @@ drive = policy
 def policy(obs):
     return drive(obs) if int(obs["goal"][0]) % 2 else (0.0, 0.0)
 """
+
+
+def test_the_report_draws_failures_of_the_selected_controller(write, half, out):
+    """Beside the counts of each candidate; nothing is drawn of a run from elsewhere."""
+    write(code(half), iterations=1, patience=0, refine=False)
+    found, page = selection(out).candidates[0], make_page(out).html.decode()
+    driven = found.feedback_worlds + found.validation_worlds
+    failed = driven - found.feedback_reached - found.validation_reached
+    assert 0 < failed < driven
+    assert f"{failed} of {driven} recorded episodes failed" in page
+    drawn = re.findall(r'alt="(\w+ world \d+): ([\w ]+)">', page)
+    assert len({name for name, _ in drawn}) == min(failed, MOST_DRAWN)
+    assert {cause for _, cause in drawn} == {"no motion"}
+    reached = f"{found.validation_reached} of {found.validation_worlds}"
+    assert f'<td class="n">{reached}</td>' in page
+    assert ">no motion</th>" in page  # a cause of failures
+    assert make_page(out).html.decode() == page
+    record = json.loads((out / "run.json").read_text())
+    (out / "run.json").write_text(json.dumps({**record, "mark": ""}))
+    page = make_page(out).html.decode()
+    assert "Not drawn: this installation did not begin the run" in page
+    assert 'alt="feedback world' not in page
+
+
+@pytest.mark.slow
+def test_the_best_is_selected_when_the_budget_ends(write, half, out):
+    """One that reaches some goals is worth a selection."""
     _, run = write(model=Paid(code(half)), max_tokens=FOR_ONE)
     assert run.status == "selected"
     assert "tokens" in run.reason
@@ -246,6 +276,9 @@ def test_then_verify_drives_once_on_hidden_worlds(write, solver, out):
     text = (out / "hidden.json").read_text()
     assert json.loads(text)["episodes"] == []
     assert json.loads(text)["hidden"]["lineage"] == 1
+    reached = "{successes} of {worlds}".format(**json.loads(text))
+    said = f"On hidden worlds, it then reached the goal in {reached}."
+    assert said in make_page(out).html.decode()
     secret = salt.read_bytes()
     for path in out.rglob("*"):
         if path.is_file() and path != salt:

@@ -1,0 +1,142 @@
+"""What the page shows of a run on a task set: its selection, and failures in worlds."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from tdac_agent.errors import RunError
+from tdac_agent.html_report.scene import data_address
+from tdac_agent.models.picture import MEDIA_TYPE
+from tdac_agent.runs.history import Told
+from tdac_agent.runs.ownership import is_own_folder
+from tdac_agent.runs.selection_record import (
+    HiddenCounts,
+    Selection,
+    read_hidden,
+    read_selection,
+)
+from tdac_agent.runs.world_pictures import failure_pictures
+from tdac_agent.tasks.task_file import SET_FILE
+from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_envs.core.errors import TdacError
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+
+MOST_DRAWN = 6
+SIDE = 640
+"""Most width and height of a picture, px."""
+PURPOSES = {
+    "feedback": "feedback world",
+    "validation": "validation world",
+    "improve": "world of the variations",
+    "comparison": "world of the comparison",
+}
+"""Names of worlds by what a candidate drove there for, in this order."""
+_EPISODES = TypeAdapter(tuple[WorldEpisode, ...])
+_Driven = tuple[Path, list[tuple[str, WorldEpisode]]]
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnFailure:
+    """A failed episode of the selected controller.
+
+    Attributes:
+        name: Its world, such as `feedback world 3`.
+        cause: Its cause.
+        picture: A picture as a data URL.
+    """
+
+    name: str
+    cause: str
+    picture: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetPart:
+    """What is shown of a finished run on a task set.
+
+    Attributes:
+        selection: The candidates and the selected one.
+        hidden: Its counts on hidden worlds, if it drove there.
+        driven: Number of recorded episodes of the selected controller on `dev`.
+        failed: Number of these that failed.
+        drawn: Pictures of the first ones that failed.
+        problem: Why there are no more pictures, if something broke.
+    """
+
+    selection: Selection
+    hidden: HiddenCounts | None
+    driven: int
+    failed: int
+    drawn: tuple[DrawnFailure, ...]
+    problem: str
+
+
+def set_part_of(told: Told) -> SetPart | None:
+    """Collects what is shown of a run; None before something is selected."""
+    run = told.run
+    selection = read_selection(run.folder) if run.on_set else None
+    if selection is None:
+        return None
+    at = f"k{selection.k:02d}", f"j{selection.j}"
+    driven = list(_driven(run.folder.joinpath("iterations", *at)))
+    episodes = [each for _, named in driven for _, each in named]
+    failed = sum(not each.success for each in episodes)
+    drawn, problem = list[DrawnFailure](), ""
+    try:
+        if failed and is_own_folder(run):
+            tasks = load_set(run.folder / SET_FILE)
+            drawn += _drawn(tasks, driven)
+        elif failed:
+            problem = "this installation did not begin the run"
+    except (TdacError, RunError, OSError, ValueError) as error:
+        problem = str(error)
+    hidden = read_hidden(run.folder)
+    return SetPart(selection, hidden, len(episodes), failed, tuple(drawn), problem)
+
+
+def _driven(candidate: Path) -> Iterator[_Driven]:
+    """Yields the folders of a candidate's tests, and their named episodes."""
+    counts = Counter[str]()
+    for purpose, name in PURPOSES.items():
+        for folder in sorted(candidate.glob(f"{purpose}-*"), key=_number):
+            named = []
+            for episode in _episodes(folder / "set.json"):
+                counts[purpose] += 1
+                named.append((f"{name} {counts[purpose]}", episode))
+            yield folder, named
+
+
+def _number(folder: Path) -> int:
+    found = re.search(r"\d+$", folder.name)
+    return int(found.group()) if found else 0
+
+
+def _episodes(file: Path) -> tuple[WorldEpisode, ...]:
+    """The episodes of a report; none if it cannot be read."""
+    try:
+        content = parse_json(read_file(file, RECORD_BYTES))
+        return _EPISODES.validate_python(content["episodes"])
+    except (OSError, ValueError, KeyError, TypeError, ValidationError):
+        return ()
+
+
+def _drawn(tasks: TaskSet, driven: list[_Driven]) -> Iterator[DrawnFailure]:
+    """Yields the first failures, drawn."""
+    left = MOST_DRAWN
+    for folder, named in driven:
+        causes = {name: str(each.cause or each.outcome) for name, each in named}
+        for name, picture in failure_pictures(
+            tasks, named, folder / "trajectories", SIDE
+        ):
+            if not left:
+                return
+            left -= 1
+            address = data_address(picture.png, MEDIA_TYPE)
+            yield DrawnFailure(name, causes[name], address)
