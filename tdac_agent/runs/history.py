@@ -31,7 +31,7 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 MOST_BYTES = 8 << 20
 T = TypeVar("T")
 _NO_MODELS = {
-    "builtin": "a tuned template, no language model",
+    "builtin": "no language model",
     AGENT: "an agent that submits controllers; tdac asked no model",
 }
 State = Literal["passed", "failed", "no code", "unfinished"]
