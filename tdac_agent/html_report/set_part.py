@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -10,7 +11,6 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from tdac_agent.errors import RunError
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.models.picture import MEDIA_TYPE
 from tdac_agent.runs.history import Told
@@ -92,10 +92,10 @@ def set_part_of(told: Told) -> SetPart | None:
     try:
         if failed and is_own_folder(run):
             tasks = load_set(run.folder / SET_FILE)
-            drawn += _drawn(tasks, driven)
+            drawn += itertools.islice(_drawn(tasks, driven), MOST_DRAWN)
         elif failed:
             problem = "this installation did not begin the run"
-    except (TdacError, RunError, OSError, ValueError) as error:
+    except (TdacError, OSError, ValueError) as error:
         problem = str(error)
     hidden = read_hidden(run.folder)
     return SetPart(selection, hidden, len(episodes), failed, tuple(drawn), problem)
@@ -128,15 +128,10 @@ def _episodes(file: Path) -> tuple[WorldEpisode, ...]:
 
 
 def _drawn(tasks: TaskSet, driven: list[_Driven]) -> Iterator[DrawnFailure]:
-    """Yields the first failures, drawn."""
-    left = MOST_DRAWN
+    """Yields the failures in order, drawn."""
     for folder, named in driven:
         causes = {name: str(each.cause or each.outcome) for name, each in named}
-        for name, picture in failure_pictures(
-            tasks, named, folder / "trajectories", SIDE
-        ):
-            if not left:
-                return
-            left -= 1
+        place = folder / "trajectories"
+        for name, picture in failure_pictures(tasks, named, place, SIDE):
             address = data_address(picture.png, MEDIA_TYPE)
             yield DrawnFailure(name, causes[name], address)
