@@ -53,6 +53,7 @@ class CandidateHistory:
         learnt: Rules in force when it was written, and later changes to them.
         on_set: Whether it is for a task set.
         varies: Whether it is a variation of what works.
+        author: Who wrote it, in words.
     """
 
     k: int
@@ -66,6 +67,7 @@ class CandidateHistory:
     learnt: RuleChanges
     on_set: bool = False
     varies: bool = False
+    author: str = ""
 
     @property
     def failed(self) -> tuple[str, ...]:
@@ -194,6 +196,7 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
             learnt.get((k, j), RuleChanges()),
             run.on_set,
             _varies(run, k, attempt),
+            _author(run, k, j, attempt),
         )
 
 
@@ -207,6 +210,16 @@ def _varies(run: Run, k: int, attempt: Attempt | None) -> bool:
     if attempt is None:
         return run.improve > 0 and k > run.iterations
     return attempt.parent is not None
+
+
+def _author(run: Run, k: int, j: int, attempt: Attempt | None) -> str:
+    if _varies(run, k, attempt):
+        return "a variation by the Optimizer"
+    if run.learner == AGENT:
+        return "submitted by the agent"
+    if run.given_sha256 is not None and (k, j) == (1, 0):
+        return "given at the start"
+    return "edited by the Optimizer" if j else "written by the Learner"
 
 
 def _state(attempt: Attempt | None) -> State:

@@ -200,6 +200,19 @@ def test_a_run_that_was_killed(copied):
     assert "tdac synth --resume run" in shown
 
 
+def test_who_wrote_a_candidate(copied):
+    """A controller that the run began with is not the Learner's."""
+    page = make_page(copied).html.decode()
+    written, edited = page.count("written by the Learner"), page.count("edited by the")
+    assert (written, edited) == (1, 1)
+    given = {"given_sha256": "0" * 64}
+    run = load_run(copied)
+    (copied / "run.json").write_text(run.model_copy(update=given).model_dump_json())
+    page = make_page(copied).html.decode()
+    assert page.count("given at the start") == 1
+    assert page.count("written by the Learner") == 0
+
+
 def test_a_run_that_is_still_at_work(copied):
     """Its lock says so; it was not killed or ended early, and nobody is to go on."""
     run = load_run(copied)
