@@ -16,7 +16,7 @@ from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
 from tdac_agent.set_synthesis.pictures import world_picture
 from tdac_agent.set_synthesis.trials import Candidate, Trials
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
-from tdac_agent.synthesis.loop import MOST_SPENT, given_up
+from tdac_agent.synthesis.iterations import MOST_SPENT, given_up
 
 if TYPE_CHECKING:
     from tdac_agent.verification.diagnosis.model_picture import FailurePicture
