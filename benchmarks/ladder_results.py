@@ -101,7 +101,6 @@ def show(options: argparse.Namespace) -> None:
 def _table(found: Bench) -> str:
     """Time score and success of each entrant on each set, in Markdown."""
     names = [each.name for each in found.sets]
-    names.sort(key=set_names().index)
     mean = frame_of(found).groupby("entrant")["time"].mean()
     lines = [
         f"| entrant | {' | '.join(f'`{name}`' for name in names)} |",

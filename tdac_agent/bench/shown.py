@@ -19,11 +19,14 @@ from tdac_agent.storage.locks import LOCK_FILE
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.source import read_salt
 
 
 def merged(folders: Sequence[Path]) -> Bench:
     """The results in folders as one bench, with pairs of all entrants.
+
+    Levels are in the order of the ladder, and other sets follow.
 
     Raises:
         RunError: A folder has no results, or two have different worlds of a set, or
@@ -48,11 +51,12 @@ def merged(folders: Sequence[Path]) -> Bench:
             if row.time is not None and row.kind != "privileged":
                 driven[row.set][row.entrant] = _driven(table, row)
     both = {name: list(each.values()) for name, each in driven.items()}
+    order = list(sets)
     return Bench(
         versions=found[0].versions,
         sets=tuple(sets.values()),
         entrants=tuple(dict.fromkeys(row.entrant for row in rows.values())),
-        rows=tuple(rows.values()),
+        rows=tuple(sorted(rows.values(), key=lambda row: order.index(row.set))),
         overall=overall_of(both) if len(both) > 1 else (),
         pairs=pairs_of(both),
     )
@@ -89,7 +93,8 @@ def _same_sets(folders: Sequence[Path], found: Sequence[Bench]) -> dict[str, Ben
                     f"{folder / RESULTS}: the set {own.name!r} differs in the {what} "
                     "from the folders before; show them one at a time"
                 )
-    return sets
+    levels = [name for name in set_names() if name in sets]
+    return {name: sets[name] for name in dict.fromkeys([*levels, *sets])}
 
 
 def _table(folder: Path) -> pd.DataFrame:

@@ -182,6 +182,16 @@ def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
 
 
 @pytest.mark.slow
+def test_levels_are_in_the_order_of_the_ladder(judge, tmp_path, files):
+    """However the folders were given; sets of one's own come last."""
+    for name in ("moving", "known"):
+        out = tmp_path / name
+        bench(files[:1], [name], "dev", worlds=1, out=out, judge=judge)
+    found = merged([tmp_path / "moving", tmp_path / "known"])
+    assert [own.name for own in found.sets] == ["known", "moving"]
+    assert [row.set for row in found.rows] == ["known", "moving"]
+
+
 def test_folders_together(judge, tmp_path, level, files):
     """Two benches on the same worlds are one; on others they are refused."""
     given = {"split": "dev", "judge": judge}
