@@ -104,4 +104,5 @@ async def _show_difference(names: Sequence[str], folders: Sequence[Path]) -> Non
             f"{removed} lines are in {names[0]} alone (−), {added} in {names[1]} "
             "alone (+)."
         ).classes("note")
-        ui.html(shown_diff(diff, MOST_LINES), tag="pre").classes("diff")
+        text = shown_diff(diff, MOST_LINES)  # with all that was in the files escaped
+        ui.html(text, sanitize=False, tag="pre").classes("diff")

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import anyio
 import httpx2
-from mcp import Client, StdioServerParameters
+from mcp import Client, StdioServerParameters, stdio_client
 from mcp.client.streamable_http import streamable_http_client
 from mcp_types import Implementation
 
@@ -98,8 +98,10 @@ def words(*arguments):
 def over_stdio(place, *arguments):
     """A server that the client starts itself."""
     command, *rest = words(*arguments)
-    return StdioServerParameters(
-        command=command, args=rest, cwd=place, env=dict(os.environ)
+    return stdio_client(
+        StdioServerParameters(
+            command=command, args=rest, cwd=place, env=dict(os.environ)
+        )
     )
 
 
