@@ -15,7 +15,7 @@ from tdac_agent.runs.run_record import Attempt
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
 from tdac_agent.set_synthesis.pictures import world_picture
 from tdac_agent.set_synthesis.trials import Candidate, Trials
-from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
+from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer, same_as
 from tdac_agent.synthesis.iterations import MOST_SPENT, given_up
 
 if TYPE_CHECKING:
@@ -273,7 +273,7 @@ class _Search:
         """
         report = self._test(candidate)
         failure = None if report is None else set_feedback(report)
-        said = f"same code as k={candidate.k} j={candidate.j}"
+        said = same_as(candidate.k, candidate.j)
         self._recorder.candidate(k, j, candidate.source)
         self._recorder.attempted(
             Attempt(

@@ -197,8 +197,7 @@ class Dialogue:
 
     def saw_again(self, k: int, j: int, first: tuple[int, int]) -> None:
         """Notes that candidate (k, j) has the code of an earlier candidate."""
-        same = f"same code as k={first[0]} j={first[1]}"
-        self.earlier = (*self.earlier, f"k={k} j={j}: {same}")
+        self.earlier = (*self.earlier, f"k={k} j={j}: {same_as(*first)}")
         self._unchanged = False
 
     def saw(self, k: int, j: int, result: Feedback) -> None:
@@ -317,3 +316,8 @@ def _file_in(reply: Reply) -> Answer:
     if reply.stop != "end":
         return Answer(None, _ENDED[reply.stop])
     return read_answer(reply.text, must_define="policy")
+
+
+def same_as(k: int, j: int) -> str:
+    """What is noted on an answer with the code of candidate (k, j)."""
+    return f"same code as k={k} j={j}"

@@ -14,7 +14,7 @@ from tdac_agent.prompting.improve import Tried, improve_text
 from tdac_agent.runs.recorder import Recorder, difference
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.synthesis.archive import Archive, C, Figures, Member, Refused
-from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
+from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer, same_as
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 
 FOUNDERS = 3
@@ -170,7 +170,7 @@ class ImprovingSearch(Generic[C]):
         folder = recorder.candidate(k, 0, source, before=before)
         same = [each for each in self._known if same_code(source, each.source)]
         if same:
-            said = f"same code as k={same[0].k} j={same[0].j}"
+            said = same_as(same[0].k, same[0].j)
             found = (known for one, known in self._results if one is same[0])
             earlier = next(found, None)
             self._record(k, parent, (*notes, said), earlier, unchanged=True)

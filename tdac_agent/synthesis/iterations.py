@@ -19,7 +19,7 @@ from tdac_agent.synthesis.candidates import (
     verify_all,
     verify_candidate,
 )
-from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer
+from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer, same_as
 from tdac_agent.synthesis.improve_task import TaskCandidate, improve_verified
 from tdac_agent.verification.diagnosis.model_picture import (
     FailurePicture,
@@ -101,7 +101,7 @@ class Iterations:
             source, self._empty = edited, 0
             folder = self._recorder.candidate(k, j, source)
             if same_code(source, parent):
-                said = _same_as(k, j - 1)
+                said = same_as(k, j - 1)
                 self._recorder.judged(k, j, report, (*notes, said), unchanged=True)
                 dialogue.saw_no_change(k, j)
                 continue
@@ -147,7 +147,7 @@ class Iterations:
             if same is None:
                 self._recorder.judged(k, 0, by_k[k], notes)
                 continue
-            said = _same_as(same, 0)
+            said = same_as(same, 0)
             self._recorder.judged(k, 0, by_k[same], (*notes, said), unchanged=True)
             self._dialogue.saw_again(k, 0, (same, 0))
         best = min(tested, key=lambda each: (len(each.report.failures), each.k))
@@ -197,11 +197,6 @@ class Iterations:
             assert chosen.report is not None
             place(recorder, task, chosen.source, chosen.report, chosen.folder)
         recorder.finish("verified", k=chosen.k, j=chosen.j, reason=stopped)
-
-
-def _same_as(k: int, j: int) -> str:
-    """What is noted on a candidate with the code of another one."""
-    return f"same code as k={k} j={j}"
 
 
 def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
