@@ -37,15 +37,23 @@ def warm():
         yield judge
 
 
+@pytest.fixture
+def browser(chromium):
+    """Chromium with an empty page: that of the test before complains no more."""
+    chromium.get("about:blank")
+    chromium.get_log("browser")
+    return chromium
+
+
 @pytest.fixture(scope="session")
-def browser(tmp_path_factory):
-    """Chromium without a window."""
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+def chromium(tmp_path_factory):
+    """Chromium without a window; use `browser`."""
+    program = shutil.which("chromium") or shutil.which("google-chrome")
     driver = shutil.which("chromedriver")
-    if not chromium or not driver:
+    if not program or not driver:
         pytest.skip("needs chromium and chromedriver: apt-get install chromium-driver")
     options = webdriver.ChromeOptions()
-    options.binary_location = chromium
+    options.binary_location = program
     for flag in (
         *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"),
         # A page that still scrolls smoothly moves away from under a click.

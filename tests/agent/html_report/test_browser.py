@@ -34,7 +34,6 @@ def opened(request, browser, page, tmp_path):
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size | mobile)
     file = tmp_path / "report.html"
     file.write_text(page)
-    browser.get_log("browser")  # of the page before
     browser.get(file.as_uri())
     yield browser
     assert browser.get_log("browser") == []
@@ -139,7 +138,6 @@ def test_movers(browser, moving, tmp_path):
     """The player draws them at their places of the step that is shown."""
     file = tmp_path / "report.html"
     file.write_bytes(make_page(moving).html)
-    browser.get_log("browser")  # of the page before
     browser.get(file.as_uri())
     Select(find(browser, ".player .candidate")).select_by_visible_text("iteration 1")
     steps = int(find(browser, ".player .scrub").get_attribute("max"))

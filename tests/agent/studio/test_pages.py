@@ -34,7 +34,6 @@ return page.scrollWidth - page.clientWidth;
 @pytest.fixture
 def page(browser, studio):
     """The studio in a window; afterwards nothing was complained about."""
-    browser.get_log("browser")  # of the page before
     resize(browser, "desktop")
     browser.get(studio.address)
     wait(browser, lambda b: "token" not in b.current_url and b.title.startswith("New"))
