@@ -80,6 +80,7 @@ def settings_of(folder: Path) -> dict[str, str]:
         except (OSError, ValueError):
             continue
         found |= dict(_flat(content, name.partition(".")[0]))
+    found.pop("task: profile", None)  # it is the form of the controller
     return found
 
 
