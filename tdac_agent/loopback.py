@@ -57,7 +57,7 @@ class Here:
         self._origins = {f"http://{host}" for host in self._hosts}
 
     def is_here(self, headers: dict[str, str], *, without_origin: bool) -> bool:
-        """Whether the host is this one, and the page that asks, if any, is of here.
+        """Whether the host, and the origin if there is one, are those of this server.
 
         Args:
             headers: Headers of the request.

@@ -1,4 +1,4 @@
-"""What planners reach that know the true world and all movers: a reference, no rival.
+"""Planners that know the true world and all movers: a reference, not a competitor.
 
 These are the planners that admit worlds to a set. Among discs that bounce it is the
 earliest arrival on a lattice in space and time, with turns that take no time; among
@@ -43,8 +43,8 @@ def check_movers(tasks: TaskSet) -> None:
     """
     if not tasks.file.movers:
         raise TaskError(
-            "without movers, a planner that knows the world needs just OT: its time "
-            "score is 1 by definition"
+            "without movers, a planner that knows the world takes the least possible "
+            "time: its time score is 1 by definition"
         )
 
 

@@ -57,7 +57,7 @@ def rival_on(name: str, tasks: TaskSet) -> Rival:
     rival, level = _known()[name], level_of(tasks)
     if level not in rival.levels:
         known = ", ".join(rival.levels)
-        raise TaskError(f"{name} drives by what is observed in {known}")
+        raise TaskError(f"{name} needs what is observed in {known}")
     assert level is not None
     # Some sets with the observations of a level have values of their own.
     own = _tuned().get(name, {})

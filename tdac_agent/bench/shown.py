@@ -44,8 +44,8 @@ def merged(folders: Sequence[Path]) -> Bench:
             key = row.set, row.entrant
             if key in rows and rows[key].files != row.files:
                 raise RunError(
-                    f"{folder / RESULTS}: another {row.entrant!r} on {row.set} than in "
-                    "the folders before; rename one (NAME=FILE)"
+                    f"{folder / RESULTS}: {row.entrant!r} on {row.set} is not that of "
+                    "the earlier folders; rename one (NAME=FILE)"
                 )
             rows[key] = row
             if row.time is not None and row.kind != "privileged":
@@ -91,7 +91,7 @@ def _same_sets(folders: Sequence[Path], found: Sequence[Bench]) -> dict[str, Ben
                 what = "version" if version else "split, number or salt of its worlds"
                 raise RunError(
                     f"{folder / RESULTS}: the set {own.name!r} differs in the {what} "
-                    "from the folders before; show them one at a time"
+                    "from the earlier folders; show them one at a time"
                 )
     levels = [name for name in set_names() if name in sets]
     return {name: sets[name] for name in dict.fromkeys([*levels, *sets])}
@@ -124,7 +124,7 @@ def reveal(folder: Path, salt_file: Path) -> None:
     Raises:
         RunError: There are no results, they are not of hidden worlds, or episodes are
             missing.
-        TaskError: The salt is no salt, or another one.
+        TaskError: The file has no valid salt, or the wrong one.
     """
     found, sha256 = read(folder), sha256_of(read_salt(salt_file))
     for own in found.sets:

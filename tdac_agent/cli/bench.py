@@ -34,11 +34,12 @@ WIDEST = 14
 FEW = 20
 """Worlds below which a bootstrap claims too much."""
 LEGEND = (
-    "time: mean of success x OT / T (SCT), with a 95 % interval by bootstrap over "
-    "worlds (and seeds). reached: with the exact 95 % interval; by bootstrap if there "
-    "are several seeds. path: mean of success x L / driven (SPL). contacts: with a "
-    "wall / a mover while driving / a mover while standing. late: at the horizon; "
-    "error: its own, or too much CPU time."
+    "time: mean of success x OT / T (SCT; least possible / actual time), with a 95 % "
+    "interval by bootstrap over worlds (and seeds). reached: with the exact 95 % "
+    "interval; by bootstrap if there are several seeds. path: mean of success x L / "
+    "driven (SPL; shortest / actual path). contacts: with a wall / a mover while "
+    "driving / a mover while standing. late: cut off at the horizon; error: its own, "
+    "or too much CPU time."
 )
 
 
@@ -221,8 +222,8 @@ def _notes(row: BenchRow, knows_map: bool) -> list[str]:
     # Nobody chooses among versions of what comes with the package.
     if counts and row.kind not in ("builtin", "planner"):
         notes.append(
-            f"{row.entrant}: hidden evaluation {max(counts)} of its file; the "
-            "first one is the one to report"
+            f"{row.entrant}: evaluation {max(counts)} of its file on hidden worlds; "
+            "only the first one is to be reported"
         )
     return notes
 

@@ -31,8 +31,8 @@ def run_command(
             help="Controller files, run folders, .zip files of stable-baselines3, "
             "`builtin`, or a classical planner: `go-to-goal`, `tangent-bug`, "
             "`follow-the-gap`, `dwa`, `mppi`, `orca`; `privileged` is a planner that "
-            "knows all movers. NAME=FILE gives it a name; "
-            "NAME=FILE,FILE are seeds of one training.",
+            "knows all movers. NAME=FILE names an entrant; "
+            "NAME=FILE,FILE are policies trained alike with several seeds.",
         ),
     ],
     sets: Annotated[
@@ -54,16 +54,16 @@ def run_command(
         Optional[Path],  # noqa: UP045 - typer reads it at run time
         dir_flag(
             "--out",
-            help="Folder for the results; the same command goes on after an "
-            "interruption, and drives only what is new.  [default: bench-1, …]",
+            help="Folder for the results; after an interruption, the same command "
+            "drives only what is missing.  [default: bench-1, …]",
         ),
     ] = None,
     salt_file: Annotated[
         Optional[Path],  # noqa: UP045
         file_flag(
             "--salt-file",
-            help="Salt of hidden worlds, which then stay sealed.  [default: drawn, and "
-            "revealed at the end]",
+            help="File with the salt of hidden worlds, which stay sealed until `tdac "
+            "bench reveal`.  [default: drawn, and revealed at the end]",
         ),
     ] = None,
     tier: Tier = "auto",

@@ -26,7 +26,7 @@ from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 LEGEND = (
     "K: iterations; J: repairs per iteration; questions: of all runs if no controller "
     "ever passes; USD once, 3 times: cost if each question is asked once, or three "
-    "times because no answer to it can be used before"
+    "times because the first two answers cannot be used"
 )
 
 

@@ -43,7 +43,9 @@ def campaign(
     shard: Annotated[
         str,
         typer.Option(
-            metavar="I/N", help="Make every N-th run from the I-th: one of N machines."
+            metavar="I/N",
+            help="Carry out only every N-th run, from the I-th on, so that N machines "
+            "can share the runs.",
         ),
     ] = "1/1",
     out: Annotated[
@@ -53,7 +55,7 @@ def campaign(
     dry_run: Annotated[
         bool,
         typer.Option(
-            "--dry-run", help="Print the runs and their maximum cost; make none."
+            "--dry-run", help="Print the runs and their maximum cost; start none."
         ),
     ] = False,
     max_cost: Annotated[
@@ -81,7 +83,7 @@ def campaign(
     key_over_http: KeyOverHttp = False,
     as_json: Json = False,
 ) -> None:
-    """Make all synthesis runs of an experiment, and their tables.
+    """Carry out all synthesis runs of an experiment, and write their tables.
 
     The file asks for R runs of each task × learner × optimizer × prompt × setting. The
     same command continues an interrupted campaign; finished runs are not repeated.

@@ -76,8 +76,9 @@ def evaluate(
         Optional[Path],  # noqa: UP045
         dir_flag(
             "--out",
-            help="Folder for evaluation.json, episodes.csv, timing.csv and, per task, "
-            "a picture of all trajectories; on a task set, for the trajectories.",
+            help="Folder for evaluation.json and episodes.csv; on tasks, also for "
+            "timing.csv and a picture of all trajectories per task; on a task set, for "
+            "the episodes of each policy.",
         ),
     ] = None,
     tier: Tier = "auto",
@@ -106,7 +107,7 @@ def evaluate(
             "-n",
             "--worlds",
             min=1,
-            help="Number of worlds.  [default: 100]",
+            help="Number of worlds.  [default: 100, or all if there are fewer]",
             rich_help_panel="Task set",
         ),
     ] = None,

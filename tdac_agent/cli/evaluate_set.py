@@ -28,10 +28,10 @@ WIDEST = 16
 LEGEND = (
     "knows: what the policy may use; sensors include the goal, and the pose where the "
     "set observes it. 95 %: exact interval of the rate (Clopper-Pearson); with several "
-    "runs on each world, worlds are resampled. SCT: success x OT / T; SPL: success x "
-    "L / driven; BARN: at most 0.5 (docs/task-sets.md). hit: "
-    "episodes with a contact; late: at the horizon; error: the policy's own, or too "
-    "much CPU time."
+    "runs on each world, worlds are resampled. SCT: success x OT / T (least possible "
+    "/ actual time); SPL: success x L / driven (shortest / actual path); BARN: at most "
+    "0.5 (docs/task-sets.md). hit: episodes with a contact; late: cut off at the "
+    "horizon; error: the policy's own, or too much CPU time."
 )
 
 

@@ -100,7 +100,7 @@ class RosMap:
         """Metres per pixel.
 
         Raises:
-            TaskError: Nobody says it, or flag and file say different things.
+            TaskError: Neither the flag nor the file gives it, or they disagree.
         """
         given, own = self.resolution, params.resolution
         if given is not None and not 0.0 < given < math.inf:

@@ -31,8 +31,8 @@ def mcp(
         Optional[int],  # noqa: UP045
         number_flag(
             min=1,
-            help="Most simulated episodes of all submissions; on a task, each takes 6."
-            "  [default: 128]",
+            help="Maximum number of simulated episodes of all submissions together; on "
+            "a task, each takes 6.  [default: 128]",
         ),
     ] = None,
     out: Annotated[

@@ -45,10 +45,12 @@ Speed = Annotated[
 RANGE_NOISE = "Noise of each range, standard deviation relative to the range."
 WHEEL_SLIP = "Noise of each wheel's speed, standard deviation relative to the speed."
 MOTOR_LAG = "Time constant of the wheel speeds, s."
-DELAY = "Steps by which each action takes effect late."
-WHEEL_GAINS = "Bound of the hidden error of each wheel's speed, constant in an episode."
-AXLE_ERROR = "Bound of the hidden relative error of the axle length, constant, too."
-RANGE_DROPOUT = "Probability that a ray reads the largest range; only on maps."
+DELAY = "Number of steps until an action takes effect."
+WHEEL_GAINS = (
+    "Largest hidden relative error of each wheel's speed, constant in an episode."
+)
+AXLE_ERROR = "Largest hidden relative error of the axle length, constant in an episode."
+RANGE_DROPOUT = "Probability that a ray reads its maximum range; only on maps."
 Controller = Annotated[
     str,
     typer.Argument(help="Controller file, or run folder, which brings its own task."),
@@ -111,8 +113,8 @@ Movers = Annotated[
     Optional[str],  # noqa: UP045
     typer.Option(
         metavar="KIND:COUNT",
-        help="Moving obstacles on a map: `bounce:5` or `crowd:20`; a task.yaml can say "
-        "more of them.  [default: none]",
+        help="Moving obstacles on a map: `bounce:5` or `crowd:20`; a task.yaml can "
+        "describe them in detail.  [default: none]",
     ),
 ]
 Snap = Annotated[

@@ -52,7 +52,7 @@ def play(
     seed: Annotated[
         Optional[int],  # noqa: UP045
         number_flag(
-            min=0, help="Seed of an episode of `tdac verify --robust` to play instead."
+            min=0, help="Play the episode of `tdac verify --robust` with this seed."
         ),
     ] = None,
     tier: Tier = "auto",

@@ -10,7 +10,7 @@ SECONDS = 30.0
 
 
 class Pulse:
-    """Prints now and then how far long work is, if the output is no terminal.
+    """Prints now and then how far long work has come, unless on a terminal.
 
     Work that takes less than `SECONDS` prints nothing.
 

@@ -23,8 +23,8 @@ MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""
 LEGEND = (
     "grid path left, straight left: the smallest distance to the goal in the episode, "
-    "of the distance at the start, along the path on the grid and in a straight line; "
-    "ms per call: mean time of policy(obs)"
+    "out of that at the start, along the grid path and in a straight line; ms per "
+    "call: mean time of policy(obs)"
 )
 
 

@@ -50,8 +50,8 @@ def export(folders: list[Path], out: Path) -> int:
         raise RunError("no rule to export: none is in force at the end of a run given")
     if not rules:
         raise RunError(
-            f"no rule to export: of {number} in force, none is about the environment "
-            "or the code without having done harm; the others are about one task"
+            f"no rule to export: each of the {number} in force is about one task only, "
+            "or has done harm"
         )
     tasks = ", ".join(dict.fromkeys(run.task for run in runs))
     names = [name for run in runs for name in run.models or (run.optimizer,)]

@@ -22,7 +22,7 @@ def check_set(
         others: Values of the flags that only a single task has, by flag.
 
     Raises:
-        TaskError: One does not.
+        TaskError: A flag does not belong to the others.
     """
     wrong = others if name is not None else own
     flag = next((flag for flag, value in wrong.items() if value is not None), None)
@@ -59,7 +59,7 @@ class SetFlags:
             others: Values of further flags that only a single task has.
 
         Raises:
-            TaskError: One does not.
+            TaskError: A flag does not belong to the others.
         """
         if self.name is None:
             flags: dict[str, object] = {

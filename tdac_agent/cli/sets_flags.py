@@ -53,11 +53,11 @@ def show_command(
     ] = None,
     png: Annotated[
         Path | None,
-        file_flag(help="Draw this world, or world 0, into a PNG file."),
+        file_flag(help="Draw the world of --index, or world 0, to a PNG file."),
     ] = None,
     sheet: Annotated[
         Path | None,
-        file_flag(help="Draw 24 worlds, from this one on, into a PNG file."),
+        file_flag(help="Draw 24 worlds, from that of --index on, to a PNG file."),
     ] = None,
     as_json: Json = False,
 ) -> None:

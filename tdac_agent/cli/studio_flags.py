@@ -19,7 +19,7 @@ def studio(
             "--port",
             min=0,
             max=65535,
-            help="Port; 0 for the last one of this folder, if it is free.",
+            help="Port; 0 for the one last used in this folder, or else any free one.",
         ),
     ] = 0,
     open_it: Annotated[

@@ -34,7 +34,7 @@ ALLOWED = (
     *("learner", "optimizer", "base_url", "key_over_http"),
     *("prompt", "suite", "seed"),
 )
-"""Flags that, given again with --resume, permit their use by a run from elsewhere."""
+"""Flags that, given with --resume, permit a run from elsewhere to use their values."""
 WITH_RESUME = frozenset(
     {
         *("resume", "max_cost", "max_tokens", "tier", "as_json", "trust"),
@@ -71,16 +71,17 @@ def synth(
             "-N",
             "--candidates",
             min=1,
-            help="New controllers that are asked for side by side; the best one is "
-            "repaired. Each counts as an iteration.",
+            help="Number of new controllers to request at the same time; the best one "
+            "is repaired. Each counts as an iteration.",
         ),
     ] = 1,
     improve: Annotated[
         Optional[int],  # noqa: UP045
         number_flag(
             min=32,
-            help="After a success, vary what works in N further simulated episodes "
-            "(disturbed ones on a task), and deliver the best of all.",
+            help="After a success, try variations of the controllers that work, in N "
+            "further simulated episodes (disturbed ones on a task), and deliver the "
+            "best.",
         ),
     ] = None,
     suite: Suite = None,
@@ -116,7 +117,7 @@ def synth(
         bool,
         typer.Option(
             "--vision",
-            help="Show the optimizer a picture of the failure that it shall repair.",
+            help="Show the optimizer a picture of the failure that it is to repair.",
         ),
     ] = False,
     dry_run: Annotated[
@@ -158,8 +159,8 @@ def synth(
         Optional[int],  # noqa: UP045
         number_flag(
             min=2,
-            help="Most simulated episodes of all candidates: half for feedback, half "
-            "for the selection.  [default: 128]",
+            help="Maximum number of simulated episodes of all candidates together: "
+            "half for feedback, half for the selection.  [default: 128]",
             rich_help_panel=SETS,
         ),
     ] = None,
@@ -167,7 +168,8 @@ def synth(
         Optional[int],  # noqa: UP045
         number_flag(
             min=1,
-            help="Most episodes of a test of a candidate.  [default: 8]",
+            help="Maximum number of episodes in each test of a candidate.  "
+            "[default: 8]",
             rich_help_panel=SETS,
         ),
     ] = None,
@@ -175,8 +177,8 @@ def synth(
         bool,
         typer.Option(
             "--then-verify",
-            help="Drive the selected controller on hidden worlds of a new salt, once; "
-            "exit 0 only if a sequential test accepts it.",
+            help="Drive the selected controller, once, on hidden worlds drawn with a "
+            "new salt; exit 0 only if a sequential test accepts it.",
             rich_help_panel=SETS,
         ),
     ] = False,

@@ -26,7 +26,7 @@ class SynthSetFlags:
             others: Values of further flags that only a single task has.
 
         Raises:
-            TaskError: One does not.
+            TaskError: A flag does not belong to the others.
         """
         if self.name is None:
             flag = next(iter(self.settings()))

@@ -91,7 +91,7 @@ def verify(
     margin: Annotated[
         Optional[float],  # noqa: UP045
         number_flag(
-            help="Distance of the two rates of --accept-at.  [default: 0.05]",
+            help="Difference between the two rates of --accept-at.  [default: 0.05]",
             rich_help_panel="Robustness",
         ),
     ] = None,
@@ -142,8 +142,8 @@ def verify(
         Optional[Path],  # noqa: UP045
         dir_flag(
             "--hidden-folder",
-            help="For a set of real maps: a folder of maps that was kept back, with an "
-            "index.json; with --split hidden.",
+            help="For a set of real maps: a folder of held-out maps with an "
+            "index.json; needs --split hidden.",
             rich_help_panel="Task set",
         ),
     ] = None,

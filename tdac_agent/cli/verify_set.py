@@ -179,7 +179,7 @@ def _counted(hidden: HiddenCount, name: str) -> str:
     if hidden.count > 1:
         text += f", {hidden.count} in all; the first one counts"
     if hidden.lineage is not None and hidden.lineage > hidden.count:
-        text += f"; {hidden.lineage} of controllers of its run"
+        text += f"; {hidden.lineage} of all controllers of its run"
     if hidden.recorded is not None:
         text += f"; recorded {hidden.recorded}, nothing was driven anew"
     return text
@@ -200,6 +200,9 @@ def _scores(report: SetReport, whole: Scores) -> Table:
             f"{scores.path:.3f}",
             f"{scores.barn:.3f}",
         )
-    table.caption = " time: OT / T; path: L / driven; BARN: at most 0.5"
+    table.caption = (
+        " time: OT / T (least possible / actual time); path: L / driven (shortest / "
+        "actual path); BARN: at most 0.5"
+    )
     table.caption_justify = "left"
     return table

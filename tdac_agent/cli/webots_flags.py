@@ -58,7 +58,7 @@ def webots_run(
         typer.Option(
             "--start",
             metavar="X Y [YAW]",
-            help="Start, m; for YAW, see --heading.  [default: the robot's place]",
+            help="Start, m; for YAW, see --heading.  [default: as in the world file]",
         ),
     ] = None,
     heading: Annotated[
@@ -84,7 +84,8 @@ def webots_run(
         bool,
         typer.Option(
             "--webots-sensors",
-            help="Sensors with Webots' noise and materials, which see the goal marker.",
+            help="Sensors with Webots' noise and materials; they also see the goal "
+            "marker.",
         ),
     ] = False,
     video: Annotated[
@@ -149,8 +150,7 @@ def export_harbor(
             "-n",
             min=1,
             max=100_000,
-            help="Hidden worlds of the set on which a controller drives.  "
-            "[default: 20]",
+            help="Number of hidden worlds on which a controller drives.  [default: 20]",
         ),
     ] = None,
     as_json: Json = False,

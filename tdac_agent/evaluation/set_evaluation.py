@@ -70,7 +70,7 @@ class SetEvaluation(_Record):
         return all(row.errors == row.worlds for row in self.rows)
 
     def to_frame(self) -> pd.DataFrame:
-        """Tidy data with a row for each episode; lengths in px."""
+        """Tidy data with a row for each episode; lengths in px, for the e-puck in m."""
         import pandas as pd
 
         return pd.DataFrame(

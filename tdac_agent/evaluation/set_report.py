@@ -34,7 +34,7 @@ from tdac_envs.ladder.set_file import CpuSpec
 from tdac_envs.ladder.task_sets import TaskSet
 
 LEAST_GROUP = 5
-"""Hidden worlds of a generator below which its scores would tell single worlds."""
+"""Least number of hidden worlds of a generator whose scores reveal no single world."""
 MOST_TOLD = 3
 """Failures whose diagnosis is reported."""
 TOUCHED = {

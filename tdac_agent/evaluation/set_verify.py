@@ -176,7 +176,7 @@ def _check_hiding(request: _Request) -> None:
     if request.tier not in ("auto", *(each.name for each in CONFINING)):
         raise TaskError(
             f"the sandbox tier {request.tier!r} cannot keep a controller from reading "
-            "files, and so not from hidden worlds; leave out --tier"
+            "files, including hidden worlds; leave out --tier"
         )
     seen, path = exposure(), secret.resolve()
     if any(path.is_relative_to(folder) for folder in (*seen.system, *seen.packages)):

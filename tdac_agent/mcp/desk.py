@@ -135,7 +135,7 @@ class Desk:
         try:
             submission = self._judge(number, source, client)
         except (Fault, TdacError) as error:
-            # The next start shall not judge what the agent will submit again.
+            # The next start must not judge what the agent will submit again.
             (self._folder(number) / "controller.py").unlink(missing_ok=True)
             raise Fault(f"{error}; this submission does not count") from error
         answer = self._answer(submission)

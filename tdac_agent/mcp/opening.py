@@ -106,7 +106,7 @@ def open_desk(
         opening = _on_task(about, out, episodes)
     opening.run.agent = agent
     with hold_folder(out):
-        # Whoever else uses this machine shall not read what an agent is not told.
+        # Other users of this machine must not read what an agent is not told.
         out.chmod(0o700)
         watch = Watch()
         recorder = _recorder(opening, existing_run(out))

@@ -52,7 +52,7 @@ class Watch:
         self._stopping.set()
 
     def poll(self) -> None:
-        """Called repeatedly while the judge works; tells the time without episodes.
+        """Called repeatedly while the judge works; reports the time if none drives.
 
         Raises:
             Stopped: The server ends.

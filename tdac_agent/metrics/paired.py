@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 RESAMPLES = 9_999
 LEAST_P = 2.0 / (RESAMPLES + 1)
-"""The smallest p-value that so many resamples can tell."""
+"""The smallest p-value that this number of resamples can resolve."""
 LEVEL = 0.95
 
 
@@ -61,8 +61,8 @@ class Bootstrap:
     def p_value(self) -> float:
         """Two-sided p-value of the hypothesis that the mean is 0.
 
-        It is at least that of an exact test by the signs of so many worlds: a bootstrap
-        of a few worlds would claim more than they can tell.
+        It is at least the smallest one of an exact sign test on this number of worlds:
+        a bootstrap of a few worlds would claim more than they can show.
         """
         below = int((self.resampled <= 0.0).sum())
         above = int((self.resampled >= 0.0).sum())

@@ -92,9 +92,9 @@ def synthesize_on_set(
         learner: As for `synthesize`, like all arguments that are not listed here.
         optimizer: See there.
         out: New or empty folder for the run, or one with the same run.
-        episodes: Most simulated episodes of all candidates: half of them for tests,
-            half for the selection.
-        feedback_episodes: Most episodes of a test of a candidate.
+        episodes: Maximum number of simulated episodes of all candidates together: half
+            for tests, half for the selection.
+        feedback_episodes: Maximum number of episodes in each test of a candidate.
         improve: Further simulated episodes, for variations of the candidates that work
             (`tdac_agent.synthesis.workload.shares`); 0 for none.
         then_verify: Whether the selected controller drives on hidden worlds at the end,

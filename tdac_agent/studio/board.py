@@ -39,7 +39,7 @@ class Board:
     """A picture, and the conversion between its pixels and places.
 
     Attributes:
-        kind: Of what it is a picture.
+        kind: Whether it shows a map or a world.
         png: The picture.
         width: Its width, px.
         height: Its height, px.

@@ -67,7 +67,7 @@ def figures_of(folder: Path) -> dict[str, str]:
 
 
 def settings_of(folder: Path) -> dict[str, str]:
-    """With what a run was begun: its own settings, and those of its task.
+    """The settings that a run was begun with: its own, and those of its task.
 
     Raises:
         RunError: It cannot be read.
@@ -106,14 +106,14 @@ def _of_loop(run: Run) -> dict[str, str]:
         "repaired by": run.optimizer,
         "form of the controller": run.profile,
         "prompt": run.prompt,
-        "most iterations": str(run.iterations),
-        "most repairs of each": str(run.patience),
+        "maximum iterations": str(run.iterations),
+        "maximum repairs per iteration": str(run.patience),
         "candidates side by side": str(run.candidates),
         "failures become rules": yes[run.refine],
         "rules given at the start": str(len(run.given_rules)),
         "pictures of failures": yes[run.vision],
-        "most tokens of an answer": str(run.max_output or NONE),
-        "most cost": limit,
+        "maximum tokens per answer": str(run.max_output or NONE),
+        "cost limit": limit,
         "begun with a controller": yes[run.given_sha256 is not None],
         "seed of the starts": NONE if run.seed is None else str(run.seed),
         "version of tdac": run.version or NONE,

@@ -1,4 +1,4 @@
-"""Driving a world of a task set by the keyboard."""
+"""Driving through a world of a task set with the keyboard."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ BACKWARD = {"ArrowDown", "s", "S"}
 LEFT = {"ArrowLeft", "a", "A"}
 RIGHT = {"ArrowRight", "d", "D"}
 TURN = 0.45
-"""Part of full speed by which the wheels differ while a turn is pressed."""
+"""Change of a wheel's speed while a turn key is pressed, as a part of full speed."""
 
 
 class Drive:

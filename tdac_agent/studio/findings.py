@@ -30,7 +30,7 @@ def sentence_of(checked: Checked, board: Board) -> tuple[str, bool]:
     reach = checked.task.nominal.goal_tolerance
     text = (
         f"A path of {path_length(checked.path):.4g} {board.unit}; the goal is reached "
-        f"within {reach:.3g} {board.unit} (disc)"
+        f"within {reach:.3g} {board.unit} (green disc)"
     )
     return f"{text}.{_about_passage(checked, board.unit)}", True
 

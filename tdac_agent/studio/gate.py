@@ -1,4 +1,4 @@
-"""Lets only the browser in that was given the address with the token.
+"""Admits only a browser that has opened the address with the token.
 
 A page of another site, or another user of this machine, can reach a port of the
 loopback interface. So each request needs a cookie that no script can read and no
@@ -36,8 +36,8 @@ _ENTRANCE = (
     '<meta http-equiv="refresh" content="0; url=/"><a href="/">tdac studio</a>'
 )
 _REFUSED = (
-    "Open the address that `tdac studio` printed: it has not let this browser in, or "
-    "not within the last week, or it is the studio of another folder than before."
+    "Open the address that `tdac studio` printed: this browser has not been let in, or "
+    "not within the last week, or the studio is now that of another folder."
 )
 LASTING = 7 * 24 * 3600
 """For how long a cookie is accepted, s."""
@@ -66,7 +66,7 @@ class Gate:
         """Passes a request on, or refuses it; see the ASGI specification."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
-        elif self._has_token(scope):  # first: it shall leave the address
+        elif self._has_token(scope):  # first: removes it from the address
             await self._let_in(send)
         elif self._is_allowed(scope):
             await self._app(scope, receive, send)

@@ -89,7 +89,7 @@ class Job:
 
     @property
     def seconds(self) -> float:
-        """For how long it has run, or has been over, s."""
+        """Time since it was started, s."""
         return (
             datetime.now(UTC) - datetime.fromisoformat(self.started)
         ).total_seconds()

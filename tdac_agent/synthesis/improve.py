@@ -48,7 +48,7 @@ class Explorer(Protocol[C]):
     """Drives the candidates of a search, all in the same episodes.
 
     Attributes:
-        aim: What the models shall raise, as an order.
+        aim: What the models are to increase, as an instruction.
     """
 
     aim: str

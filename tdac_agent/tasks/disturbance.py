@@ -34,7 +34,7 @@ class Disturbance:
         wheel_gains: Bound of the hidden relative error of each wheel's speed, which is
             constant during an episode.
         axle_error: Bound of the hidden relative error of the axle length, constant too.
-        range_dropout: Probability that a ray reads the largest range in a step; only
+        range_dropout: Probability that a ray reads its maximum range in a step; only
             on maps.
     """
 

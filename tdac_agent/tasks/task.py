@@ -105,9 +105,9 @@ class Task:
         return self.setting.make_env(**options)
 
     def start_check(self) -> Callable[[Pose], bool]:
-        """Returns whether an episode may begin at a feasible start of the body.
+        """Returns a function: whether an episode may begin at a feasible start.
 
-        It may not where a mover with a start of its own would soon touch the robot.
+        It may not if a mover with a given start would soon touch the robot there.
         """
         if not self.spec.movers:
             return lambda _: True

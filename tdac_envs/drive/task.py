@@ -62,7 +62,7 @@ def check_full_step(dt: float, speed: float, unit: str) -> None:
     """Refuses steps so long that their arcs could not be computed in time.
 
     Raises:
-        TaskError: One is.
+        TaskError: A step is too long.
     """
     if dt * speed > MAX_FULL_STEP:
         raise TaskError(

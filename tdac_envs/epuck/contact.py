@@ -67,7 +67,7 @@ def first_touch(
 
     Returns:
         In [0, 1), or 2.0 if the step is free. Moving away from or along a part that the
-        disc already touches is no contact.
+        disc already touches does not count as a contact.
     """
     return touch_of(
         points, first, extent, first[:0], 0, extent.shape[0],

@@ -23,15 +23,16 @@ class Robot(NamedTuple):
     `kernels._arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (27,), float64: axle length (m), full wheel speed (rad/s), dt
+        constants: Shape (29,), float64: axle length (m), full wheel speed (rad/s), dt
             (s), body radius, sensor range (m), fraction of a wheel's speed that remains
             after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (m); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (m), horizon (steps);
             coefficient of friction between body and solids; gains of the left and
-            right wheel; scales of the measured distance and turn; height of the floor,
-            x and y of the lower left corner of the path field and of the cells, spacing
-            of the field, width of the cells (m).
+            right wheel; scales of the measured distance and turn; relative radii of the
+            left and right wheel; height of the floor, x and y of the lower left corner
+            of the path field and of the cells, spacing of the field, width of the cells
+            (m).
         state: Shape (12,), float64: x, y (m), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
             over ground to wheel speed; steps so far; length (m) and turn (rad) of the
@@ -42,11 +43,11 @@ class Robot(NamedTuple):
         turned: Shape (2,), float32: observed wheel angles, rad.
         readings: Shape (8,), float32: readings of ps0 to ps7, without noise.
         hits: Shape (8, 3), float64; see `infrared.sense`.
-        outcome: Shape (10,), float64: reward of the last step; whether it terminated
+        outcome: Shape (11,), float64: reward of the last step; whether it terminated
             or truncated the episode, reached the goal, touched an obstacle; number of
             contacts and of clipped actions so far; straight distance to the goal,
             length of the shortest path to it, distance from the centre to the nearest
-            solid part (m).
+            solid part (m); one entry that is not used.
     """
 
     constants: Array

@@ -213,8 +213,8 @@ def _drawn_start(
 ) -> Pixel | None:
     """A place from which the shortest path is probably long enough.
 
-    It is estimated from the path on the grid, less what that would be too long by
-    without obstacles.
+    Its length is estimated as that of the grid path, less the excess that a grid path
+    has without obstacles.
     """
     places = draft.places
     away = np.abs(places - np.array(goal))

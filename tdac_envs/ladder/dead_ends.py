@@ -21,8 +21,8 @@ class DeadEnds(NamedTuple):
     """What an optimistic robot without a map loses.
 
     Attributes:
-        depth: Longest way that it drives away from the goal, as the length of the
-            shortest path to the goal grows by it, divided by L.
+        depth: Largest increase of the length of the shortest path to the goal above its
+            least value so far, divided by L.
         excess: Length of its whole path beyond the shortest path, divided by L.
     """
 
@@ -45,7 +45,7 @@ class Sensor(NamedTuple):
 
 
 def dead_ends(world: LadderWorld, radius: float, sensor: Sensor) -> DeadEnds:
-    """Drives a disc that takes for free what it has not seen, and replans.
+    """Drives a disc that assumes unseen space to be free, and replans.
 
     The drive is one of pixels: at each pixel the sensor looks ahead, and if the known
     obstacles block the shortest path on the grid, there is a new path. A disc

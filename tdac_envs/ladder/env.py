@@ -92,8 +92,8 @@ class LadderEnv(OnSet, Map2DEnv):
     """A robot drives to a goal in worlds that are new to it, one for each episode.
 
     ## Description
-    Robot and physics are those of TDAC-Map2D-v0, or of TDAC-EPuck-v0 where the worlds
-    are plates (`EPuckLadderEnv`); a task set defines the worlds, the robot, what it
+    Robot and physics are those of TDAC-Map2D-v0, or of TDAC-EPuck-v0 if the robot is an
+    e-puck (`EPuckLadderEnv`); a task set defines the worlds, the robot, what it
     observes, and the disturbances (`docs/task-sets.md`). `tdac sets` lists the levels:
     - `known`: the map and the exact pose on it,
     - `unknown`: the exact pose and ranges all around, no map,
@@ -147,13 +147,13 @@ class LadderEnv(OnSet, Map2DEnv):
             and kept in the user's cache folder; those of an e-puck (by default 512)
             are kept in memory. 0 for a new world in each episode.
         salt_file: File with the salt of the split `"hidden"`, 16 bytes or more.
-        privileged: Whether `info` is complete. A rival or a judge never sets it.
+        privileged: Whether `info` is complete. Policies must not use what it adds.
         reward_weights: Reward weights by name, where they differ from the defaults.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
-        hidden_folder: Folder of maps with the split `"hidden"` of a set of files.
+        hidden_folder: Folder with the held-out maps of a set whose worlds are files.
         nearer_starts: Probability with which an episode of the split `"train"` begins
-            nearer to the goal: the length of its path is drawn evenly up to that from
-            the world's own start. A help for learning.
+            nearer to the goal: the length of its path is drawn uniformly, up to that
+            from the world's own start. This makes learning easier.
 
     ## Version History
     * v0: Initial version.

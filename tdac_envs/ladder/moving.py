@@ -33,7 +33,7 @@ from tdac_envs.movers.spec import (
 from tdac_envs.movers.state import Movers
 
 TRIES = 10
-"""Movers of a world are drawn so often before there are fewer of them."""
+"""Number of draws of a world's movers before half of them are left out."""
 
 
 def _both_ends(given: Any) -> Any:
@@ -43,7 +43,7 @@ def _both_ends(given: Any) -> Any:
 
 Count = Annotated[int, Field(ge=0, le=MOST_MOVERS)]
 ENDS = AfterValidator(ordered), BeforeValidator(_both_ends)
-"""Of two ends between which a number is drawn."""
+"""Validators of the two ends between which a number is drawn."""
 
 
 class MoversOfSet(BaseModel):

@@ -19,9 +19,9 @@ from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.state import SPEED
 
 TRIES = 20
-"""Starts that are drawn until no mover is near."""
+"""Largest number of draws of a start without a mover nearby."""
 APART = 2.0
-"""Time that a mover needs at least to touch the robot at its start, s."""
+"""Least time after which a mover may reach the robot at its start, s."""
 
 
 def nearer_task(
@@ -29,7 +29,7 @@ def nearer_task(
 ) -> AnyTask:
     """A task with a start that is nearer to its goal, facing any way.
 
-    The length of the path from there is drawn evenly between the tolerance of the goal
+    The length of the path from there is drawn uniformly between the goal tolerance
     and the length from the task's own start. A start too near to a mover is drawn anew.
 
     Args:

@@ -64,7 +64,7 @@ class View:
         goal in the frame.
         """
         x, y, heading = task.start if self._from_start else (0.0, 0.0, 0.0)
-        # Of `math`, since NumPy's may differ between one number and many.
+        # From `math`: NumPy's may differ between a scalar and an array.
         cosine, sine = math.cos(heading), math.sin(heading)
         dx, dy = task.goal[0] - x, task.goal[1] - y
         goal = cosine * dx + sine * dy, cosine * dy - sine * dx

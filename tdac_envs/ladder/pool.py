@@ -39,7 +39,7 @@ _MAPPED = 16_384
 _IN_MEMORY = 256
 """Tasks without a file that a process keeps in memory."""
 _ALIGNED = 8
-"""Arrays begin at multiples of so many bytes."""
+"""Alignment of the arrays, bytes."""
 _MOVERS = "traits", "now", "points", "people", *Places._fields
 """Arrays of movers that are kept; the others are blank at a start."""
 

@@ -16,7 +16,7 @@ from tdac_envs.ladder.pool import TrainingPool
 from tdac_envs.ladder.task_sets import MOST_SALT, AnyTask, AnyWorld, TaskSet
 
 MOST_WORLDS = 2**31
-"""Numbers of worlds that are drawn at random are below it."""
+"""Exclusive upper bound of the world numbers that are drawn at random."""
 
 
 class SetSource:
@@ -38,7 +38,7 @@ class SetSource:
         gives_map: Whether robots are given the map of their world.
 
     Raises:
-        TaskError: The split is unknown, its salt is missing or not asked for, or other
+        TaskError: The split is unknown, its salt is missing or not needed, or nearer
             starts are asked for in a split that is not for training.
     """
 

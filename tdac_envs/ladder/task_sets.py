@@ -81,7 +81,7 @@ class TaskSet:
         )
 
     def runs(self, split: str, worlds: int) -> int:
-        """How often the first `worlds` worlds of a split are the same ones.
+        """How often each different world is among the first `worlds` of a split.
 
         Raises:
             TaskError: Some of them are driven more often than others.
@@ -237,8 +237,8 @@ class TaskSet:
         """Key of the random numbers of one purpose of a world.
 
         Raises:
-            TaskError: The split is unknown, or its salt is missing, short, or not
-                asked for.
+            TaskError: The split is unknown, or its salt is missing, too short, or not
+                needed.
         """
         if split not in SPLITS:
             raise TaskError(
@@ -271,8 +271,8 @@ class TaskSet:
         if split == "hidden" and "hidden" not in self.files.splits:
             raise TaskError(
                 f"set {self.name!r} has no split 'hidden': its worlds are files, which "
-                "an author of a controller may have seen; a hidden folder has further "
-                "ones"
+                "an author of a controller may have seen; give a folder of other maps "
+                "(--hidden-folder DIR, or hidden_folder=)"
             )
         if split not in self.files.splits:
             own = ", ".join(self.files.splits)
@@ -318,8 +318,8 @@ def load_set(name: str | Path, hidden_folder: Path | None = None) -> TaskSet:
     if file.files is None:
         if hidden_folder is not None:
             raise TaskError(
-                f"set {file.name!r} makes its worlds: its split 'hidden' needs a salt "
-                "file, and no hidden folder"
+                f"set {file.name!r} generates its worlds: its split 'hidden' needs a "
+                "salt file, not a hidden folder"
             )
         return TaskSet(file)
     sizes = file.robot.radius, file.goal_tolerance

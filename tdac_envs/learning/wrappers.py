@@ -186,7 +186,7 @@ def check_closeness(own: spaces.Space[Any]) -> None:
     """Checks that observations have ranges as `GoalRelativeObservation` gives them.
 
     Raises:
-        TaskError: They have not.
+        TaskError: They do not have such ranges.
     """
     found = own.spaces.get("ranges") if isinstance(own, spaces.Dict) else None
     if not isinstance(found, spaces.Box) or found.high.max() > 1.0:
@@ -261,9 +261,8 @@ class Closeness(
     |---|---|---|---|
     | `ranges` | (n,) | [0, 1] | body radius / distance from the robot's centre |
 
-    A wall that is one pixel nearer changes it the more, the nearer the wall is. As a
-    share of the largest range, distances at which a narrow passage is driven hardly
-    differ.
+    A difference of one pixel changes it more, the nearer the wall is. As fractions of
+    the maximum range, the small distances in a narrow passage would hardly differ.
 
     Args:
         env: An environment with ranges, wrapped in `GoalRelativeObservation`.

@@ -50,7 +50,7 @@ def first_contact(
 
     Returns:
         In [0, 1), or 2.0 if the step is free. Moving away from or along a wall that the
-        disc already touches is no contact.
+        disc already touches does not count as a contact.
     """
     return arc_contact(clear, x, y, heading, forward, turn, radius)
 

@@ -36,7 +36,7 @@ _SINK = 1e-9
 # Discs touch within this distance, px.
 TOUCH = 1e-6
 NEVER = 2.0
-# Where nobody sees it, px.
+# A coordinate far outside of any map, px.
 _FAR = 1e9
 LOOK = 0.05
 """Duration of the steps with which a mover's future is computed, s."""
@@ -88,7 +88,7 @@ def meeting(
 ) -> float:
     """Fraction of the step at which the robot and mover m first touch, or `NEVER`.
 
-    Discs that touch and move apart are no contact.
+    Discs that touch and move apart do not count as a contact.
 
     Args:
         path: `Movers.path`.
@@ -198,7 +198,7 @@ def first_meeting(
 def hold_pressing(
     traits: Array, now: Array, pieces: Array, x: float, y: float, radius: float
 ) -> bool:
-    """Lets the movers wait that touch the robot and move towards it.
+    """Stops the movers that touch the robot and move towards it.
 
     Otherwise a faster mover would stop the robot for as long as it follows it.
 
@@ -222,7 +222,7 @@ def hold_arriving(
     traits: Array, now: Array, pieces: Array, path: Array, radius: float,
     length: float, dt: float, since: float,
 ) -> None:  # fmt: skip
-    """Lets movers stand from their contact with a robot that stands since a time.
+    """Stops movers at their contact with a robot that has stood still since a time.
 
     Args:
         traits: As for `first_meeting`.

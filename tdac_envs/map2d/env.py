@@ -139,8 +139,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     2. Termination: the body touches an obstacle or a mover (`info["collision"]`). With
        `on_collision="block"` the episode goes on: the wheels slip, so that the robot
        turns and slides along the obstacle (`docs/contacts.md`), and
-       `info["collisions"]` counts the steps in contact. Robot and mover stand from
-       their contact to the end of the step; the robot may turn. A mover that would
+       `info["collisions"]` counts the steps in contact. Robot and mover stop at
+       their contact until the end of the step; the robot may turn. A mover that would
        press against the robot waits.
     3. Truncation: the episode has lasted `horizon` steps.
 

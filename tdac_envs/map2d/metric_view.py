@@ -106,7 +106,7 @@ class MetricView:
 def _numbers(frame: MapFrame) -> tuple[float, ...]:
     """Resolution, height, origin; cosine and sine of its yaw."""
     yaw = frame.origin[2]
-    # Of `math`, since NumPy's may differ between one number and many.
+    # From `math`: NumPy's may differ between a scalar and an array.
     return (
         *(frame.resolution, frame.height, *frame.origin),
         *(math.cos(yaw), math.sin(yaw)),

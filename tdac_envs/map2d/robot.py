@@ -26,13 +26,14 @@ class Robot(NamedTuple):
     `kernels.arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (22,), float64: axle length (px), full wheel speed (px/s), dt
+        constants: Shape (24,), float64: axle length (px), full wheel speed (px/s), dt
             (s), body radius, largest range (px), fraction of a wheel's speed that
             remains after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (px); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (px), horizon (steps);
             coefficient of friction between body and obstacles; gains of the left and
-            right wheel; scales of the measured distance and turn.
+            right wheel; scales of the measured distance and turn; relative radii of the
+            left and right wheel, always 1 here.
         state: Shape (10,), float64: x, y (px), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
             over ground to wheel speed; steps so far; length (px) and turn (rad) of the

@@ -38,7 +38,7 @@ class Start(Protocol):
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """Way-points of its round, if it has a route."""
+        """Waypoints of its round, if it has a route."""
 
     @property
     def is_drawn(self) -> bool:
@@ -56,8 +56,8 @@ class Route:
     """A route, of which one round goes there and back if it is not a loop.
 
     Attributes:
-        points: The way-points of a round, px.
-        ends: Length of the round up to the way-point after each, px.
+        points: The waypoints of a round, px.
+        ends: Length of the round up to the waypoint after each, px.
         phase: Part of the round at which it starts; None if drawn.
         stands: Whether the mover never moves.
         kind: See `Start`.
@@ -74,7 +74,7 @@ class Route:
         """The route of a disc, checked on the map of a task.
 
         Raises:
-            TaskError: It runs into a wall, or has too many way-points for its speed.
+            TaskError: It runs into a wall, or has too many waypoints for its speed.
         """
         points = spec.points if spec.loop else (*spec.points, *spec.points[-2:0:-1])
         _check_route(task.terrain, spec, radius)
@@ -85,8 +85,8 @@ class Route:
         route = cls(points, tuple(accumulate(legs)), phase, stands)
         if route._most_points(speed * task.dt) > at.MOST_PIECES - 2:
             raise TaskError(
-                f"it would pass more than {at.MOST_PIECES - 2} way-points in a step; "
-                "use a lower speed or fewer way-points"
+                f"it would pass more than {at.MOST_PIECES - 2} waypoints in a step; "
+                "use a lower speed or fewer waypoints"
             )
         return route
 
@@ -96,7 +96,7 @@ class Route:
         return self.phase is None
 
     def place(self, random: Random) -> Place:
-        """See `Start`; the last entry is the number of the next way-point."""
+        """See `Start`; the last entry is the number of the next waypoint."""
         phase = random.random() if self.phase is None else self.phase
         along, count = phase * self.ends[-1], len(self.points)
         leg = min(bisect_right(self.ends, along), count - 1)
@@ -114,7 +114,7 @@ class Route:
         return self.points
 
     def _most_points(self, length: float) -> int:
-        """Largest number of way-points in a piece of this length, or a few more."""
+        """Largest number of waypoints in a piece of this length, or a few more."""
         legs = np.diff(self.ends, prepend=0.0)
         if len(legs) == 1 or length < legs.min():
             return 1
@@ -134,7 +134,7 @@ def _check_route(terrain: Terrain, spec: RouteSpec, radius: float) -> None:
     ends = [*points, points[0]] if spec.loop else [*points]
     for k, (x, y) in enumerate(points):
         if not fits(clear, x, y, radius):
-            what = f"way-point {k} of its route is" if len(points) > 1 else "it stands"
+            what = f"waypoint {k} of its route is" if len(points) > 1 else "it stands"
             raise TaskError(
                 f"{what} at ({x:.1f}, {y:.1f}), where its radius of {radius:g} px does "
                 "not fit"

@@ -62,7 +62,7 @@ ARRIVED = 3.0
 ROBOT_MARGIN = 0.5
 """People keep this distance from a robot that they see, px."""
 DEEPEST = 0.02
-"""People do not come closer than this part of the smaller radius inside each other."""
+"""Deepest permitted overlap of two people, as a part of the smaller radius."""
 _HOPS = 8
 _MOST_SLIDES = 4
 _ROBOT = -1
@@ -180,9 +180,9 @@ def _choose(
 
 @subkernel
 def _halt(traits: Array, now: Array, people: Array, dt: float) -> None:
-    """Lets people stand for the step who would get inside another one.
+    """Stops people for the step who would overlap another person.
 
-    That happens where a throng leaves no velocity that is permitted.
+    That happens where a dense crowd leaves no permitted velocity.
     """
     for m in range(traits.shape[0]):
         if traits[m, KIND] != CROWD:

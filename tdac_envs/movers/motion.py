@@ -34,7 +34,7 @@ GAP = 1e-6
 def follow_route(
     traits: Array, now: Array, points: Array, pieces: Array, m: int, dt: float
 ) -> None:
-    """Plans the step of a mover on a route: from way-point to way-point."""
+    """Plans the step of a mover on a route: from waypoint to waypoint."""
     x, y, goal = now[m, X], now[m, Y], int(now[m, OWN])
     first, count = int(traits[m, FIRST]), int(traits[m, COUNT])
     length = traits[m, SPEED] * dt

@@ -25,7 +25,7 @@ MOST_MOVERS = 256
 MOST_PEOPLE = 64
 """Largest number of people in the crowds of a robot."""
 MOST_POINTS = 1000
-"""Largest number of way-points of a route."""
+"""Largest number of waypoints of a route."""
 
 Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Point = tuple[Coordinate, Coordinate]
@@ -46,22 +46,22 @@ class _Strict(BaseModel):
 
 
 class RouteSpec(_Strict):
-    """A disc that drives along way-points, for ever and through other movers."""
+    """A disc that drives along waypoints for ever, and passes through other movers."""
 
     kind: Literal["route"] = "route"
     points: tuple[Point, ...] = Field(
         min_length=1,
         max_length=MOST_POINTS,
-        description="Way-points, px. A disc with a single one stands there.",
+        description="Waypoints, px. With a single one, the disc stands still there.",
     )
     loop: bool = Field(
         True,
-        description="Whether it drives from the last way-point to the first; otherwise "
+        description="Whether it drives from the last waypoint to the first; otherwise "
         "it goes back and forth.",
     )
     phase: Annotated[float, Field(ge=0.0, lt=1.0)] | None = Field(
         None,
-        description="Where on its whole route it starts, as a part of the length, "
+        description="Where it starts, as a fraction of the length of the whole route, "
         "there and back if not `loop`. Default: drawn at each reset.",
     )
 
@@ -80,7 +80,7 @@ class RouteSpec(_Strict):
 
 
 class BounceSpec(_Strict):
-    """Discs that drive straight on and bounce off walls, through other movers."""
+    """Discs that drive straight, bounce off walls, and pass through other movers."""
 
     kind: Literal["bounce"] = "bounce"
     count: int = Field(1, ge=1, description="Number of discs.")

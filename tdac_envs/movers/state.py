@@ -54,11 +54,11 @@ class Movers(NamedTuple):
 
     Attributes:
         traits: Shape (n, 5): kind; radius (px); speed (px/s); of a route, the row of
-            its first way-point in `points` and their number, else 0.
+            its first waypoint in `points` and their number, else 0.
         now: Shape (n, 5): x, y (px); velocity at the end of the last step (px/s); what
-            a kind remembers: of a route, the number of the next way-point; of a
+            a kind remembers: of a route, the number of the next waypoint; of a
             bouncing disc, its heading (rad); of a person, the number of its place.
-        points: Shape (k, 2): way-points of all routes, px. Each is driven in a circle;
+        points: Shape (k, 2): waypoints of all routes, px. Each is driven in a circle;
             one that goes back and forth also lists the way back.
         pieces: Shape (n, `MOST_PIECES` + 2, 6): motion in the current step. A row has
             the time at which a piece begins, x, y (px), velocity (px per step), and the
@@ -102,7 +102,7 @@ class Movers(NamedTuple):
 
         Args:
             count: Number of movers.
-            points: Way-points.
+            points: Waypoints.
             dt: Duration of a step, s.
             places: What people know of the map; None without a crowd.
         """
@@ -189,7 +189,7 @@ def place_at(pieces: Array, m: int, time: float) -> tuple[int, float, float]:
 
 @subkernel
 def hold(pieces: Array, m: int, time: float) -> None:
-    """Lets mover m stand from a fraction of the step to its end."""
+    """Stops mover m from a fraction of the step until the end of the step."""
     row, x, y = place_at(pieces, m, time)
     own = pieces[m, row, STATE]
     row = begin_piece(pieces, m, row + 1, time, x, y, 0.0, 0.0, own)

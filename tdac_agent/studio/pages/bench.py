@@ -36,13 +36,13 @@ from tdac_envs.ladder.set_file import shipped_names
 WORLDS = 20
 SECONDS = 1.0
 """Between two looks at the folder."""
-FIRST = " ({:.0f} s): making the worlds, and the first drive"
+FIRST = " ({:.0f} s): making the worlds, driving the first episodes"
 ABOUT = {
     "dev": "Worlds of dev are for feedback and selection: those who were tuned on them "
     "have an advantage.",
     "test": "Worlds of test are public, and for comparisons.",
-    "hidden": "Hidden worlds are drawn now and revealed at the end, and the ledger "
-    "counts this evaluation of each file.",
+    "hidden": "Hidden worlds are drawn now and revealed at the end. Your ledger of "
+    "hidden evaluations counts this one for each file.",
 }
 
 
@@ -171,7 +171,7 @@ class Watching:
         if job is not None and not done:
             self._bar.value, self._now.text = progress_of(job, self._folder)
             if not running:
-                self._now.text += "; Continue goes on with the next one"
+                self._now.text += "; Continue resumes with the next episode"
         version = str(page.stat().st_mtime_ns) if done else ""
         if version != self._shown:
             self._shown = version

@@ -15,8 +15,8 @@ ALIVE = "/alive"
 INSTANCE = secrets.token_hex(8)
 """Tells this server from the next one on the same port."""
 ENDED = (
-    "The studio has ended, or cannot be reached. Start it again, and this page goes "
-    "on: `tdac studio` in the folder {}"
+    "The studio has ended, or cannot be reached. Start it again with `tdac studio`, "
+    "and this page continues. Its folder: {}"
 )
 FOREIGN = (
     "A server that does not know this page answers here. If it is a studio, open the "

@@ -87,7 +87,7 @@ class Places:
         text = f"robot radius {draft.radius:g} px" if draft.radius else ""
         widest = checked.widest if checked else None
         if widest is not None and widest > 0:
-            text += f"; the widest that gets through has {widest:g} px"
+            text += f"; the largest that gets through is {widest:g} px"
         self._radius_text.text = text
 
     def clear(self) -> None:

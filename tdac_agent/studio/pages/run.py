@@ -37,9 +37,9 @@ from tdac_agent.studio.standing import (
 )
 from tdac_envs.core.errors import TdacError
 
-ELSEWHERE = "This run was not begun here: its verdict is what its files say."
+ELSEWHERE = "This run was not begun here: its verdict is only what its files claim."
 FIRST = "The first candidate appears here as soon as it has been tested."
-LETTERS = "k: the iteration; j: the repair of its candidate, 0 for the first version."
+LETTERS = "k: iteration; j: number of the repair, 0 for the first version."
 SECONDS = 1.0
 """Between two looks at the folder."""
 
@@ -149,7 +149,7 @@ class Watching:
         if not running and not row and job is not None:
             with self._wishes:
                 last = job.output().strip().splitlines()[-1:] or ["nothing was printed"]
-                ui.label(f"It did not begin: {last[0]}").classes("problem")
+                ui.label(f"The run did not start: {last[0]}").classes("problem")
 
     def _show_clock(self, state: _State, job: Job | None) -> None:
         """Where the run stands, and for how long its command has run."""
@@ -207,7 +207,7 @@ class Watching:
     def _ask(self, asked: list[str]) -> None:
         self._wishes.clear()
         with self._wishes, ui.card().classes("w-full"):
-            ui.label("This run was not begun here. To continue it, it wants to:")
+            ui.label("This run was not begun here. To continue, it asks to:")
             for what in asked:
                 ui.label(f"• {what}").classes("problem")
             ui.button(

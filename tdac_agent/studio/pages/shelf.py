@@ -217,7 +217,7 @@ def _show_others(place: Path, at_work: list[Job]) -> None:
         ui.link(at, address_of("/campaign", at))
     show_benches(place, "Benches")
     if at_work:
-        ui.label("At work").classes("text-lg font-bold")
+        ui.label("Running now").classes("text-lg font-bold")
     for job in at_work:
         with ui.row().classes("items-center"):
             page = {"synth": "/run", "bench": "/bench"}.get(job.words[0])

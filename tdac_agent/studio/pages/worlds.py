@@ -36,7 +36,7 @@ LEAST = 2
 """Episodes of a run on a set: one for a test, one for the selection."""
 SECONDS = 0.05
 """Between two frames of a drive, at least."""
-KEYS = "Arrow keys or W A S D drive; R begins again."
+KEYS = "Drive with the arrow keys or W A S D; R begins again."
 
 
 def add(place: Path) -> None:
@@ -101,12 +101,11 @@ class Looking:
         self._one_map.bind_enabled_from(
             self._name, "value", lambda name: name != "epuck"
         )
-        ui.button("Write one for the whole set …", on_click=self._ask_writer).props(
-            "outline no-caps"
-        )
+        whole = "Write a controller for the whole set …"
+        ui.button(whole, on_click=self._ask_writer).props("outline no-caps")
 
     def _build_watching(self) -> None:
-        ui.label("Watch two on this world").classes("text-lg font-bold")
+        ui.label("Watch two policies on this world").classes("text-lg font-bold")
         options = ["builtin", *rival_names(), *policies_in(self._place)]
         with ui.row().classes("items-end gap-3"):
             self._one = ui.select(options, value="builtin", label="left").classes(
@@ -193,7 +192,7 @@ class Looking:
         index, split = int(self._index.value or 0), self._split.value
         world = self._tasks.world(split, index)
         if not isinstance(world, LadderWorld):
-            ui.notify("this world is no map; choose another set", type="info")
+            ui.notify("this world is not a map; choose another set", type="info")
             return
         at = f"{FILES}/{self._tasks.name}-{split}-{index}.npy"
         (self._place / at).parent.mkdir(parents=True, exist_ok=True)
@@ -214,7 +213,7 @@ class Looking:
             )
             ui.label(
                 "Candidates drive on worlds of the split dev: half of the episodes are "
-                "for tests, half for the selection. 128 take minutes."
+                "for tests, half for the selection. 128 episodes take minutes."
             ).classes("note")
 
             def words() -> list[str]:

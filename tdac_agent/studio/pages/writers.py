@@ -48,7 +48,7 @@ class Writers:
                 "server, if not the vendor's", on_change=self._update
             ).classes("w-64")
             self._most = ui.number(
-                "at most, USD", value=MAX_COST, min=0, on_change=self._update
+                "cost limit, USD", value=MAX_COST, min=0, on_change=self._update
             ).classes("w-32")
         with ui.column().classes("w-full") as self._own:
             ui.upload(
@@ -56,7 +56,7 @@ class Writers:
                 max_file_size=200_000, on_upload=self._uploaded,
             ).props("flat accept=.py")  # fmt: skip
         self._short = ui.checkbox(
-            "ask for policy(obs) alone, not for the paper's whole file",
+            "ask only for policy(obs), not for all functions of the paper",
             on_change=self._update,
         ).props("dense")
         self._note = ui.label().classes("text-sm note")
@@ -87,14 +87,14 @@ class Writers:
         """What is missing for a start; None if nothing is."""
         who = self._who.value
         if who == "file" and not self._file:
-            return "Drop the controller first."
+            return "Add your controller first."
         if who in KEYS:
             if not (self._model.value or "").strip():
-                return "Name the model."
+                return "Enter the name of the model."
             if not self._server.value and not os.environ.get(KEYS[who]):
                 return (
                     f"The key is missing: set {KEYS[who]} where you start the studio. "
-                    "Keys come from the environment alone."
+                    "Keys are read from environment variables only."
                 )
         return None
 

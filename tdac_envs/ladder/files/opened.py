@@ -58,7 +58,7 @@ class FileWorlds:
     def with_hidden(
         self, folder: Path, spec: FilesSpec, radius: float, tolerance: float
     ) -> FileWorlds:
-        """The same with a split `hidden`: a folder of maps that was kept back.
+        """The same with a split `hidden`: a folder of held-out maps.
 
         Args:
             folder: Its folder, with an index as that of the set.

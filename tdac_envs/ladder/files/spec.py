@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 FileSplit = Literal["train", "dev", "test"]
 """Splits that worlds from files may have."""
 AnySplit = Literal[FileSplit, "hidden"]
-"""Also that of a folder that was kept back."""
+"""These, and the split of a folder of held-out maps."""
 FILE_SPLITS: tuple[FileSplit, ...] = ("train", "dev", "test")
 
 

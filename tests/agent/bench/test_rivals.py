@@ -72,5 +72,5 @@ def test_what_is_not_tuned_is_said():
 
 
 def test_a_level_that_it_cannot_drive():
-    with pytest.raises(TaskError, match="orca drives by what is observed in moving, c"):
+    with pytest.raises(TaskError, match="orca needs what is observed in moving, c"):
         rival_on("orca", load_set("known"))

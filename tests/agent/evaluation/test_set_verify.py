@@ -512,7 +512,7 @@ def test_the_command_counts_hidden_evaluations(tdac, tmp_path, set_yaml):
         ),
         (
             ("--set", "known", "--split", "hidden", "--hidden-folder", "x"),
-            "set 'known' makes its worlds",
+            "set 'known' generates its worlds",
         ),
         (("--set", "unkown"), r"unknown task set 'unkown'"),
         (("--set", "known", "--task", "maze"), "leave out --task"),

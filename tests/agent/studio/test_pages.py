@@ -170,7 +170,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     (tmp_path / "blind.py").write_text(BLIND)
     open_plan(page, plan)
     choose(page, "a controller of my own")
-    says(page, "Drop the controller first.")
+    says(page, "Add your controller first.")
     upload(page, tmp_path / "blind.py", "Drop controller.py here")
     says(page, "--from .studio/files/blind.py")
     says(page, "The controller is blind.py.")
@@ -294,7 +294,7 @@ def test_a_bench_is_stopped_and_continued(page, studio):
     wait(page, lambda b: re.search(r"\b[1-5] of 12 episodes driven", text_of(b)))
     press(page, "Stop")
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.not-finished"))
-    says(page, "; Continue goes on with the next one")
+    says(page, "; Continue resumes with the next episode")
     folder = studio.place / page.current_url.partition("?at=")[2]
     (rows,) = folder.glob("driven/*/*/unfinished/episodes.jsonl")
     before = [json.loads(line) for line in rows.read_text().splitlines()]
@@ -333,7 +333,7 @@ def test_a_controller_for_a_set_of_worlds(page, studio):
     page.get(f"{studio.base}/worlds?level=unknown")
     says(page, "narrowest passage")
     assert "without movers" not in text_of(page)
-    press(page, "Write one for the whole set …")
+    press(page, "Write a controller for the whole set …")
     says(page, "tdac synth --set unknown --episodes 128")
     field = number(page, "episodes at most")
     field.send_keys(Keys.CONTROL, "a")

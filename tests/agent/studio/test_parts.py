@@ -337,7 +337,7 @@ def test_what_differs_between_two_runs(tmp_path):
     repairs = str(run.patience), str(run.patience + 1)
     radii = "15.0", "19.0"
     assert differing(settings_of) == {
-        "most repairs of each": repairs,
+        "maximum repairs per iteration": repairs,
         "task: robot: radius": radii,
     }
     lines = difference(one, other).splitlines()

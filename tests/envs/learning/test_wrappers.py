@@ -101,7 +101,7 @@ def test_a_batch_is_told_what_each_is_told():
 
 
 def walk(task, start):
-    """The places that the way-points lead to, one after the other."""
+    """The places that the waypoints lead to, one after the other."""
     route = route_to_goal(task)
     places = [np.array(start, float)]
     while tuple(places[-1]) != tuple(task.goal):
@@ -144,7 +144,7 @@ def test_way_points_in_a_world_hold_the_body():
 
 @given(st.floats(-3.1, 3.1), st.integers(0, 2**20))
 def test_guidance_turns_with_the_robot(turn, number):
-    """The same way-point, whatever the heading; turned by it in the robot's frame."""
+    """The same waypoint, whatever the heading; turned by it in the robot's frame."""
     env = gym.make(MAP, map="clutter").unwrapped
     task, frame = env.nominal, Frame.of(env)
     rows, columns = np.nonzero(np.isfinite(task.field))
@@ -165,7 +165,7 @@ def test_guidance_turns_with_the_robot(turn, number):
 
 
 def test_guidance_follows_a_new_goal():
-    """After a reset with another goal the way-points lead there."""
+    """After a reset with another goal the waypoints lead there."""
     env = Guidance(gym.make(MAP, map="rooms"))
     env.reset(seed=0)
     goal = env.unwrapped.nominal.start[:2]

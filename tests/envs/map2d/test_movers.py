@@ -56,7 +56,7 @@ def bounce(x, y, heading=0.0, **options):
 
 class TestRoutes:
     def test_way_points_are_passed_at_their_exact_time(self):
-        """A triangle in steps that end between the way-points."""
+        """A triangle in steps that end between the waypoints."""
         env = hall_env([route((100, 20), (140, 20), (140, 50), phase=0.0)], dt=0.07)
         env.reset(seed=0)
         corners = np.array([[100, 20], [140, 20], [140, 50], [100, 20]], float)
@@ -278,13 +278,13 @@ class TestStarts:
             (route((60, 50), (30, 50), phase=0.0), "mover 0 .* reaches the robot"),
             (route((30, 60)), "mover 0 starts on the robot"),
             (route((30, 60), (31, 60)), "mover 0 reaches .* wherever it starts"),
-            (route((60, 50), (60, 99)), "mover 0: way-point 1 of its route is at"),
+            (route((60, 50), (60, 99)), "mover 0: waypoint 1 of its route is at"),
             (route((20, 20), (150, 20), (150, 80)), "mover 0: segment 2 of its route"),
             (route((5, 5), radius=6.0), "mover 0: it stands at"),
             (bounce(3, 3), "mover 0: it starts at"),
             ({"kind": "bounce", "radius": 60}, "mover 0: a disc of 60 px"),
             (route((168, 50), radius=31), "mover 0 covers the goal .* for ever"),
-            (route((100, 20), (101, 20), speed=2000), "more than 14 way-points"),
+            (route((100, 20), (101, 20), speed=2000), "more than 14 waypoints"),
             (bounce(100, 50, speed=1e9), "the limit is"),
         ],
     )
