@@ -84,7 +84,7 @@ class HorizonSpec(_Strict):
 
 
 class AdmissionSpec(_Strict):
-    """What every world of the set must fulfil; see `docs/task-sets.md`."""
+    """What every world of the set must fulfil; see `docs/generated-worlds.md`."""
 
     gap: float = Field(1.1, ge=1, le=10, description="Least gap.")
     steps: float = Field(60.0, ge=1, le=MOST_STEPS, description="Least OT, steps.")
