@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from tdac_agent.evaluation.policy import Policy, load_controller
     from tdac_agent.evaluation.robust import verify_robust
     from tdac_agent.evaluation.set_verify import verify_on_set
-    from tdac_agent.runs.history import Told, gather_run
+    from tdac_agent.runs.history import RunHistory, gather_run
     from tdac_agent.runs.run_record import Run, load_run
     from tdac_agent.synthesis.loop import synthesize
     from tdac_agent.tasks.disturbance import Disturbance
@@ -25,8 +25,8 @@ __all__ = [
     "Policy",
     "Report",
     "Run",
+    "RunHistory",
     "Task",
-    "Told",
     "evaluate",
     "gather_run",
     "load_controller",
@@ -45,7 +45,7 @@ _MODULE_OF = {
     "Report": "verification.diagnosis.report",
     "Run": "runs.run_record",
     "Task": "tasks.task",
-    "Told": "runs.history",
+    "RunHistory": "runs.history",
     "evaluate": "evaluation.evaluate",
     "gather_run": "runs.history",
     "load_controller": "evaluation.policy",

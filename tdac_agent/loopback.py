@@ -45,7 +45,7 @@ def listen(port: int) -> socket.socket:
     return opened
 
 
-class Here:
+class LocalAddress:
     """The names under which a port of this machine is reached.
 
     Args:
@@ -56,7 +56,7 @@ class Here:
         self._hosts = {f"{host}:{port}" for host in HOSTS}
         self._origins = {f"http://{host}" for host in self._hosts}
 
-    def is_here(self, headers: dict[str, str], *, without_origin: bool) -> bool:
+    def is_local(self, headers: dict[str, str], *, without_origin: bool) -> bool:
         """Whether the host, and the origin if there is one, are those of this server.
 
         Args:

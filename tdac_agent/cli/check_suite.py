@@ -11,7 +11,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import TaskFlags, check_tier
 from tdac_agent.cli.sentences import print_sentences
-from tdac_agent.tasks.task import called
+from tdac_agent.tasks.task import display_name
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -49,7 +49,7 @@ def run(
     if as_json:
         sys.stdout.write(check.model_dump_json(indent=2) + "\n")
     else:
-        _show(check, called(task), console)
+        _show(check, display_name(task), console)
     return 0 if check.proven else 1
 
 

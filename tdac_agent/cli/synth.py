@@ -24,7 +24,7 @@ from tdac_agent.runs.resume import (
 )
 from tdac_agent.runs.run_record import AGENT, Run, load_run
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import Task, called
+from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.tasks.task_file import TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
@@ -171,7 +171,7 @@ def _heading(task: Task, learner: str, optimizer: str | None) -> str:
     if optimizer not in (None, learner):
         model += f", optimizer [bold]{escape(str(optimizer))}[/]"
     return (
-        f"task [bold]{escape(called(task))}[/]: shortest path "
+        f"task [bold]{escape(display_name(task))}[/]: shortest path "
         f"{setting.told(shortest_path_length(nominal))}, "
         f"body radius {setting.told(nominal.body_radius)}, "
         f"at most {nominal.horizon} steps; "

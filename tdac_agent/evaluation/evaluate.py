@@ -37,7 +37,7 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.provenance import sha256_of, versions
-from tdac_agent.tasks.task import Task, called, lay_out, load_task
+from tdac_agent.tasks.task import Task, display_name, lay_out, load_task
 from tdac_agent.verification.diagnosis.measures import Measured
 from tdac_agent.verification.judge.kept_episodes import KeptEpisode, kept_episodes
 from tdac_agent.verification.judge.seeded import SeededJob
@@ -265,7 +265,7 @@ def _compete(
 def _about_task(task: Task) -> EvaluatedTask:
     return EvaluatedTask(
         name=task.name,
-        called=called(task),
+        called=display_name(task),
         task_sha256=task.sha256(),
         map_sha256=task.setting.world_sha256(),
         unit=task.setting.units.place,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.html_report.names import candidate_name
 from tdac_agent.html_report.scene import TaskPicture
-from tdac_agent.runs.history import CandidateHistory, Told
+from tdac_agent.runs.history import CandidateHistory, RunHistory
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import contact_of
@@ -35,14 +35,16 @@ ALL_MOVER_POINTS = 60_000
 """The same of their movers; each has at least 20."""
 
 
-def animations(told: Told, task: Task, scene: TaskPicture) -> list[dict[str, Any]]:
+def animations(
+    history: RunHistory, task: Task, scene: TaskPicture
+) -> list[dict[str, Any]]:
     """Encodes the recorded episodes of all candidates of a run.
 
     Returns:
         A dict per episode for the player: candidate, its label, name, and what
         `encoded` returns.
     """
-    found = [(one, *pair) for one in told.tried for pair in _episodes(one)]
+    found = [(one, *pair) for one in history.tried for pair in _episodes(one)]
     most = shares([each[-1] for each in found])
     return [
         {

@@ -24,7 +24,7 @@ from tdac_agent.metrics import (
 )
 from tdac_agent.metrics.table import KIND
 from tdac_agent.plots import figure_bytes, plot_cumulative_success, plot_success_rates
-from tdac_agent.runs.history import Told
+from tdac_agent.runs.history import RunHistory
 
 MOST_CURVES = 8
 
@@ -46,15 +46,15 @@ class Overview:
     figures: tuple[tuple[str, str], ...]
 
 
-def overview_of(told: Sequence[Told]) -> Overview:
+def overview_of(histories: Sequence[RunHistory]) -> Overview:
     """Summarises runs of one or several kinds."""
-    frames = frames_of(one.run for one in told)
-    set_kinds = tuple(_set_kinds(told))
+    frames = frames_of(one.run for one in histories)
+    set_kinds = tuple(_set_kinds(histories))
     if not len(frames.runs):
         return Overview((), set_kinds, (), ())
     table = summarise(frames).to_dict("records")
     groups = [frames.only(**{name: row[name] for name in KIND}) for row in table]
-    working = {str(one.run.folder) for one in told if one.status == "running"}
+    working = {str(one.run.folder) for one in histories if one.status == "running"}
     kinds = tuple(
         _kind(row, group.runs, group.runs["run"].isin(working))
         for row, group in zip(table, groups, strict=True)
@@ -76,10 +76,10 @@ def _kind(
     }
 
 
-def _set_kinds(told: Sequence[Told]) -> Iterator[dict[str, Any]]:
+def _set_kinds(histories: Sequence[RunHistory]) -> Iterator[dict[str, Any]]:
     """Yields the rows of the runs on task sets."""
-    frame = set_frame_of(one.run for one in told)
-    working = {str(one.run.folder) for one in told if one.status == "running"}
+    frame = set_frame_of(one.run for one in histories)
+    working = {str(one.run.folder) for one in histories if one.status == "running"}
     for row in summarise_sets(frame).to_dict("records") if len(frame) else ():
         same = (frame[list(KIND)] == [row[name] for name in KIND]).all(axis=1)
         running = int(frame[same]["run"].isin(working).sum())

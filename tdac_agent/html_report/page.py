@@ -24,7 +24,7 @@ from tdac_agent.html_report.section import (
     section_of,
 )
 from tdac_agent.models.budget import format_usd
-from tdac_agent.runs.history import Told, gather_run, learner_named, run_folders
+from tdac_agent.runs.history import RunHistory, gather_run, learner_named, run_folders
 
 MOST_BYTES = 24 << 20
 """Limit for the details of all runs; further runs are only listed."""
@@ -60,7 +60,7 @@ def make_page(place: Path) -> Page:
         RunError: No run can be read.
     """
     place = place.resolve()
-    runs: list[tuple[str, Told]] = []
+    runs: list[tuple[str, RunHistory]] = []
     unreadable: list[str] = []
     for folder in run_folders(place):
         name = place.name if folder == place else str(folder.relative_to(place))
@@ -71,20 +71,20 @@ def make_page(place: Path) -> Page:
     if not runs:
         raise RunError(unreadable[0])
     details, scenes = _details(runs)
-    told = [one for _, one in runs]
+    histories = [one for _, one in runs]
     html = rendered(
         "page.html.j2",
         scenes,
         name=place.name,
         runs=runs,
         unreadable=unreadable,
-        overview=overview_of(told),
+        overview=overview_of(histories),
         details=details,
     )
     return Page(
         html,
         len(runs),
-        sum(one.run.verified for one in told),
+        sum(one.run.verified for one in histories),
         tuple(unreadable),
     )
 
@@ -109,16 +109,16 @@ def rendered(template: str, scenes: Mapping[str, TaskPicture], **values: Any) ->
 
 
 def _details(
-    runs: list[tuple[str, Told]],
+    runs: list[tuple[str, RunHistory]],
 ) -> tuple[list[Markup], dict[str, TaskPicture]]:
     """Renders the sections of as many runs as fit, and their scenes."""
     template = _environment().get_template("run.html.j2")
     scenes: dict[str, TaskPicture] = {}
     details: list[Markup] = []
     size = 0
-    for number, (name, told) in enumerate(runs, 1):
-        scene = _scene(told, scenes)
-        section = template.render(section_of(told, number, name, scene))
+    for number, (name, history) in enumerate(runs, 1):
+        scene = _scene(history, scenes)
+        section = template.render(section_of(history, number, name, scene))
         size += len(section)
         if details and size > MOST_BYTES:
             break
@@ -127,14 +127,14 @@ def _details(
 
 
 def _scene(
-    told: Told, scenes: dict[str, TaskPicture]
+    history: RunHistory, scenes: dict[str, TaskPicture]
 ) -> tuple[str, TaskPicture] | None:
     """The scene of a run's task; runs of the same task share it."""
-    if told.task is None:
+    if history.task is None:
         return None
-    key = told.task.sha256()
+    key = history.task.sha256()
     if key not in scenes:
-        scenes[key] = scene_of(told.task)
+        scenes[key] = scene_of(history.task)
     return key, scenes[key]
 
 

@@ -18,7 +18,7 @@ from tdac_agent.models.picture import MEDIA_TYPE, PNG_SIGNATURE
 from tdac_agent.models.picture import MOST_BYTES as MOST_PICTURE_BYTES
 from tdac_agent.models.provider import PICTURED
 from tdac_agent.plots import plot_breakdown
-from tdac_agent.runs.history import CandidateHistory, Told, learner_named
+from tdac_agent.runs.history import CandidateHistory, RunHistory, learner_named
 from tdac_agent.runs.improvement_record import read_improvement
 from tdac_agent.runs.resume import resume_words
 from tdac_agent.runs.run_record import (
@@ -55,49 +55,51 @@ class FailureGroup:
 
 
 def section_of(
-    told: Told, number: int, name: str, scene: tuple[str, TaskPicture] | None
+    history: RunHistory, number: int, name: str, scene: tuple[str, TaskPicture] | None
 ) -> dict[str, Any]:
     """Collects the values for the template of a run.
 
     Args:
-        told: The run.
+        history: The run.
         number: Number of its section in the page, from 1.
         name: Displayed name of its folder.
         scene: Key of its task's scene in the page, and the scene.
     """
+    run, report = history.run, history.report
     least, most = DIFF_LINES
+    share = ALL_DIFF_LINES // max(1, len(history.tried))
     episodes = []
-    if scene is not None and told.task is not None:
-        episodes = animations(told, told.task, scene[1])
+    if scene is not None and history.task is not None:
+        episodes = animations(history, history.task, scene[1])
     return {
         "number": number,
         "name": name,
-        "told": told,
-        "run": told.run,
-        "learner": learner_named(told.run.learner),
-        "iterations": _iterations(told),
-        "failures": list(_failures(told)),
+        "history": history,
+        "run": run,
+        "learner": learner_named(run.learner),
+        "iterations": _iterations(history),
+        "failures": list(_failures(history)),
         "scene": scene,
         "episodes": episodes,
         "watchable": {(e["candidate"], e["name"]): n for n, e in enumerate(episodes)},
-        "most_lines": max(least, min(most, ALL_DIFF_LINES // max(1, len(told.tried)))),
-        "breakdown": _breakdown(told),
-        "seconds": format_seconds(told.run.seconds),
-        "spent": spent(told),
-        "origin": list(_origin(told)),
-        "commands": list(_commands(told, name)),
-        "set_part": set_part_of(told),
-        "improvement": read_improvement(told.run.folder) if told.run.improve else None,
-        "units": None if told.report is None else UNITS[told.report.provenance.unit],
+        "most_lines": max(least, min(most, share)),
+        "breakdown": _breakdown(history),
+        "seconds": format_seconds(run.seconds),
+        "spent": spent(history),
+        "origin": list(_origin(history)),
+        "commands": list(_commands(history, name)),
+        "set_part": set_part_of(history),
+        "improvement": read_improvement(run.folder) if run.improve else None,
+        "units": None if report is None else UNITS[report.provenance.unit],
     }
 
 
-def _breakdown(told: Told) -> str | None:
+def _breakdown(history: RunHistory) -> str | None:
     """Figure of time and tokens as a data URL; None if the journal is unusable."""
-    if not told.run.attempts:
+    if not history.run.attempts:
         return None
     try:
-        return drawn(plot_breakdown(told.run))
+        return drawn(plot_breakdown(history.run))
     except (RunError, KeyError, TypeError, ValueError):
         return None
 
@@ -131,9 +133,9 @@ def question_picture(candidate: CandidateHistory) -> str | None:
     return None
 
 
-def spent(told: Told) -> str:
+def spent(history: RunHistory) -> str:
     """Tokens and cost of a run, as text."""
-    run = told.run
+    run = history.run
     if not run.tokens:
         return "not counted"
     cost = "cost unknown" if run.cost is None else format_usd(run.cost)
@@ -142,21 +144,21 @@ def spent(told: Told) -> str:
     return f"{run.tokens_in:,} in, {run.tokens_out:,} out; {cost}"
 
 
-def _iterations(told: Told) -> list[tuple[int, list[CandidateHistory]]]:
-    groups = itertools.groupby(told.tried, key=lambda one: one.k)
+def _iterations(history: RunHistory) -> list[tuple[int, list[CandidateHistory]]]:
+    groups = itertools.groupby(history.tried, key=lambda one: one.k)
     return [(k, list(group)) for k, group in groups]
 
 
-def _failures(told: Told) -> Iterator[tuple[str, list[bool]]]:
+def _failures(history: RunHistory) -> Iterator[tuple[str, list[bool]]]:
     """Each test that ever failed, and whether each candidate failed it."""
-    names = dict.fromkeys(test for one in told.tried for test in one.failed)
+    names = dict.fromkeys(test for one in history.tried for test in one.failed)
     for name in itertools.islice(names, MOST_ROWS):
-        yield name, [name in one.failed for one in told.tried]
+        yield name, [name in one.failed for one in history.tried]
 
 
-def _origin(told: Told) -> Iterator[tuple[str, str]]:
+def _origin(history: RunHistory) -> Iterator[tuple[str, str]]:
     """Provenance of the run: name and value of each fact."""
-    run = told.run
+    run = history.run
     yield "started", run.started
     yield "task", f"{run.task}, sha256 {run.task_sha256}"
     yield "Learner", learner_named(run.learner)
@@ -175,9 +177,9 @@ def _origin(told: Told) -> Iterator[tuple[str, str]]:
         yield "pictures", "a failure, with each question to edit or improve"
     for rule in run.given_rules:
         yield "given rule", rule
-    yield "tokens and cost", spent(told)
-    if told.report is not None:
-        yield from _verified_with(told.report)
+    yield "tokens and cost", spent(history)
+    if history.report is not None:
+        yield from _verified_with(history.report)
 
 
 def _verified_with(report: Report) -> Iterator[tuple[str, str]]:
@@ -196,13 +198,13 @@ def _verified_with(report: Report) -> Iterator[tuple[str, str]]:
         yield "remark", warning
 
 
-def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
+def _commands(history: RunHistory, name: str) -> Iterator[tuple[str, str]]:
     """Commands to type in the parent of the run's folder, and what each does."""
-    run = told.run
+    run = history.run
     about = ["--set", f"{name}/{SET_FILE}"] if run.on_set else ["--task", name]
     limits = []
     if run.learner == AGENT:
-        yield from _agent_commands(told, name, about)
+        yield from _agent_commands(history, name, about)
         return
     if run.on_set:
         limits += ["--episodes", str(run.episodes)]
@@ -227,28 +229,30 @@ def _commands(told: Told, name: str) -> Iterator[tuple[str, str]]:
     yield shlex.join(words), "repeat the run with new answers"
     replay = ["tdac", "synth", *about, *limits, "--learner", f"replay:{name}"]
     yield shlex.join(replay), "repeat the run with the recorded answers"
-    if not run.finished and told.status != "running":
+    if not run.finished and history.status != "running":
         more = run.enough.split()
         yield shlex.join(["tdac", "synth", "--resume", name, *more]), "resume the run"
-    yield from _uses(told, name, about)
+    yield from _uses(history, name, about)
 
 
 def _agent_commands(
-    told: Told, name: str, about: list[str]
+    history: RunHistory, name: str, about: list[str]
 ) -> Iterator[tuple[str, str]]:
     """The commands of a run whose candidates an agent submitted."""
-    run = told.run
+    run = history.run
     words = ["tdac", "mcp", *about]
     words += ["--episodes", str(run.episodes)] if run.on_set else []
     yield shlex.join(words), "let an agent repeat the run"
-    if not run.finished and told.status != "running":
+    if not run.finished and history.status != "running":
         yield resume_words(run, name), "resume the run"
-    yield from _uses(told, name, about)
+    yield from _uses(history, name, about)
 
 
-def _uses(told: Told, name: str, about: list[str]) -> Iterator[tuple[str, str]]:
+def _uses(
+    history: RunHistory, name: str, about: list[str]
+) -> Iterator[tuple[str, str]]:
     """What can be done with the controller of a run."""
-    run = told.run
+    run = history.run
     if run.on_set and run.tau is not None:
         verify = ["tdac", "verify", f"{name}/controller.py", *about]
         yield shlex.join(verify), "verify the controller on public worlds"

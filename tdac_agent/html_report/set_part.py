@@ -13,7 +13,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.models.picture import MEDIA_TYPE
-from tdac_agent.runs.history import Told
+from tdac_agent.runs.history import RunHistory
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.selection_record import (
     HiddenCounts,
@@ -78,9 +78,9 @@ class SetPart:
     problem: str
 
 
-def set_part_of(told: Told) -> SetPart | None:
+def set_part_of(history: RunHistory) -> SetPart | None:
     """Collects what is shown of a run; None before something is selected."""
-    run = told.run
+    run = history.run
     selection = read_selection(run.folder) if run.on_set else None
     if selection is None:
         return None

@@ -14,7 +14,7 @@ from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.prompt import generate_prompt
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.synthesis.candidates import Tests, deliver, verify_candidate
-from tdac_agent.tasks.task import called
+from tdac_agent.tasks.task import display_name
 from tdac_agent.verification.diagnosis.figures import file_stem
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.suite.starts import JITTERS
@@ -35,7 +35,7 @@ class OnTask:
     @property
     def about(self) -> str:
         """See `Judging`."""
-        return f"the task {called(self.tests.task)}"
+        return f"the task {display_name(self.tests.task)}"
 
     def question(self) -> str:
         """See `Judging`."""

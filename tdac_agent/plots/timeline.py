@@ -14,7 +14,12 @@ from matplotlib.figure import Figure
 from tdac_agent.plots.runs import journal_of, short_name
 from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, new_figure, title
 from tdac_agent.prompting.feedback import Group, group_failures
-from tdac_agent.runs.history import CandidateHistory, Told, gather_run, learner_named
+from tdac_agent.runs.history import (
+    CandidateHistory,
+    RunHistory,
+    gather_run,
+    learner_named,
+)
 from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.journal import JournalRecord
 
@@ -90,8 +95,8 @@ def _draw(axes: Axes, entry: Entry, row: float, *, begins: bool) -> None:
         axes.text(22.5, row + number, line, **style | {"fontsize": 8})
 
 
-def _entries(told: Told, records: list[JournalRecord]) -> Iterator[Entry]:
-    tried = {(one.k, one.j): one for one in told.tried}
+def _entries(history: RunHistory, records: list[JournalRecord]) -> Iterator[Entry]:
+    tried = {(one.k, one.j): one for one in history.tried}
     for record in records:
         event, k = record["event"], record.get("k")
         if event == "verify.end":

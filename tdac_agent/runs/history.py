@@ -85,7 +85,7 @@ class CandidateHistory:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class RunHistory:
     """A run with everything that could be read from its folder.
 
     Attributes:
@@ -116,7 +116,7 @@ def learner_named(learner: str) -> str:
     return learner if told is None else f"{learner} ({told})"
 
 
-def gather_run(source: Path | Run) -> Told:
+def gather_run(source: Path | Run) -> RunHistory:
     """Reads a run, even if it is damaged or still running.
 
     Args:
@@ -140,7 +140,7 @@ def gather_run(source: Path | Run) -> Told:
         verified_source = read_text(run.controller)
         if verified_source is None:
             problems.append("controller.py of the verified run is missing")
-    return Told(
+    return RunHistory(
         run,
         status,
         None if run.on_set else _try_to(problems, lambda: load_task(folder)),

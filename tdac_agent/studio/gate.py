@@ -20,7 +20,7 @@ from urllib.parse import parse_qs
 
 from tdac_agent.loopback import (
     App,
-    Here,
+    LocalAddress,
     Receive,
     Scope,
     Send,
@@ -60,7 +60,7 @@ class Gate:
         self._app, self._about = app, f"studio|{port}|{place}"
         # Cookies are shared by all ports of a host.
         self._cookie = f"tdac-studio-{port}"
-        self._here = Here(port)
+        self._here = LocalAddress(port)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or refuses it; see the ASGI specification."""
@@ -83,7 +83,7 @@ class Gate:
     def _is_here(self, scope: Scope, headers: dict[str, str]) -> bool:
         """Whether the host is this one, and the page that asks is one of ours."""
         reads = scope["type"] == "http" and scope["method"] in ("GET", "HEAD")
-        return self._here.is_here(headers, without_origin=reads)
+        return self._here.is_local(headers, without_origin=reads)
 
     def _has_session(self, headers: dict[str, str]) -> bool:
         try:

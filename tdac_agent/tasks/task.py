@@ -206,7 +206,7 @@ def _open(spec: TaskFile, base: Path) -> tuple[str, Setting]:
     return entry.open(spec, base)
 
 
-def called(task: Task) -> str:
+def display_name(task: Task) -> str:
     """Describes a task: a bundled one by its name, others also by map hash and goal.
 
     A name alone does not identify a task: any map may have a bundled map's name. The

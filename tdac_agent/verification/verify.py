@@ -15,7 +15,7 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.provenance import origin, sha256_of, versions
-from tdac_agent.tasks.task import Task, called, lay_out
+from tdac_agent.tasks.task import Task, display_name, lay_out
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.report import OWN, SHIPPED, Provenance, Report
@@ -233,7 +233,7 @@ def _provenance(
 ) -> Provenance:
     return Provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
-        called=called(task),
+        called=display_name(task),
         own_suite=_own_suite_hash(suites),
         suite=" + ".join(_suite_name(task, folder) for folder in suites.values()),
         suite_sha256=_hash_of_suites(suites),

@@ -23,9 +23,9 @@ _INFOS: dict[str, tuple[int, type]] = {
     "collision": (stepping.TOUCHED, np.bool_),
     "collisions": (stepping.COLLISIONS, np.int64),
     "clipped": (stepping.CLIPPED, np.int64),
-    "distance_to_goal": (stepping.GAP, np.float64),
+    "distance_to_goal": (stepping.GOAL_DISTANCE, np.float64),
     "path_distance": (stepping.REMAINING, np.float64),
-    "clearance": (stepping.ROOM, np.float64),
+    "clearance": (stepping.CLEARANCE, np.float64),
 }
 
 

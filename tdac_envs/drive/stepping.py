@@ -31,7 +31,7 @@ X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS, FORWARD, TURN = range(
 N_STATE = 10
 # Entries of `outcome`.
 REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
-GAP, REMAINING, ROOM, CONTACT = range(7, 11)
+GOAL_DISTANCE, REMAINING, CLEARANCE, CONTACT = range(7, 11)
 N_OUTCOME = 11
 UNDISTURBED = 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
 """Gains, scales and relative wheel radii in `constants` of a robot without errors."""
@@ -162,7 +162,7 @@ def finish_step(constants: Array, state: Array, outcome: Array, before: float) -
 
 def info_of(outcome: list[float]) -> dict[str, Any]:
     """The `info` of a step, from its `outcome` as a list."""
-    entries = outcome[REACHED : ROOM + 1]
+    entries = outcome[REACHED : CLEARANCE + 1]
     reached, touched, collisions, clipped, gap, remaining, room = entries
     return {
         "is_success": reached == 1.0,

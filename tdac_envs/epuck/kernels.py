@@ -16,9 +16,10 @@ from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive import stepping
 from tdac_envs.drive.stepping import (
     AXLE,
+    CLEARANCE,
     DT,
     FORWARD,
-    GAP,
+    GOAL_DISTANCE,
     GOAL_X,
     GOAL_Y,
     HEADING,
@@ -26,7 +27,6 @@ from tdac_envs.drive.stepping import (
     RADIUS,
     REACHED,
     REMAINING,
-    ROOM,
     SLIP_LEFT,
     SLIP_RIGHT,
     TOLERANCE,
@@ -110,7 +110,7 @@ def _observe(
     outcome[REACHED] = gap <= constants[TOLERANCE] and (
         gap < room or in_sight(points, first, extent, x, y, goal_x, goal_y)
     )
-    outcome[GAP], outcome[ROOM] = gap, room
+    outcome[GOAL_DISTANCE], outcome[CLEARANCE] = gap, room
 
 
 @subkernel
@@ -238,7 +238,7 @@ def _drive(
     """
     _turn_wheels(constants, state, queue, wheel_speeds, outcome)
     forward, turn, x, y = state[FORWARD], state[TURN], state[X], state[Y]
-    if outcome[ROOM] - constants[RADIUS] > abs(forward):
+    if outcome[CLEARANCE] - constants[RADIUS] > abs(forward):
         # No contact is possible.
         x, y, heading = move(x, y, state[HEADING], forward, turn)
         state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)

@@ -19,7 +19,7 @@ from pydantic import (
 
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.generators.draft import ordered
-from tdac_envs.map2d.placing import Cast
+from tdac_envs.map2d.placing import MoversSetup
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.spec import (
     MOST_MOVERS,
@@ -107,7 +107,7 @@ def _starts(
 ) -> Iterator[Movers]:
     """Draws where movers start, up to `TRIES` times, where there is room for them."""
     with suppress(TaskError):
-        cast = Cast.of(specs, task)
+        movers_setup = MoversSetup.of(specs, task)
         for _ in range(TRIES):
             with suppress(TaskError):
-                yield cast.start(task, random)
+                yield movers_setup.start(task, random)

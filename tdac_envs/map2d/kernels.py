@@ -18,11 +18,12 @@ from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.sliding import sliding
 from tdac_envs.drive.stepping import (
     AXLE,
+    CLEARANCE,
     CONTACT,
     DT,
     FORWARD,
     FRICTION,
-    GAP,
+    GOAL_DISTANCE,
     GOAL_X,
     GOAL_Y,
     HEADING,
@@ -31,7 +32,6 @@ from tdac_envs.drive.stepping import (
     RANGE_MAX,
     REACHED,
     REMAINING,
-    ROOM,
     SLIP_LEFT,
     SLIP_RIGHT,
     STOPS,
@@ -172,9 +172,9 @@ def observe(
     gap = math.hypot(goal_x - x, goal_y - y)
     near = gap <= constants[TOLERANCE]
     outcome[REACHED] = near and in_sight(leaps, x, y, goal_x, goal_y)
-    outcome[GAP] = gap
+    outcome[GOAL_DISTANCE] = gap
     outcome[REMAINING] = _path_distance(leaps, field, x, y, outcome[REMAINING])
-    outcome[ROOM] = clear[math.floor(y + 1.5), math.floor(x + 1.5)]
+    outcome[CLEARANCE] = clear[math.floor(y + 1.5), math.floor(x + 1.5)]
 
 
 @subkernel

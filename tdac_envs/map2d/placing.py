@@ -28,7 +28,7 @@ SAFE_SECONDS = 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cast:
+class MoversSetup:
     """The movers of an environment on a map; their starts are drawn per episode.
 
     Attributes:
@@ -46,7 +46,7 @@ class Cast:
     seeing: tuple[bool | None, ...]
 
     @classmethod
-    def of(cls, specs: Sequence[AnySpec], task: Map2DTask) -> Cast:
+    def of(cls, specs: Sequence[AnySpec], task: Map2DTask) -> MoversSetup:
         """The movers that a user asks for, checked on the map of a task.
 
         Args:

@@ -21,7 +21,7 @@ from tdac_envs.drive.disturbances import Random
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.map_units import MapFrame
-from tdac_envs.map2d.placing import Cast
+from tdac_envs.map2d.placing import MoversSetup
 from tdac_envs.map2d.rays import fan
 from tdac_envs.map2d.robot import constants_of
 from tdac_envs.map2d.sonar import Sonar
@@ -51,7 +51,7 @@ class Setup(DriveSetup):
         sensor: `"rays"` or `"sonar"`.
         sonar: The sonars; None with rays.
         directions: Directions of the rays, from `rays.fan`.
-        cast: The movers, checked on the map.
+        movers_setup: The movers, checked on the map.
     """
 
     nominal: Map2DTask
@@ -62,7 +62,7 @@ class Setup(DriveSetup):
     sensor: str = "rays"
     sonar: Sonar | None = field(init=False)
     directions: NDArray[np.float64] = field(init=False)
-    cast: Cast = field(init=False)
+    movers_setup: MoversSetup = field(init=False)
 
     def __post_init__(self) -> None:
         DriveSetup.__post_init__(self)
@@ -78,11 +78,11 @@ class Setup(DriveSetup):
         if self.sensor == "sonar":
             sonar = Sonar(float(view), robot.n_rays, robot.range_max)
         object.__setattr__(self, "sonar", sonar)
-        cast = Cast.of(self.movers, self.nominal)
-        object.__setattr__(self, "cast", cast)
+        movers_setup = MoversSetup.of(self.movers, self.nominal)
+        object.__setattr__(self, "movers_setup", movers_setup)
         if self.movers and self.variation == "nominal" and self.source is None:
             # A fault is found here, and not at the first reset.
-            self.cast.start(self.nominal, np.random.default_rng(0))
+            self.movers_setup.start(self.nominal, np.random.default_rng(0))
 
     @property
     def has_inexact_ranges(self) -> bool:
@@ -110,7 +110,7 @@ class Setup(DriveSetup):
         again = 0 if options or self.variation == "nominal" else MOST_STARTS
         while True:
             try:
-                movers = self.cast.start(drawn, noise)
+                movers = self.movers_setup.start(drawn, noise)
             except TaskError:
                 if again == 0:
                     raise

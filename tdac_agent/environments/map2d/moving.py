@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.map2d.placing import Cast
+from tdac_envs.map2d.placing import MoversSetup
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.spec import AnySpec
 
@@ -20,7 +20,7 @@ def check_movers(specs: Sequence[AnySpec], task: Map2DTask) -> None:
         TaskError: They cannot be placed; the message names the mover.
     """
     if specs:
-        Cast.of(specs, task).start(task, np.random.default_rng(0))
+        MoversSetup.of(specs, task).start(task, np.random.default_rng(0))
 
 
 def as_option(specs: Sequence[AnySpec]) -> dict[str, list[dict[str, Any]]]:

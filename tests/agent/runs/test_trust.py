@@ -16,7 +16,7 @@ from tdac_agent.runs.ownership import is_own, is_own_folder
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.installation import lasting_secret
-from tdac_agent.tasks.task import called, load_task
+from tdac_agent.tasks.task import display_name, load_task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.trust import NotTrustedError, tree_sha256
 from tdac_agent.verification.verify import verify
@@ -181,17 +181,17 @@ def test_a_template_computes_nothing(small_task, tmp_path):
 
 def test_a_task_is_called_by_what_it_is(tmp_path):
     """Only the bundled maze is called maze and nothing else."""
-    assert called(load_task("maze")) == "maze"
+    assert display_name(load_task("maze")) == "maze"
     empty = load_task(write_small_task(tmp_path / "a", name="maze"))
     digest = empty.setting.world_sha256()[:8]
     tolerance = f"{empty.nominal.goal_tolerance:.0f}"
     about = f"(map {digest}, goal within {tolerance} px)"
-    assert called(empty) == f"maze, not the bundled one {about}"
+    assert display_name(empty) == f"maze, not the bundled one {about}"
     folder = tmp_path / "b"
     folder.mkdir()
     content = {"schema": 1, "map": "maze", "tolerance": 900.0}
     (folder / "maze.yaml").write_text(yaml.safe_dump(content))
-    near = called(load_task(folder / "maze.yaml"))
+    near = display_name(load_task(folder / "maze.yaml"))
     assert near.startswith("maze, changed (map ")
     assert near.endswith("goal within 900 px)")
 
@@ -200,9 +200,9 @@ def test_a_bundled_world_has_the_name_of_its_task():
     """`--world maze` is the bundled task `epuck-maze`, not a forged maze."""
     about = {"env": "TDAC-EPuck-v0", "world": "maze"}
     task = load_task(TaskFile.model_validate(about))
-    assert called(task) == called(load_task("epuck-maze")) == "epuck-maze"
+    assert display_name(task) == display_name(load_task("epuck-maze")) == "epuck-maze"
     moved = load_task(TaskFile.model_validate({**about, "tolerance": 0.03}))
-    assert called(moved).startswith("epuck-maze, changed (map ")
+    assert display_name(moved).startswith("epuck-maze, changed (map ")
 
 
 def test_the_verdict_names_the_folder(tdac, good):
