@@ -122,8 +122,8 @@ def rate_text(rate: float, interval: Interval) -> str:
 
 def _legend(result: SequentialResult) -> str:
     return (
-        "  accepted: the episodes fit a success rate of "
-        f"{percent(result.test.accept_at)} much better than one of "
+        "  accepted: a success rate of "
+        f"{percent(result.test.accept_at)} explains the episodes far better than one of "
         f"{percent(result.at_refused_rate.rate)}; the test ends as soon as it can "
         "decide (docs/robustness.md), and errs rarely:"
     )

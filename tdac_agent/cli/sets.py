@@ -179,8 +179,8 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
         + ("; the map is given" if file.map else ""),
         "disturbed": _disturbed(file) or "nothing",
         "horizon": _horizon(file),
-        "verified": f"if {file.bar:g} fits the success rate much better than "
-        f"{file.bar - MARGIN:g} (sequential test)",
+        "verified": f"if a sequential test accepts a success rate of {file.bar:g} "
+        f"against {file.bar - MARGIN:g}",
     }
     if file.movers:
         rows["movers"] = "; ".join(_group(group) for group in file.movers)

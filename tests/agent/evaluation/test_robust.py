@@ -448,7 +448,7 @@ def test_the_decision_is_the_exit_code(tdac, good):
     assert code == 1
     assert "rejected at 90.0 % after 2 of at most 30 episodes" in out
     assert "a true rate of 50.0 % is accepted with probability" in out
-    assert "much better than one of 50.0 %" in " ".join(out.split())
+    assert "far better than one of 50.0 %" in " ".join(out.split())
     assert "interval" not in out
 
 
