@@ -122,10 +122,9 @@ def rate_text(rate: float, interval: Interval) -> str:
 
 def _legend(result: SequentialResult) -> str:
     return (
-        "  accepted: a success rate of "
-        f"{percent(result.test.accept_at)} explains the episodes far better than one of "
-        f"{percent(result.at_refused_rate.rate)}; the test ends as soon as it can "
-        "decide (docs/robustness.md), and errs rarely:"
+        f"  accepted: a success rate of {percent(result.test.accept_at)} explains the "
+        f"episodes far better than one of {percent(result.at_refused_rate.rate)}; the "
+        "test ends as soon as it can decide (docs/robustness.md), and errs rarely:"
     )
 
 
