@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-SAMPLE = 120
+SAMPLE = 80
 ROOT = Path(__file__).resolve().parents[1]
 REAL_DATA = ROOT.parent / "shared" / "data"
 # Their tests import the benchmarks, which are never installed.

@@ -192,6 +192,7 @@ def test_levels_are_in_the_order_of_the_ladder(judge, tmp_path, files):
     assert [row.set for row in found.rows] == ["known", "moving"]
 
 
+@pytest.mark.slow
 def test_folders_together(judge, tmp_path, level, files):
     """Two benches on the same worlds are one; on others they are refused."""
     given = {"split": "dev", "judge": judge}

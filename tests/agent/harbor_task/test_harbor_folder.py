@@ -121,6 +121,7 @@ def test_two_exports_have_different_worlds(unknown, tmp_path):
     assert hidden[0].tasks.sha256 == load_set("unknown").sha256
 
 
+@pytest.mark.slow
 def test_the_oracle_is_rewarded_and_others_are_not(small, tmp_path, capfd):
     """Also not no file, a link to the judge's files, a folder, or a huge file."""
     root = container(tmp_path, small)

@@ -78,6 +78,7 @@ def metrics(log):
     }
 
 
+@pytest.mark.slow
 def test_a_reference_is_verified_and_others_are_not(tmp_path):
     """Score 1, 0, and 0 with the reason; the log opens in Inspect's reader."""
     answers = [reference(task="maze"), answer(NOTHING), "I would rather not."]

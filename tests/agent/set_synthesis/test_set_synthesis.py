@@ -73,6 +73,7 @@ def test_a_repaired_candidate_is_selected(write, solver, out, few):
     assert load_run(out).status == "selected"
 
 
+@pytest.mark.slow
 def test_the_only_controller_of_a_learner_has_one_test(write, out):
     """Nothing else can be asked of it, so more feedback tells nobody anything."""
     _, run = write(model="builtin", candidates=3)
@@ -223,6 +224,7 @@ def policy(obs):
 """
 
 
+@pytest.mark.slow
 def test_the_report_draws_failures_of_the_selected_controller(write, half, out):
     """Beside the counts of each candidate; nothing is drawn of a run from elsewhere."""
     write(code(half), iterations=1, patience=0, refine=False)

@@ -487,6 +487,7 @@ def test_a_map_that_may_be_read_in_two_ways(page, studio, tmp_path):
     says(page, "A path of")
 
 
+@pytest.mark.slow
 def test_two_runs_are_compared(page, studio):
     """Chosen from the list, which shows new runs by itself; what differs is marked."""
     page.get(f"{studio.base}/runs")

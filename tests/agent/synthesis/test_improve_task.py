@@ -96,6 +96,7 @@ def test_the_shares_of_a_task_are_all_episodes(improve):
     assert most_variations(0, on_set=False) == 0
 
 
+@pytest.mark.slow
 def test_a_more_robust_variation_is_asked_for_and_delivered(
     write, fragile, good_source, tmp_path
 ):
