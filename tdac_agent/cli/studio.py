@@ -18,9 +18,11 @@ def run(port: int, open_it: bool) -> None:
 
     def announce(address: str) -> None:
         print(address, flush=True)
-        text = "whoever opens this address is let in; Ctrl-C ends only the studio"
-        text += ", not its runs"
-        print(text, file=sys.stderr)
+        print(
+            "whoever opens this address is let in; "
+            "Ctrl-C ends the studio, not its runs",
+            file=sys.stderr,
+        )
 
     print("starting the studio …", file=sys.stderr, flush=True)
     try:

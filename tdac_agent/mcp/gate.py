@@ -35,7 +35,7 @@ class Gate:
     """
 
     def __init__(self, app: App, port: int, token: str) -> None:
-        self._app, self._here, self._token = app, LocalAddress(port), token
+        self._app, self._address, self._token = app, LocalAddress(port), token
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or refuses it; see the ASGI specification."""
@@ -45,7 +45,7 @@ class Gate:
             await receive()  # the handshake
             await send({"type": "websocket.close", "code": 1008})
         # Programs send no origin, pages do.
-        elif not self._here.is_local(headers_of(scope), without_origin=True):
+        elif not self._address.is_local(headers_of(scope), without_origin=True):
             await answer(send, 403, _NOT_HERE, "text/plain")
         elif not self._has_token(headers_of(scope)):
             challenge = "www-authenticate", "Bearer"

@@ -60,7 +60,7 @@ class Gate:
         self._app, self._about = app, f"studio|{port}|{place}"
         # Cookies are shared by all ports of a host.
         self._cookie = f"tdac-studio-{port}"
-        self._here = LocalAddress(port)
+        self._address = LocalAddress(port)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or refuses it; see the ASGI specification."""
@@ -78,12 +78,12 @@ class Gate:
 
     def _is_allowed(self, scope: Scope) -> bool:
         headers = headers_of(scope)
-        return self._is_here(scope, headers) and self._has_session(headers)
+        return self._is_local(scope, headers) and self._has_session(headers)
 
-    def _is_here(self, scope: Scope, headers: dict[str, str]) -> bool:
+    def _is_local(self, scope: Scope, headers: dict[str, str]) -> bool:
         """Whether the host is this one, and the page that asks is one of ours."""
         reads = scope["type"] == "http" and scope["method"] in ("GET", "HEAD")
-        return self._here.is_local(headers, without_origin=reads)
+        return self._address.is_local(headers, without_origin=reads)
 
     def _has_session(self, headers: dict[str, str]) -> bool:
         try:
@@ -109,7 +109,7 @@ class Gate:
         return (
             scope["type"] == "http"
             and scope["method"] == "GET"
-            and self._is_here(scope, headers_of(scope))
+            and self._is_local(scope, headers_of(scope))
             and equal(given, self.token)
         )
 
