@@ -3,7 +3,7 @@
 #                     No test needs a quiet machine.
 #   make slow         Tests that take long or need a quiet machine: each controller of the
 #                     zoo on every sandbox tier, each bundled map, many seeds, killed runs.
-#   make slow-sample  120 of these tests, drawn by the seed SAMPLE; CI uses the commit hash.
+#   make slow-sample  80 of these tests, drawn by the seed SAMPLE; CI uses the commit hash.
 #   make test-all     test, slow and lint: required before a release.
 #   make portability  Other machines: no bubblewrap, each tier, lowest and newest versions,
 #                     other Pythons, another user, other processors, a busy machine. The

@@ -57,6 +57,7 @@ def test_the_same_file_is_not_judged_again(serve, small_task):
     assert first == second
 
 
+@pytest.mark.slow
 def test_a_spent_budget_on_a_task(serve, small_task, out):
     """Twelve episodes are two submissions; without success, the run has ended."""
 

@@ -76,6 +76,7 @@ def write(task, tmp_path, warm):
     return run
 
 
+@pytest.mark.slow
 def test_the_best_of_three_is_repaired(write, good_source, tmp_path):
     """All are asked at the same time, and each is an iteration."""
     answers = {

@@ -281,6 +281,7 @@ def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
         write(out=tmp_path / "b", improve=40)
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_leaves_a_verified_run(
     write, good_source, tmp_path, tdac
 ):
