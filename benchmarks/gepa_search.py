@@ -136,7 +136,7 @@ class Terms(NamedTuple):
         about = SetProvenance.unconfined(
             self.tasks, "dev", None, sha256_of(source.encode())
         )
-        return summarise(about, episodes, None, 0.0, told=True)
+        return summarise(about, episodes, None, 0.0, per_world=True)
 
     def variation(self, source: str, number: int) -> str:
         """The proposal with a number, from 1."""

@@ -100,4 +100,4 @@ class Drives:
                 except ControllerFault as fault:
                     rollout = not_driven(record, f"world {index}", fault)
         cpu = time.process_time() - began
-        return figures_of(env, split, index, rollout, cpu, told=True)
+        return figures_of(env, split, index, rollout, cpu, per_world=True)

@@ -57,7 +57,7 @@ def plan_worlds(
     episodes = [_episode(tasks, split, index, salt) for index in range(count)]
     provenance = SetProvenance.unconfined(tasks, split, salt, planner_sha256())
     seconds = time.monotonic() - began
-    report = summarise(provenance, episodes, None, seconds, told=salt is None)
+    report = summarise(provenance, episodes, None, seconds, per_world=salt is None)
     keep_report(report, folder)
     if salt is not None:
         keep_sealed(episodes, folder)

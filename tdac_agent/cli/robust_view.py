@@ -99,7 +99,7 @@ def _row(episode: SeededEpisode, units: Units) -> list[str]:
 def _place(episode: SeededEpisode, units: Units) -> str:
     if episode.x is None or episode.y is None:
         return ""
-    return units.told_place(episode.x, episode.y)
+    return units.place_text(episode.x, episode.y)
 
 
 def _errors(report: RobustReport) -> list[str]:

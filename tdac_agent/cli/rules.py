@@ -111,7 +111,7 @@ def _effect(rule: RepairRule) -> str:
     pairs = list(zip(rule.evidence, rule.passes_each, strict=True))
     cured = [test for test, count in pairs if count == rule.tried]
     sometimes = [test for test, count in pairs if 0 < count < rule.tried]
-    effect = rule.effect_told
+    effect = rule.effect_text
     if not rule.tried or len(cured) == len(pairs):
         return effect
     if cured:

@@ -98,7 +98,7 @@ def _attempts(run: Run, found: TaskImprovement | None) -> Table:
         if attempt.unchanged or not failed:
             failed = _remark(attempt)
         if found is not None:
-            failed = failed or found.told_of(attempt.k, attempt.j)
+            failed = failed or found.text_of(attempt.k, attempt.j)
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
 

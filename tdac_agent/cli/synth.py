@@ -172,8 +172,8 @@ def _heading(task: Task, learner: str, optimizer: str | None) -> str:
         model += f", optimizer [bold]{escape(str(optimizer))}[/]"
     return (
         f"task [bold]{escape(display_name(task))}[/]: shortest path "
-        f"{setting.told(shortest_path_length(nominal))}, "
-        f"body radius {setting.told(nominal.body_radius)}, "
+        f"{setting.length_text(shortest_path_length(nominal))}, "
+        f"body radius {setting.length_text(nominal.body_radius)}, "
         f"at most {nominal.horizon} steps; "
         f"learner [bold]{escape(learner)}[/]{model}" + "".join(_remarks(task))
     )

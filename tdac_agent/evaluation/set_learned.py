@@ -122,7 +122,7 @@ class LearnedRuns:
     ) -> SetReport:
         began = time.monotonic()
         assert self.entrant.sha256 is not None
-        told, wrappers = self.salt is None, self.entrant.policy.wrappers
+        per_world, wrappers = self.salt is None, self.entrant.policy.wrappers
         about = {
             "policy": [self.entrant.sha256, wrappers],
             "set": self.tasks.sha256,
@@ -132,7 +132,7 @@ class LearnedRuns:
         }
         with unfinished(out, about) as driven:
             episodes = self._episodes(worlds, driven, watch)
-            if told and out is not None and driven is not None:
+            if per_world and out is not None and driven is not None:
                 keep_trajectories(driven / TRAJECTORIES, out)
         provenance = SetProvenance.unconfined(
             self.tasks, self.split, self.salt, self.entrant.sha256
@@ -140,9 +140,14 @@ class LearnedRuns:
         seconds = time.monotonic() - began
         different = self.tasks.different(self.split)
         report = summarise(
-            provenance, episodes, None, seconds, told=told, different=different
+            provenance,
+            episodes,
+            None,
+            seconds,
+            per_world=per_world,
+            different=different,
         )
-        if out is not None and told:
+        if out is not None and per_world:
             keep_report(report, out)
         elif out is not None:
             keep_sealed(episodes, out)
@@ -157,15 +162,17 @@ class LearnedRuns:
         """Drives the worlds that an interrupted call has not driven."""
         rows = None if kept is None else kept / ROWS_FILE
         episodes = kept_worlds(rows, tuple(range(worlds)))
-        told = self.salt is None
+        per_world = self.salt is None
         for index in range(len(episodes), worlds):
             before = time.process_time()
             rollout = self.drive(index)
             cpu = time.process_time() - before
-            if kept is not None and told:
+            if kept is not None and per_world:
                 (kept / TRAJECTORIES).mkdir(exist_ok=True)
                 rollout.trajectory.save(kept / TRAJECTORIES / f"{index}.npz")
-            found = figures_of(self.env, self.split, index, rollout, cpu, told=told)
+            found = figures_of(
+                self.env, self.split, index, rollout, cpu, per_world=per_world
+            )
             episodes.append(found)
             if rows is not None:
                 with rows.open("a", encoding="utf-8") as file:

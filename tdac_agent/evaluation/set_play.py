@@ -53,7 +53,7 @@ def play_world(
             worlds=(index,),
             controller=entrant.policy.file,
             test=None,
-            told=True,
+            per_world=True,
             tier=tier,
             limits=limits_of(tasks),
             out=folder / "results",

@@ -146,7 +146,7 @@ def summarise(
     test: SequentialTest | None,
     seconds: float,
     *,
-    told: bool,
+    per_world: bool,
     different: int | None = None,
     checks: Checks | None = None,
     clock_dependent: str | None = None,
@@ -158,7 +158,7 @@ def summarise(
         episodes: The episodes, in the order of worlds.
         test: The sequential test that may have stopped them.
         seconds: Wall time, s.
-        told: Whether single worlds may be reported.
+        per_world: Whether single worlds may be reported.
         different: Number of different worlds, if each is driven several times.
         checks: The static and contract tests. If one failed, there are no episodes.
         clock_dependent: See `clock_dependence`.
@@ -171,7 +171,7 @@ def summarise(
     groups: dict[str, list[WorldEpisode]] = {}
     for episode in episodes:
         groups.setdefault(episode.generator, []).append(episode)
-    if not told:
+    if not per_world:
         groups = {name: own for name, own in groups.items() if len(own) >= LEAST_GROUP}
     scored = test is None and bool(episodes)
     texts = [each.text or f"world {each.index}: {each.error}" for each in failed]
@@ -186,8 +186,8 @@ def summarise(
             {name: scores_of(group) for name, group in groups.items()} if scored else {}
         ),
         causes=dict(Counter(cause_of(episode) for episode in failed).most_common()),
-        told=checks.failures or (tuple(texts[:MOST_TOLD]) if told else ()),
-        episodes=tuple(episodes) if told else (),
+        told=checks.failures or (tuple(texts[:MOST_TOLD]) if per_world else ()),
+        episodes=tuple(episodes) if per_world else (),
         sequential=None if test is None else result_of(test, successes, len(failed)),
         child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),
         seconds=round(seconds, 3),

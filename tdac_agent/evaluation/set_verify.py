@@ -111,7 +111,7 @@ def verify_on_set(
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     source = read_source(controller)
     request = _Request(source, tasks, split, worlds, first, salt_file, tier)
-    if request.told:
+    if request.per_world:
         return _driven(request, out, judge, watch)
     _check_hiding(request)
     about = HiddenEvaluation(
@@ -144,7 +144,7 @@ class _Request:
     tier: str
 
     @property
-    def told(self) -> bool:
+    def per_world(self) -> bool:
         """Whether single worlds may be reported."""
         return self.split != "hidden"
 
@@ -152,7 +152,7 @@ class _Request:
     def hidden_folder(self) -> Path | None:
         """Folder of the hidden worlds, if they are files."""
         files = self.tasks.files
-        return None if files is None or self.told else files.hidden_folder
+        return None if files is None or self.per_world else files.hidden_folder
 
     @property
     def secret_sha256(self) -> str:
@@ -195,7 +195,7 @@ def _driven(
 ) -> SetReport:
     """Has the judge test and drive the controller, and keeps what it found."""
     began = time.monotonic()
-    tasks, worlds, told = request.tasks, request.worlds, request.told
+    tasks, worlds, per_world = request.tasks, request.worlds, request.per_world
     most = most_worlds(tasks, request.split)
     test = SequentialTest(tasks.file.bar, most) if worlds is None else None
     count = most if worlds is None else worlds
@@ -204,7 +204,7 @@ def _driven(
         "controller": sha256_of(request.source),
         "set": tasks.sha256,
         "worlds": [request.split, request.first, count],
-        "secret": None if told else request.secret_sha256,
+        "secret": None if per_world else request.secret_sha256,
         "sandbox": [request.tier, asdict(limits_of(tasks))],
         "versions": dict(versions()),
     }
@@ -222,11 +222,11 @@ def _driven(
             worlds=tuple(range(request.first, request.first + count)),
             controller=folder / "controller.py",
             test=test,
-            told=told,
+            per_world=per_world,
             tier=request.tier,
             limits=limits_of(tasks),
             out=folder / "results",
-            trajectories=kept if out is not None and told else None,
+            trajectories=kept if out is not None and per_world else None,
             hidden_folder=request.hidden_folder,
             kept=None if driven is None else driven.resolve() / ROWS_FILE,
         )
@@ -238,7 +238,7 @@ def _driven(
             set=tasks.name,
             set_sha256=tasks.sha256,
             split=request.split,
-            salt_sha256=None if told else request.secret_sha256,
+            salt_sha256=None if per_world else request.secret_sha256,
             controller_sha256=sha256_of(request.source),
             sandbox=ending.tier,
             limits=asdict(job.limits),
@@ -251,12 +251,12 @@ def _driven(
             ended,
             test,
             seconds,
-            told=told,
+            per_world=per_world,
             different=tasks.different(request.split),
             checks=checks,
             clock_dependent=clock,
         )
-        if out is not None and told:
+        if out is not None and per_world:
             keep_report(report, out)
             keep_trajectories(job.trajectories, out)
         elif out is not None:

@@ -116,7 +116,7 @@ def row_of(folder: Path) -> dict[str, Any]:
     }
 
 
-def variations_told(row: dict[str, Any]) -> str:
+def variations_text(row: dict[str, Any]) -> str:
     """What is added to the iteration in the row of a run, if it varies what works."""
     varied = row["variations"]
     return f", {varied} variation{'s' * (varied > 1)}" if varied else ""

@@ -56,7 +56,7 @@ class RepairRule(_Record):
     reason: str = Field("", description="Why it ended.")
 
     @property
-    def effect_told(self) -> str:
+    def effect_text(self) -> str:
         """The effect of the rule in words, for people and models."""
         if not self.tried:
             return "not tried yet"
@@ -162,7 +162,7 @@ class RuleBook(_Record):
             # The newest rules have not been tried yet.
             old = [rule for rule in rules if rule.born < newest] or rules
             worst = min(old, key=lambda rule: rule.benefit)
-            reason = f"{worst.effect_told}; no room for more rules"
+            reason = f"{worst.effect_text}; no room for more rules"
             book = book.change(worst.id, status="made room", ended=k, reason=reason)
         return book
 

@@ -29,7 +29,7 @@ def is_shown(low: float, p: float | None) -> bool:
     return low > 0.0 and (p is None or p <= MOST_P)
 
 
-def told_drive(time: float, reached: int, count: int) -> str:
+def drive_text(time: float, reached: int, count: int) -> str:
     """How a candidate drove, in one line.
 
     Args:
@@ -37,10 +37,10 @@ def told_drive(time: float, reached: int, count: int) -> str:
         reached: Number of disturbed episodes that reached the goal.
         count: Their number.
     """
-    return f"time score {time:.3f}; {told_goals(reached, count)}"
+    return f"time score {time:.3f}; {goals_text(reached, count)}"
 
 
-def told_goals(reached: int, count: int) -> str:
+def goals_text(reached: int, count: int) -> str:
     """How many disturbed episodes reached the goal."""
     return f"the goal reached in {reached} of {count} disturbed episodes"
 
@@ -126,12 +126,12 @@ class TaskImprovement(_Record):
         """(k, j) of the selected candidate."""
         return self.k, self.j
 
-    def told_of(self, k: int, j: int) -> str:
+    def text_of(self, k: int, j: int) -> str:
         """How a candidate drove that the search began with; empty for any other."""
         for each in self.members:
             if (each.k, each.j, each.parent) == (k, j, None):
                 reached = round(each.robustness * self.block)
-                return told_drive(each.time, reached, self.block)
+                return drive_text(each.time, reached, self.block)
         return ""
 
     @property

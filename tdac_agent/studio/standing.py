@@ -8,7 +8,7 @@ from typing import Any
 
 from tdac_agent.evaluation.kept_sets import ROWS_FILE, UNFINISHED
 from tdac_agent.html_report.names import candidate_name
-from tdac_agent.library.listing import variations_told
+from tdac_agent.library.listing import variations_text
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.run_record import JOURNAL, load_run
 from tdac_agent.storage.journal import read_records
@@ -33,7 +33,7 @@ def progress_of(row: dict[str, Any], running: bool) -> str:
     """
     if not row or "k" not in row:
         return "preparing the task …" if running else ""
-    text, varied = f"iteration {row['k']}", variations_told(row)
+    text, varied = f"iteration {row['k']}", variations_text(row)
     if row["status"] in ("verified", "selected"):
         text = f"in {text}{varied}, {row['seconds']:.0f} s"
     else:

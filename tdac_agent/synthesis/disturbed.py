@@ -11,7 +11,7 @@ from pathlib import Path
 from pydantic import ConfigDict, Field, ValidationError
 
 from tdac_agent.prompting.feedback import cut
-from tdac_agent.runs.improvement_record import told_goals
+from tdac_agent.runs.improvement_record import goals_text
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
@@ -75,7 +75,7 @@ class DisturbedEpisodes(PrintableRecord):
     @property
     def told(self) -> str:
         """The result in one line."""
-        return told_goals(self.reached, len(self.episodes))
+        return goals_text(self.reached, len(self.episodes))
 
     @property
     def failed(self) -> dict[str, int]:

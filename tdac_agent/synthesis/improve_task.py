@@ -18,7 +18,7 @@ from tdac_agent.runs.improvement_record import (
     MemberFigures,
     PairedChange,
     TaskImprovement,
-    told_drive,
+    drive_text,
 )
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.storage.files import write_atomic
@@ -162,7 +162,7 @@ class TaskExplorer:
         driven = candidate.driven = self.trials.explore(candidate)
         figures = TaskFigures.of(self.trials.tests.task, report, driven)
         if not varied:
-            said = told_drive(figures.time, driven.reached, len(driven.episodes))
+            said = drive_text(figures.time, driven.reached, len(driven.episodes))
             about = {"k": candidate.k, "j": candidate.j, "said": said}
             self.recorder.tell({"event": "improve.begin", **about})
         return Explored(figures, driven.told, passed=True, seed=seed)

@@ -182,7 +182,7 @@ class Setting(Protocol):
     def seen(self, observation: Observation) -> Observation:
         """Converts an observation of `make_env` to what a controller observes."""
 
-    def told(self, length: float) -> str:
+    def length_text(self, length: float) -> str:
         """Formats a length in the units that the user has chosen: `12 px`, `0.6 m`."""
 
     @property

@@ -222,7 +222,7 @@ def display_name(task: Task) -> str:
         name = f"{alias}, changed"
     elif name in bundled_tasks():
         name += ", not the bundled one"
-    tolerance = setting.told(task.nominal.goal_tolerance)
+    tolerance = setting.length_text(task.nominal.goal_tolerance)
     return f"{name} (map {setting.world_sha256()[:8]}, goal within {tolerance})"
 
 

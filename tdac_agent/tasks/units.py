@@ -113,7 +113,7 @@ class Units:
         """Formats a screen length as `amount` does, with its unit: `12.3 px`."""
         return f"{self.amount(length, decimals)} {self.length}"
 
-    def told(self, length: float) -> str:
+    def length_text(self, length: float) -> str:
         """Formats a length of the environment: `12 px`, `250 mm`, `0.61 m`."""
         return self.far(length * self.scale, 0)
 
@@ -122,9 +122,9 @@ class Units:
         if self.shown is not None:
             return self.shown.length(length)
         shown = length * self.scale
-        return f"{shown:.3g} {self.length}" if shown < 100 else self.told(length)
+        return f"{shown:.3g} {self.length}" if shown < 100 else self.length_text(length)
 
-    def told_place(self, x: float, y: float) -> str:
+    def place_text(self, x: float, y: float) -> str:
         """Formats a place of the environment: `(12, 34)`, `(0.12, -0.34)`."""
         if self.shown is not None:
             return self.shown.point(x, y)

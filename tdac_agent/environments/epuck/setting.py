@@ -80,7 +80,7 @@ class EPuckSetting:
         """Returns the observation, which is in metres anyway."""
         return observation
 
-    def told(self, length: float) -> str:
+    def length_text(self, length: float) -> str:
         """Formats a length in mm."""
         return METRES.figure(length)
 

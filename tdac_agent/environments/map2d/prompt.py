@@ -63,7 +63,7 @@ def facts_of(task: Task) -> dict[str, Any]:
             SENSORS_FILE.read_text(encoding="utf-8"),
             CONVERSIONS if setting.view is None else (),
         ),
-        "length": setting.told_in.length,
+        "length": setting.task_units.length,
         "frame": setting.params.frame,
         **({} if setting.view is None else _in_metres(setting)),
     }

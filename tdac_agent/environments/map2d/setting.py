@@ -98,13 +98,13 @@ class Map2DSetting:
         env = self.make_env()
         if self.view is None:
             return env
-        return Map2DEnv.of(replace(env.setup, metric=self.told_in.frame))
+        return Map2DEnv.of(replace(env.setup, metric=self.task_units.frame))
 
     def seen(self, observation: Observation) -> Observation:
         """See `Setting`."""
         return observation if self.view is None else self.view.seen(observation)
 
-    def told(self, length: float) -> str:
+    def length_text(self, length: float) -> str:
         """Formats a length in `shown_in`."""
         return self.shown.figure(length)
 
@@ -182,7 +182,7 @@ class Map2DSetting:
 
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
-        robot, units = self.nominal.robot, self.told_in
+        robot, units = self.nominal.robot, self.task_units
         length = units.written_length
         return {
             **as_option(movers_in(units, self.movers)),
@@ -201,7 +201,7 @@ class Map2DSetting:
 
     def ends(self) -> dict[str, Any]:
         """See `Setting`."""
-        nominal, units = self.nominal, self.told_in
+        nominal, units = self.nominal, self.task_units
         x, y, heading = nominal.start
         return {
             "start": [*units.written_place(x, y), units.heading(heading)],
@@ -210,7 +210,7 @@ class Map2DSetting:
         }
 
     @property
-    def told_in(self) -> MapUnits:
+    def task_units(self) -> MapUnits:
         """Units of a task file and of what a controller observes."""
         return MAP_PIXELS if self.view is None else MapUnits.metres(self.params)
 

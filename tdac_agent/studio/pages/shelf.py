@@ -12,7 +12,7 @@ from urllib.parse import quote
 from nicegui import events, ui
 
 from tdac_agent.campaign.drive import CONFIG_FILE
-from tdac_agent.library.listing import folders_of, row_of, variations_told
+from tdac_agent.library.listing import folders_of, row_of, variations_text
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
 from tdac_agent.studio.jobs import Job, jobs
@@ -141,7 +141,7 @@ def _cells(place: Path, row: dict[str, Any]) -> dict[str, Any]:
     iteration = f"iteration {row['k']}" if "k" in row else NONE
     if row["status"] not in ("verified", "selected") and "k" in row:
         iteration += f" of {row['iterations']}"
-    iteration += variations_told(row) if "k" in row else ""
+    iteration += variations_text(row) if "k" in row else ""
     cost = row.get("cost")
     return {
         "run": run,

@@ -54,7 +54,7 @@ from tdac_envs.movers.state import SPEED
 class SetJob(BaseModel):
     """Worlds to drive on; all paths are absolute.
 
-    `test` stops early. `told` is whether episodes may have a diagnosis. In `kept`,
+    `test` stops early. `per_world` is whether episodes may have a diagnosis. In `kept`,
     without a test, an interrupted job finds the episodes that it has driven already.
     """
 
@@ -67,7 +67,7 @@ class SetJob(BaseModel):
     worlds: tuple[int, ...]
     controller: Path
     test: SequentialTest | None
-    told: bool
+    per_world: bool
     tier: str
     limits: Limits
     out: Path
@@ -254,7 +254,9 @@ def drive_world(run: SetRun, index: int, skip: bool) -> WorldSummary:  # noqa: A
     rollout, cpu_seconds, tier = drive_once(run, index)
     late = rollout.outcome == "error" and rollout.timed_out
     job = run.job
-    figures = figures_of(run.env, job.split, index, rollout, cpu_seconds, told=job.told)
+    figures = figures_of(
+        run.env, job.split, index, rollout, cpu_seconds, per_world=job.per_world
+    )
     if run.job.trajectories is not None:
         run.job.trajectories.mkdir(parents=True, exist_ok=True)
         rollout.trajectory.save(run.job.trajectories / f"{index}.npz")
@@ -316,7 +318,7 @@ def figures_of(
     rollout: Rollout,
     cpu_seconds: float,
     *,
-    told: bool,
+    per_world: bool,
 ) -> WorldEpisode:
     """The figures of an episode that has just been driven.
 
@@ -326,7 +328,7 @@ def figures_of(
         index: Number of its world.
         rollout: The episode.
         cpu_seconds: CPU time of the policy, s.
-        told: Whether it may have a diagnosis.
+        per_world: Whether it may have a diagnosis.
     """
     world = env.setup.source.world(index)
     hard = world.difficulty
@@ -337,7 +339,7 @@ def figures_of(
     reached, failure = rollout.reached, {}
     if not reached:
         found = diagnose(rollout, env.task, shown_units(env.set.file, env.task))
-        failure = {"cause": found.cause, "text": found.text if told else None}
+        failure = {"cause": found.cause, "text": found.text if per_world else None}
     return WorldEpisode(
         index=index,
         generator=env.set.kind(split, index),

@@ -95,7 +95,7 @@ def test_a_task_in_metres_is_the_one_in_pixels(ros):
     assert task.nominal.goal == pytest.approx((130, 30))
     assert task.nominal.body_radius == pytest.approx(6.0)
     length = task.nominal.shortest
-    assert task.setting.told(length) == f"{round(0.1 * length, 2):g} m"
+    assert task.setting.length_text(length) == f"{round(0.1 * length, 2):g} m"
     assert "metres" not in task.setting.portable()
     with pytest.raises(RefusedError, match=r"radius of \d\.\d+ m") as caught:
         TaskFlags(**flags, **ends, robot_radius=4.0).load()

@@ -48,7 +48,7 @@ def test_lengths_and_places_of_a_frame():
     """y points up and headings are counter-clockwise, also in a rotated frame."""
     units = PIXELS.in_metres(FRAME)
     assert units.far(12.0) == "1.20 m"
-    assert units.told(12.0) == "1.2 m"
+    assert units.length_text(12.0) == "1.2 m"
     assert units.point(29.5, 29.5) == "(1.00, 6.00)"
     assert units.pose(29.5, 29.5, 0.5) == "1.00 6.00 -29"
     low, high = np.array([29.5, 29.5]), np.array([39.5, 49.5])

@@ -306,4 +306,4 @@ def test_rules_of_the_run(outline, hostile):
     """The life of each rule stands at the end."""
     shown = "".join(outline.shown)
     for rule in load_rules(hostile).rules:
-        assert rule.effect_told in shown
+        assert rule.effect_text in shown

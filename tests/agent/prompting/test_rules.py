@@ -219,28 +219,28 @@ def test_a_rule_remembers_its_life():
 def test_what_came_of_a_rule():
     """Each test of its evidence counts for itself; more failures than before, too."""
     book, _ = apply(RuleBook(), [add("one")], 1, ("a", "b", "c"))
-    assert book.rules[0].effect_told == "not tried yet"
+    assert book.rules[0].effect_text == "not tried yet"
     book = book.observed(("b", "c"), 3)
     rule = book.rules[0]
     assert (rule.tried, rule.cured, rule.worse, rule.passes) == (1, 0, 0, (1, 0, 0))
-    assert rule.effect_told == "cured 1 of 3 tests"
+    assert rule.effect_text == "cured 1 of 3 tests"
     book = book.observed(("c", "d", "e"), 2)
     rule = book.rules[0]
     assert (rule.tried, rule.cured, rule.worse, rule.passes) == (2, 0, 1, (2, 1, 0))
-    assert rule.effect_told == (
+    assert rule.effect_text == (
         "cured 1 of 3 tests in each of 2 tries, 1 more in some of them; more tests "
         "failed than before in 1 of them"
     )
     assert book.observed((), 2).rules[0].cured == 1
     edited, _ = apply(book, [edit("R1", "other")], 4, ("c",))
-    assert edited.rules[0].effect_told == "not tried yet"
+    assert edited.rules[0].effect_text == "not tried yet"
 
 
 def test_a_record_that_does_not_tell_tests_apart():
     """An older one counts all tests of a rule as one; it goes on from there."""
     book, _ = apply(RuleBook(), [add("one")], 1, ("a", "b"))
     old = book.change("R1", tried=2, cured=1)
-    assert old.rules[0].effect_told == (
+    assert old.rules[0].effect_text == (
         "cured 0 of 2 tests in each of 2 tries, 2 more in some of them"
     )
     assert old.observed(("b",), 9).rules[0].passes == (2, 1)

@@ -14,7 +14,7 @@ from small import write_small_task
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.html_report.page import make_page
-from tdac_agent.library.listing import row_of, variations_told
+from tdac_agent.library.listing import row_of, variations_text
 from tdac_agent.metrics import frames_of
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
@@ -173,7 +173,7 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
     assert frames.candidates["k"].tolist() == [1]
     row = row_of(out)
     assert (row["k"], row["variations"], row["tau"]) == (1, 6, 1)
-    assert variations_told(row) == ", 6 variations"
+    assert variations_text(row) == ", 6 variations"
     page = make_page(out).html.decode()
     assert "Variations of what works" in page
     assert "varies iteration 1" in page

@@ -54,7 +54,7 @@ def test_texts_use_it():
     """A place 10 px ahead and 5 px to the right of a robot that faces down."""
     units = PIXELS.from_start(StartFrame(Pose(100.0, 50.0, math.pi / 2)))
     assert units.point(95.0, 60.0) == "(10.0, 5.0)"
-    assert units.told_place(95.0, 60.0) == "(10, 5)"
+    assert units.place_text(95.0, 60.0) == "(10, 5)"
     assert units.pose(100.0, 50.0, math.pi / 2) == "0.0 0.0 0"
     assert units.far(12.34) == "12.3 px"
     assert units.figure(12.34) == "12.3 px"

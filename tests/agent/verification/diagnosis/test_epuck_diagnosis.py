@@ -234,4 +234,4 @@ def test_units_go_there_and_back():
     low, high = np.array([10.0, -50.0]), np.array([20.0, 30.0])
     assert METRES.box(low, high) == "x 0.010 to 0.020, y -0.030 to 0.050"
     assert PIXELS.box(low, high, less=1) == "x 10 to 20, y -50 to 30"
-    assert METRES.told(1.2345) == "1234 mm"
+    assert METRES.length_text(1.2345) == "1234 mm"
