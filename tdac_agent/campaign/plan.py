@@ -22,7 +22,7 @@ from tdac_agent.prompting.prompt import (
     generate_prompt,
     load_template,
 )
-from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.runs.run_record import Setting
 from tdac_agent.tasks.setting import Setting as TaskSetting
 from tdac_agent.tasks.task import Task, load_task
@@ -277,6 +277,7 @@ def setting_of(about: Task | TaskSet) -> TaskSetting | TaskSet:
 def _question(about: Task | TaskSet, template: PromptTemplate) -> str:
     """The first question on a task or task set."""
     if isinstance(about, TaskSet):
+        check_generated(about)
         return set_prompt(about, (), template)
     return generate_prompt(about, (), template)
 

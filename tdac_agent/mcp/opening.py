@@ -15,7 +15,7 @@ from tdac_agent.mcp.on_task import EPISODES_EACH, OnTask
 from tdac_agent.mcp.watch import Watch
 from tdac_agent.models.budget import Budget
 from tdac_agent.prompting.prompt import FULL
-from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.resume import check_same, existing_run, recorded_task
@@ -156,6 +156,7 @@ def _on_task(task: Task, out: Path, episodes: int) -> _Opening:
 
 def _on_set(tasks: TaskSet, out: Path, episodes: int) -> _Opening:
     whole_number("episodes", episodes, 1, MOST_EPISODES)
+    check_generated(tasks)
     run = new_run(
         (Outside(), Outside()),
         set_prompt(tasks, (), FULL),

@@ -18,7 +18,7 @@ from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import JUDGED, MOST_EPISODES, verify_on_set
 from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.prompt import FULL, generate_prompt
-from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
 from tdac_agent.set_synthesis.trials import BLOCKS
 from tdac_agent.synthesis.loop import synthesize
@@ -171,6 +171,7 @@ class LevelProblem:
 
     def question(self) -> str:
         """See `Problem`."""
+        check_generated(self.tasks)
         return set_prompt(self.tasks, (), FULL)
 
     def files(self) -> dict[str, bytes]:

@@ -9,18 +9,20 @@ from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, TABLE
 from tdac_envs.epuck.observed import ENCODER_STEP
 from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import SetFile
+from tdac_envs.ladder.task_sets import TaskSet
 
 
-def observation_rows(file: SetFile) -> Iterator[str]:
+def observation_rows(tasks: TaskSet) -> Iterator[str]:
     """Yields the rows of the table of observations."""
-    rows = {**_places(file), **_readings(file)}
+    file = tasks.file
+    rows = {**_places(file, tasks.largest_side), **_readings(file)}
     for key in sorted(file.observed):
         yield f"| `{key}` | {' | '.join(rows[key])} |"
 
 
-def _places(file: SetFile) -> dict[str, tuple[str, str, str, str]]:
-    """Rows of what all robots observe."""
-    side, unit = file.largest_side, file.unit
+def _places(file: SetFile, side: float) -> dict[str, tuple[str, str, str, str]]:
+    """Rows of what all robots observe, in worlds with sides of at most `side`."""
+    unit = file.unit
     decimals = 0 if unit == "px" else 2
     far = math.ceil(math.hypot(side, side) * 10**decimals) / 10**decimals
     low = -0.5 if unit == "px" else -side / 2

@@ -24,7 +24,6 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.infrared import PLACES, TABLE
 from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.robots import EPuckParams
-from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.task_sets import TaskSet
 
 SET_TEMPLATE = "set"
@@ -45,13 +44,7 @@ def set_prompt(
 
     Raises:
         PromptError: The template is broken, or there is none of this name for sets.
-        TaskError: The set's worlds are in files, which are too few.
     """
-    if tasks.files is not None:
-        raise TaskError(
-            f"the worlds of {tasks.name} are in files, and too few to write a "
-            "controller with; write it for generated worlds, then `tdac verify --set`"
-        )
     if template.text is None:
         if template.name != "full":
             raise PromptError(
@@ -62,16 +55,31 @@ def set_prompt(
     return fill_in(template, set_context(tasks), rules)
 
 
+def check_generated(tasks: TaskSet) -> None:
+    """Checks that a set has enough worlds to try controllers on while they are written.
+
+    Raises:
+        TaskError: Its worlds are in files, which are too few.
+    """
+    if tasks.files is not None:
+        raise TaskError(
+            f"the worlds of {tasks.name} are in files, and too few to write a "
+            "controller with; write it for generated worlds, or with the prompt that "
+            "`tdac synth --set NAME --dry-run` prints, then `tdac verify --set`"
+        )
+
+
 def set_context(tasks: TaskSet) -> dict[str, Any]:
     """Returns the template variables of a task set."""
     file, limits = tasks.file, Limits()
     return {
         "name": tasks.name,
         "file": file,
-        **_robot(file),
+        "found": tasks.files is not None,
+        **_robot(tasks),
         "unit": file.unit,
         "full_step": file.full_step,
-        "observation_rows": list(observation_rows(file)),
+        "observation_rows": list(observation_rows(tasks)),
         "disturbances": list(disturbance_lines(file)),
         "params_text": json.dumps(level_params(file), indent=2),
         "allowed_imports": " ".join(sorted(ALLOWED_IMPORTS - NOT_SUPPLIED)),
@@ -85,15 +93,16 @@ def set_context(tasks: TaskSet) -> dict[str, Any]:
     }
 
 
-def _robot(file: SetFile) -> dict[str, Any]:
+def _robot(tasks: TaskSet) -> dict[str, Any]:
     """Variables of the robot and its worlds."""
+    file = tasks.file
     robot = file.robot
     if not isinstance(robot, EPuckParams):
         return {
             "robot": robot,
             "turn": 2.0 * file.full_step / robot.axle_length,
             "ray_step": robot.field_of_view_deg / max(1, robot.n_rays - 1),
-            "side": file.largest_side,
+            "side": tasks.largest_side,
         }
     floors = [each for each in file.worlds if isinstance(each, Plates)]
     table = TABLE.tolist()

@@ -15,7 +15,7 @@ from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.given_rules import given_lines
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.rules import RuleBook
-from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.runs.recorder import Event
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
@@ -126,7 +126,7 @@ def synthesize_on_set(
         `controller` is the selected one.
 
     Raises:
-        TaskError: A number is out of range.
+        TaskError: A number is out of range, or the set's worlds are in files.
         RunError: The folder cannot be used, or contains another run.
         ProviderError: A model cannot be used, or pictures would have no effect.
         PriceError: The user's price file is broken.
@@ -137,6 +137,7 @@ def synthesize_on_set(
     block = whole_number("feedback_episodes", feedback_episodes, 1, MOST_EPISODES)
     if improve:
         whole_number("improve", improve, LEAST_IMPROVE, MOST_EPISODES)
+    check_generated(tasks)
     template, book = load_template(prompt), rules or RuleBook()
     models = choose_models(
         learner, optimizer, tasks, base_url, key_over_http=key_over_http

@@ -17,7 +17,7 @@ from tdac_envs import load_set
 from tdac_envs.ladder.set_file import set_names
 
 
-@pytest.mark.parametrize("name", set_names())
+@pytest.mark.parametrize("name", [*set_names(), "barn", "barn-slow"])
 def test_a_prompt_has_all_of_its_level(name):
     """The table of observations is that of the environment, and so are the limits."""
     tasks = load_set(name)
@@ -39,6 +39,16 @@ def test_a_prompt_has_all_of_its_level(name):
     assert "import sensors" not in text
     assert ("infra-red" in text) == ("ps" in file.observed)
     assert max(map(len, text.splitlines())) < 400
+
+
+def test_worlds_from_files():
+    """Nothing is promised that is only true of generated worlds."""
+    for name, generated in (("unknown", True), ("barn", False)):
+        text = set_prompt(load_set(name), (), FULL)
+        assert ("The straight drive to" in text) == generated
+        assert ("several kinds in turn" in text) == generated
+        assert ("It is at least 60." in text) == generated
+        assert ("whether there are dead ends, is not" in text) != generated
 
 
 def test_disturbances_are_told_with_distribution_and_size(tmp_path):

@@ -106,9 +106,8 @@ def test_mistakes_are_one_line(tdac, words, message):
     assert message in err
 
 
-@pytest.mark.parametrize("further", [("--dry-run",), ()])
-def test_worlds_in_files_are_too_few(tdac, tmp_path, further):
-    """A controller is written for generated worlds; nothing is asked or made."""
+def test_worlds_in_files_are_too_few(tdac, tmp_path):
+    """The prompt is printed, but no run begins."""
     cells = np.zeros((80, 120), np.uint8)
     cells[3:-3, 3:-3] = 255
     cv2.imwrite(str(tmp_path / "plan.png"), cells)
@@ -116,7 +115,10 @@ def test_worlds_in_files_are_too_few(tdac, tmp_path, further):
     (tmp_path / "index.json").write_text(json.dumps([entry]))
     path = tmp_path / "mine.yaml"
     path.write_text("schema: 1\nname: mine\nworlds: {folder: .}\n")
-    code, _, err = tdac("synth", "--set", path, "--out", tmp_path / "run", *further)
+    code, prompt, _ = tdac("synth", "--set", path, "--dry-run")
+    assert code == 0
+    assert "at most 120 px wide and high" in prompt
+    code, _, err = tdac("synth", "--set", path, "--out", tmp_path / "run")
     assert (code, len(err.splitlines())) == (2, 1)
     assert "the worlds of mine are in files" in err
     assert not (tmp_path / "run").exists()
