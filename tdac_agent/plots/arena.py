@@ -10,11 +10,11 @@ from matplotlib.ticker import MaxNLocator
 
 from tdac_agent.plots.style import (
     COLOURS,
-    LINES,
     MARKERS,
     TEXT,
     apply_style,
     legend_above,
+    line_style,
     new_plot,
 )
 
@@ -79,7 +79,7 @@ def plot_scores(rows: pd.DataFrame) -> Figure:
 
 def _dot(axes: Axes, own: pd.DataFrame, entrant: str, place: float) -> None:
     if entrant not in own.index or pd.isna(own.loc[entrant, "time"]):
-        axes.text(0.01, place, "–", va="center", fontsize=8, color="#888888")
+        axes.text(0.5, place, "–", ha="center", va="center", fontsize=8, color="#888")
         return
     row = own.loc[entrant]
     kind = list(_KINDS).index(row["kind"])
@@ -107,7 +107,8 @@ def plot_difficulty(worlds: pd.DataFrame, name: str) -> Figure:
     own = worlds[worlds["set"] == name]
     figures = [key for key in DIFFICULTY if own[key].nunique() > BINS]
     figure, panels = _panels(len(figures), 2.4, 2.1, left=0.4)
-    entrants = list(own["entrant"].drop_duplicates())
+    reached = own.groupby("entrant", sort=False)["success"].mean()
+    entrants = list(reached.sort_values(ascending=False, kind="stable").index)
     for axes, key in zip(panels, figures, strict=False):
         for number, entrant in enumerate(entrants):
             rows = own[own["entrant"] == entrant]
@@ -115,8 +116,7 @@ def plot_difficulty(worlds: pd.DataFrame, name: str) -> Figure:
             axes.plot(
                 centres,
                 success,
-                MARKERS[number % len(MARKERS)] + LINES[number % len(LINES)],
-                color=COLOURS[number % len(COLOURS)],
+                **line_style(number),
                 markersize=3.5,
                 linewidth=1.2,
                 label=_short(entrant),
@@ -150,25 +150,31 @@ def plot_training(rows: pd.DataFrame) -> Figure:
     learned = rows[(rows["kind"] == "learned") & rows["steps"].notna()]
     learned = learned[learned["time"].notna()]
     sets = list(learned["set"].drop_duplicates())
+    entrants = list(learned["entrant"].drop_duplicates())
+    most = (learned["steps"] / learned["files"]).max() / 1e6
     figure, panels = _panels(len(sets), 2.4, 2.1, left=0.4)
     for axes, name in zip(panels, sets, strict=False):
-        for number, row in enumerate(learned[learned["set"] == name].itertuples()):
+        for row in learned[learned["set"] == name].itertuples():
+            style = line_style(entrants.index(row.entrant))
             axes.errorbar(
-                row.steps / row.files,
+                row.steps / row.files / 1e6,
                 row.time,
                 yerr=[[row.time - row.low], [row.high - row.time]],
-                fmt=MARKERS[number % len(MARKERS)],
-                color=COLOURS[number % len(COLOURS)],
+                **{**style, "linestyle": "none"},
                 label=_short(row.entrant),
             )
         best = rows[(rows["set"] == name) & (rows["kind"] != "learned")]["time"].max()
         if not pd.isna(best):
             axes.axhline(best, color="#666666", linewidth=1, linestyle="--")
         axes.set_title(name, loc="left", fontsize=9.5, color=TEXT)
-        axes.set_xscale("log")
+        axes.set_xlim(0, 1.1 * most)
+        axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.set_ylim(0, 1)
     legend_above(figure, panels, 4)
-    label = "simulated steps of a training (log); dashed: the best other entrant"
+    label = (
+        "millions of steps to the kept policy, mean of its trainings; "
+        "dashed: the best other entrant"
+    )
     figure.supxlabel(label, fontsize=9, color=TEXT)
     figure.supylabel("time score, 95 % intervals", fontsize=9, color=TEXT)
     return figure

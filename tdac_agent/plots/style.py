@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
@@ -71,6 +72,17 @@ def colours_of(names: Iterable[str]) -> dict[str, str]:
     """A colour for each name, in the order of the names."""
     unique = dict.fromkeys(names)
     return {name: COLOURS[n % len(COLOURS)] for n, name in enumerate(unique)}
+
+
+def line_style(number: int) -> dict[str, Any]:
+    """Colour, marker and line of one of up to 49 lines, no two of them alike."""
+    again, own = divmod(number, len(COLOURS))
+    return {
+        "color": COLOURS[own],
+        "marker": MARKERS[(own + again) % len(MARKERS)],
+        "linestyle": LINES[number % len(LINES)],
+        "markerfacecolor": "white" if again % 2 else COLOURS[own],
+    }
 
 
 def legend(axes: Axes, count: int) -> None:

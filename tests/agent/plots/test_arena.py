@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from tdac_agent.plots.arena import BINS, plot_difficulty, plot_scores, plot_training
+from tdac_agent.plots.style import line_style
 
 
 @pytest.fixture
@@ -42,9 +43,28 @@ def test_scores(rows):
 def test_training(rows):
     """Steps of one training, beside the best entrant that did not learn."""
     known, lost = plot_training(rows).axes[:2]
-    assert marks(known) == [(2e6, 0.7)]
-    assert marks(lost) == [(2e6, 0.65)]
+    assert marks(known) == [(2.0, 0.7)]
+    assert marks(lost) == [(2.0, 0.65)]
     assert known.lines[-1].get_ydata()[0] == 0.9
+
+
+def test_an_entrant_looks_alike_on_all_sets(rows):
+    """Also where others are missing; and no two of many look alike."""
+    other = rows[rows["kind"] == "learned"].assign(entrant="sac")
+    both = pd.concat([rows, other])
+    panels = plot_training(both[(both["set"] == "known") | (both["entrant"] == "sac")])
+    known, lost = panels.axes[:2]
+    looks = [
+        {
+            bar.get_label(): (bar[0].get_color(), bar[0].get_marker())
+            for bar in axes.containers
+        }
+        for axes in (known, lost)
+    ]
+    assert looks[1].items() <= looks[0].items()
+    assert looks[1].keys() == {"sac"}
+    styles = [tuple(sorted(line_style(number).items())) for number in range(49)]
+    assert len({*styles}) == 49
 
 
 def test_difficulty():
