@@ -10,10 +10,11 @@ from typing import Any
 
 import pandas as pd
 
+from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.training.curve import CURVE_FILE, read_curve
 from tdac_agent.training.hyperparameters import Algo
 from tdac_agent.training.plan import make_plan, read_plan
-from tdac_agent.training.policy_files import FACTS, POLICY
+from tdac_agent.training.policy_files import FACTS
 from tdac_agent.training.train import train
 from tdac_envs.drive.rewards import RewardWeights
 

@@ -21,10 +21,11 @@ from pathlib import Path
 from typing import cast
 
 from benchmarks.baseline_trainings import finished
+from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.training.curve import CURVE_FILE, PLAN_FILE
 from tdac_agent.training.hyperparameters import Algo
 from tdac_agent.training.plan import TrainingPlan
-from tdac_agent.training.policy_files import FACTS, POLICY
+from tdac_agent.training.policy_files import FACTS
 from tdac_agent.training.set_plan import make_set_plan
 from tdac_agent.training.train import train
 

@@ -14,8 +14,9 @@ from tdac_agent.bench.privileged import (
 )
 from tdac_agent.bench.record import Kind
 from tdac_agent.bench.rivals import rival_names, rival_on
+from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.evaluation.entrants import BUILTIN, Entrant
+from tdac_agent.evaluation.entrants import BUILTIN, Entrant, is_training, nothing
 from tdac_agent.evaluation.set_entrants import set_entrants
 from tdac_agent.evaluation.set_learned import LearnedRuns
 from tdac_agent.evaluation.set_report import SetReport
@@ -54,8 +55,8 @@ class Named:
 
     Attributes:
         name: Its name in results.
-        words: A file, a run folder, or the name of a program of ours; several are
-            policies that were trained alike with several seeds.
+        words: A file, the folder of a run or training, or the name of a program of
+            ours; several are policies that were trained alike with several seeds.
     """
 
     name: str
@@ -82,6 +83,12 @@ class Member:
     lineage: str | None = None
     learned: Entrant | None = None
     tuned: bool | None = None
+
+    @property
+    def algo(self) -> str | None:
+        """Algorithm of its training, if it is known."""
+        saved = None if self.learned is None else self.learned.saved
+        return None if saved is None else saved.algo
 
     @property
     def steps(self) -> int | None:
@@ -118,7 +125,9 @@ def named(words: Sequence[str]) -> tuple[Named, ...]:
 def _named(word: str) -> Named:
     name, equals, files = word.partition("=")
     if not equals or Path(word).exists():
-        return Named(Path(word).name or word, (word,))
+        path = Path(word).absolute()
+        # Every training calls its policy the same.
+        return Named(path.parent.name if path.name == POLICY else path.name, (word,))
     return Named(name, tuple(file for file in files.split(",") if file))
 
 
@@ -130,14 +139,11 @@ def _check(word: str) -> None:
     Raises:
         ControllerFileError: There is none.
     """
-    if word == BUILTIN or Path(word).is_file():
+    path = Path(word)
+    if word == BUILTIN or path.is_file() or is_training(path):
         return
-    if not (Path(word) / "controller.py").is_file():
-        known = ", ".join((BUILTIN, *rival_names()))
-        raise ControllerFileError(
-            f"no entrant {word!r}: expected a controller.py, a run folder, a .zip of "
-            f"stable-baselines3, or one of {known}"
-        )
+    if not (path / "controller.py").is_file():
+        raise ControllerFileError(nothing("entrant", word, (BUILTIN, *rival_names())))
 
 
 def member_of(word: str, tasks: TaskSet) -> Member:

@@ -8,19 +8,55 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from tdac_agent.bench.arena import folder_of, sealed_episodes, world_rows
+from tdac_agent.bench.arena import DRIVEN, folder_of, sealed_episodes, world_rows
 from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, publish
 from tdac_agent.bench.compared import Driven, overall_of, pairs_of
 from tdac_agent.bench.figures import draw_figures
+from tdac_agent.bench.page import write_page
 from tdac_agent.bench.record import Bench, BenchRow, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.salt import SEALED
-from tdac_agent.storage.locks import LOCK_FILE
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.locks import LOCK_FILE, own_folder
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.source import read_salt
+
+_COMPARED = {
+    "sha256": "version",
+    "split": "split",
+    "worlds": "number of worlds",
+    "salt_sha256": "salt",
+}
+"""What all benches of a set have in common, and its name in messages."""
+
+
+def write_merged(folders: Sequence[Path], out: Path) -> Bench:
+    """Writes the results in folders as one bench: tables, figures and a page.
+
+    The page has no replays.
+
+    Args:
+        folders: Folders of benches.
+        out: Folder for `bench.json`, `worlds.csv`, figures and `bench.html`.
+
+    Raises:
+        RunError: As for `merged`; or `out` is the folder of a bench, or cannot be
+            written.
+    """
+    found = merged(folders)
+    table = pd.concat([_table(folder) for folder in folders])
+    table = table.drop_duplicates(["set", "entrant", "file", "index"])
+    with own_folder(out, "bench"):
+        if any((out / name).exists() for name in (DRIVEN, SEALED)):
+            raise RunError(f"{out} has a bench of its own: give another --out")
+        figures = draw_figures(found, table, out)
+        write_page(found, {}, {}, figures, out)
+        write_atomic(out / WORLD_TABLE, table.to_csv(index=False))
+        write_atomic(out / RESULTS, found.model_dump_json(indent=2) + "\n")
+    return found
 
 
 def merged(folders: Sequence[Path]) -> Bench:
@@ -86,15 +122,21 @@ def _same_sets(folders: Sequence[Path], found: Sequence[Bench]) -> dict[str, Ben
     for folder, each in zip(folders, found, strict=True):
         for own in each.sets:
             before = sets.setdefault(own.name, own)
-            if before != own:
-                version = before.sha256 != own.sha256
-                what = "version" if version else "split, number or salt of its worlds"
+            for key, what in _COMPARED.items():
+                one, other = getattr(before, key), getattr(own, key)
+                if one == other:
+                    continue
                 raise RunError(
-                    f"{folder / RESULTS}: the set {own.name!r} differs in the {what} "
-                    "from the earlier folders; show them one at a time"
+                    f"{folder / RESULTS}: the set {own.name!r} differs from that of "
+                    f"the earlier folders in its {what} ({_short(other)}, not "
+                    f"{_short(one)}); show them one at a time"
                 )
     levels = [name for name in set_names() if name in sets]
     return {name: sets[name] for name in dict.fromkeys([*levels, *sets])}
+
+
+def _short(value: object) -> str:
+    return value[:8] if isinstance(value, str) else str(value)
 
 
 def _table(folder: Path) -> pd.DataFrame:

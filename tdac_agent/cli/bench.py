@@ -15,7 +15,7 @@ from rich.table import Table
 from tdac_agent.bench.bench import RESULTS, SALT, TIMING, WORLD_TABLE, bench
 from tdac_agent.bench.page import PAGE
 from tdac_agent.bench.record import Bench, BenchPair, BenchRow, BenchSet, Interval
-from tdac_agent.bench.shown import merged
+from tdac_agent.bench.shown import merged, read, write_merged
 from tdac_agent.bench.shown import reveal as reveal_folder
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
@@ -73,6 +73,7 @@ def run(
             line = f"{doing}, {successes} of {worlds} reached"
             progress.print(line, highlight=False, soft_wrap=True)
 
+    before = read(folder) if (folder / RESULTS).is_file() else None
     with ChildPool() as child_pool, WarmJudge(child_pool) as judge, bar:
         found = bench(
             entrants,
@@ -92,6 +93,7 @@ def run(
     else:
         show(found, console)
         _say_where(folder, salt_file, console)
+        _say_replaced(before, found, folder, console)
     return 0 if any(each.time for each in found.rows) else 1
 
 
@@ -108,13 +110,37 @@ def _say_where(folder: Path, salt_file: Path | None, console: Console) -> None:
         console.print(line, soft_wrap=True, highlight=False)
 
 
-def show_folders(folders: Sequence[Path], as_json: bool) -> int:
-    """Prints results again; returns 0."""
-    found = merged(folders)
+def _say_replaced(
+    before: Bench | None, found: Bench, folder: Path, console: Console
+) -> None:
+    """Prints which earlier results of the folder are not among the new ones."""
+    if before is None:
+        return
+    others = [own for own in before.sets if own not in found.sets]
+    for own in others:
+        worlds = "world" if own.worlds == 1 else "worlds"
+        text = f"{own.worlds} {worlds} of {own.split} of {own.name} {own.sha256[:8]}"
+        print_sentences(console, f"These results replace those on {text}.")
+    there = {row.entrant for row in found.rows}
+    gone = [name for name in before.entrants if name not in there]
+    if gone and not others:
+        print_sentences(
+            console,
+            f"These results replace those of {', '.join(gone)}. What they did is kept "
+            f"in {folder}: name them as well, and nothing is driven again.",
+        )
+
+
+def show_folders(folders: Sequence[Path], out: Path | None, as_json: bool) -> int:
+    """Prints results again, and writes those of several folders together; returns 0."""
+    found = merged(folders) if out is None else write_merged(folders, out)
     if as_json:
         sys.stdout.write(found.model_dump_json(indent=2) + "\n")
     else:
-        show(found, Console())
+        console = Console()
+        show(found, console)
+        if out is not None:
+            _say_where(out, None, console)
     return 0
 
 
@@ -156,8 +182,9 @@ def show(found: Bench, console: Console) -> None:
         console.print()
         console.print(_pairs(first, pairs))
         text = (
-            "on the same worlds; p by bootstrap, adjusted for all pairs of a set "
-            f"(Holm). All pairs are in {RESULTS}."
+            "on the same worlds; p by bootstrap, at least the smallest one of a sign "
+            "test on so many worlds, adjusted for all pairs of a set (Holm). All "
+            f"pairs are in {RESULTS}."
         )
         print_sentences(console, text)
 

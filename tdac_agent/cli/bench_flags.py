@@ -28,7 +28,8 @@ def run_command(
         list[str],
         typer.Argument(
             metavar="ENTRANT...",
-            help="Controller files, run folders, .zip files of stable-baselines3, "
+            help="Controller files, folders of runs and trainings, .zip files of "
+            "stable-baselines3, "
             "`builtin`, or a classical planner: `go-to-goal`, `tangent-bug`, "
             "`follow-the-gap`, `dwa`, `mppi`, `orca`; `privileged` is a planner that "
             "knows all movers. NAME=FILE names an entrant; "
@@ -99,18 +100,24 @@ def run_command(
 
 
 @bench_app.command(
-    "show", epilog="Examples: `tdac bench show bench-1`; `tdac bench show mine theirs`"
+    "show",
+    epilog="Examples: `tdac bench show bench-1`; "
+    "`tdac bench show mine theirs --out both`",
 )
 def show_command(
     folders: Annotated[
         list[Path], typer.Argument(metavar="DIR...", help="Folders with results.")
     ],
+    out: Annotated[
+        Optional[Path],  # noqa: UP045 - typer reads it at run time
+        dir_flag("--out", help="Folder for the tables, figures and page of them all."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Show results again, or those of several folders together."""
     from tdac_agent.cli import bench
 
-    raise typer.Exit(bench.show_folders(folders, as_json))
+    raise typer.Exit(bench.show_folders(folders, out, as_json))
 
 
 @bench_app.command(

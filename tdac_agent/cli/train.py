@@ -18,6 +18,7 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.evaluate import wrapper_names
 from tdac_agent.cli.flags import flag
 from tdac_agent.cli.set_flags import check_set
+from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.training.curve import Point
 from tdac_agent.training.plan import (
@@ -26,7 +27,6 @@ from tdac_agent.training.plan import (
     make_plan,
     read_plan,
 )
-from tdac_agent.training.policy_files import POLICY
 from tdac_agent.training.set_plan import SELECTED, TRAINED, make_set_plan, set_of
 from tdac_agent.training.train import check_extra, train
 from tdac_envs.core.errors import TaskError
@@ -200,11 +200,11 @@ def _show(
             highlight=False,
             soft_wrap=True,
         )
+    given = shlex.quote(str(file))
     names = " ".join(f"--task {shlex.quote(name)}" for name in plan.tasks)
-    others = "follow-guidance reference"
+    command = f"tdac evaluate {given} follow-guidance reference {names}"
     if plan.set is not None:
-        names, others = f"--set {shlex.quote(plan.set)}", "builtin"
-    command = f"tdac evaluate {shlex.quote(str(file))} {others} {names}"
+        command = f"tdac bench {given} builtin --set {shlex.quote(plan.set)}"
     line = escape(f"to compare: {command}")
     console.print(line, soft_wrap=True, highlight=False)
 

@@ -24,6 +24,8 @@ from tdac_envs.core.intake import TEXT_BYTES, one_line, parse_json, read_file, r
 
 METADATA = "tdac.json"
 WEIGHTS = "policy.pth"
+POLICY = "policy.zip"
+"""Its name in the folder of a training."""
 DATA = "data"
 MOST_BYTES = 128_000_000
 """Largest size of the file, and of its unpacked parts together."""
@@ -89,12 +91,14 @@ class SavedNetwork:
 
     Attributes:
         saved: Metadata, or None.
+        complete: Whether the metadata is in the file itself.
         module: Module of the network's class.
         settings: Arguments of that class that the file states.
         weights: Bytes of a torch file.
     """
 
     saved: SavedPolicy | None
+    complete: bool
     module: str
     settings: Settings
     weights: bytes
@@ -123,7 +127,7 @@ def read_policy(file: Path) -> SavedNetwork:
     except ValueError as error:
         message = f"the policy {str(file)!r} cannot be used: {one_line_reason(error)}"
         raise ControllerFileError(message) from error
-    return SavedNetwork(saved, module, settings, parts[WEIGHTS])
+    return SavedNetwork(saved, METADATA in parts, module, settings, parts[WEIGHTS])
 
 
 def read_metadata(file: Path) -> SavedPolicy | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,6 +11,7 @@ from pathlib import Path
 from tdac_agent.episodes.learned import check_kind
 from tdac_agent.episodes.sb3_file import (
     MOST_BYTES,
+    POLICY,
     SavedPolicy,
     load_weights,
     read_policy,
@@ -64,7 +66,8 @@ def entrants_of(
 
     Args:
         policies: `reference`, `builtin`, `random`, `go-to-goal`, `follow-guidance`,
-            controller files, run folders, policies saved by stable-baselines3.
+            controller files, folders of runs and trainings, policies saved by
+            stable-baselines3.
         wrappers: Wrappers of saved policies that do not record their own.
 
     Raises:
@@ -91,16 +94,13 @@ def _entrant(given: str, wrappers: Sequence[str] | None) -> Entrant:
     if given == BUILTIN:
         return Entrant(given, PolicySpec("controller"))
     path = Path(given)
+    if is_training(path):
+        return _learned(given, path / POLICY, wrappers)
     if path.is_dir():
         found = _controller(given, path / "controller.py")
         return replace(found, env=_env_of(path), set_file=_set_of(path))
     if not path.is_file():
-        names = (*OURS, BUILTIN)
-        raise ControllerFileError(
-            f"no policy {given!r}: expected a controller.py, a run folder, a .zip of "
-            f"stable-baselines3, or one of {', '.join(sorted(names))}"
-            f"{hint(given, names)}"
-        )
+        raise ControllerFileError(nothing("policy", given, sorted((*OURS, BUILTIN))))
     if path.suffix == ".zip":
         return _learned(given, path, wrappers)
     if path.suffix != ".py":
@@ -109,6 +109,28 @@ def _entrant(given: str, wrappers: Sequence[str] | None) -> Entrant:
             ".zip of stable-baselines3)"
         )
     return _controller(given, path)
+
+
+def is_training(path: Path) -> bool:
+    """Whether a folder has a trained policy, and no controller."""
+    return (path / POLICY).is_file() and not (path / "controller.py").exists()
+
+
+def nothing(what: str, given: str, names: Sequence[str]) -> str:
+    """The message that there is no such file or program of ours.
+
+    Args:
+        what: What it should be.
+        given: The word of the user.
+        names: Our programs.
+    """
+    if any(mark in given for mark in "/."):
+        return f"no {what} {given!r}: there is no such file or folder"
+    return (
+        f"no {what} {given!r}: expected a controller.py, the folder of a run or "
+        f"training, a .zip of stable-baselines3, or one of {', '.join(names)}"
+        f"{hint(given, names)}"
+    )
 
 
 def _controller(name: str, file: Path) -> Entrant:
@@ -142,13 +164,19 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     else:
         known = ", ".join(WRAPPERS)
         raise ControllerFileError(
-            f"{name!r} does not say which observations it was trained with: give "
-            f"--wrapper NAME for each of its wrappers ({known}), or --wrapper none"
+            f"{name!r} does not say which observations it was trained with: write them "
+            f"to {file.with_suffix('.json').name} beside it, such as "
+            '{"algo": "ppo", "wrappers": ["goal-relative", "flatten"]} '
+            f"(wrappers: {known}; [] without any), or give tdac evaluate --wrapper NAME"
         )
     check_wrappers(names)
     check_kind(found)
     load_weights(found.weights)
-    sha256 = sha256_of(read_file(file, MOST_BYTES))
+    content = read_file(file, MOST_BYTES)
+    if not found.complete:
+        # The same network with other observations is another policy.
+        content += json.dumps(names).encode()
+    sha256 = sha256_of(content)
     return Entrant(name, PolicySpec("sb3", file.resolve(), names), sha256, saved=saved)
 
 

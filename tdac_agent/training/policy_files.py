@@ -10,14 +10,14 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.episodes.sb3_file import SavedPolicy, write_metadata
+from tdac_agent.episodes.sb3_file import POLICY, SavedPolicy, write_metadata
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.training.curve import Point
 from tdac_agent.training.plan import TrainingPlan
 from tdac_agent.training.set_plan import set_of
 
-POLICY, FACTS = "policy.zip", "policy.json"
+FACTS = "policy.json"
 LEARNERS = ("stable_baselines3", "sb3_contrib", "torch")
 
 

@@ -13,8 +13,10 @@ import yaml
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
+from tdac_agent.bench.arena import part_of
 from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, bench
 from tdac_agent.bench.compared import Driven
+from tdac_agent.bench.entrants import named
 from tdac_agent.bench.page import MOST_WORLDS
 from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, reveal
@@ -202,12 +204,14 @@ def test_folders_together(judge, tmp_path, level, files):
         bench(files[number : number + 1], [level], worlds=3, out=folder, **given)
     assert merged([tmp_path / "0", tmp_path / "1"]) == both
     bench(files[1:2], [level], worlds=2, out=tmp_path / "2", **given)
-    with pytest.raises(RunError, match="'few' differs in the split, number or salt"):
+    with pytest.raises(
+        RunError, match=r"'few' differs .* in its number of worlds \(2, not 3\)"
+    ):
         merged([tmp_path / "0", tmp_path / "2"])
     text = level.read_text().replace("clutter", "aisles")
     level.write_text(text)
     bench(files[1:2], [level], worlds=3, out=tmp_path / "3", **given)
-    with pytest.raises(RunError, match="'few' differs in the version"):
+    with pytest.raises(RunError, match=r"'few' differs .* in its version"):
         merged([tmp_path / "0", tmp_path / "3"])
 
 
@@ -316,8 +320,9 @@ def test_runs_on_the_same_world(judge, tmp_path, files):
             ["known"],
             "test",
             ControllerFileError,
-            r"no entrant 'no\.py'.*builtin",
+            r"no entrant 'no\.py': there is no such file",
         ),
+        (["dwaa"], ["known"], "test", ControllerFileError, "did you mean 'dwa'"),
         (["a=builtin", "a=dwa"], ["known"], "test", TaskError, "'a' is given twice"),
         (["builtin"], ["known", "known"], "test", TaskError, "'known' is given twice"),
         (["builtin"], [], "test", TaskError, "at least one task set"),
@@ -347,6 +352,40 @@ def test_the_command(tdac, tmp_path, level, files):
     record = Bench.model_validate_json(tdac("bench", *words, "--json")[1])
     assert record == read(out)
     assert all(len(line) <= 80 for line in said.splitlines() if "0.000 (" in line)
+
+
+def test_fewer_entrants_than_before(tdac, tmp_path, level, files):
+    """It is said, and nothing is lost; `show --out` writes them elsewhere."""
+    out, both = tmp_path / "out", tmp_path / "both"
+    given = ("--set", level, "--split", "dev", "-n", "1", "--out", out)
+    tdac("bench", *files[:2], *given)
+    code, said, _ = tdac("bench", files[0], *given)
+    assert code == 0
+    assert "These results replace those of ahead." in " ".join(said.split())
+    code, said, _ = tdac("bench", *files[:2], *given)
+    assert "These results replace" not in said
+    code, said, _ = tdac("bench", "show", out, "--out", both)
+    assert code == 0
+    assert "wrote bench.json, worlds.csv, scores.svg, bench.html" in said
+    for name in (RESULTS, WORLD_TABLE):
+        assert (both / name).read_bytes() == (out / name).read_bytes()
+    code, _, error = tdac("bench", "show", both, "--out", out)
+    assert code == 2
+    assert "has a bench of its own: give another --out" in error
+    code, said, _ = tdac("bench", files[0], *given[:-3], "2", "--out", out)
+    assert "replace those on 1 world of dev of few" in " ".join(said.split())
+
+
+def test_names_and_seeds(tmp_path, files, monkeypatch):
+    """A policy has the name of its training; seeds are of one kind."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "policy.zip").touch()
+    words = named(["a/policy.zip", "b", "x=dwa,still.py"])
+    assert [each.name for each in words] == ["a", "b", "x"]
+    problem = part_of(words[-1], load_set("known")).problem
+    assert problem == "its files are not seeds of one training: planner, controller"
 
 
 def test_nobody_drives(tdac, tmp_path, level, files):

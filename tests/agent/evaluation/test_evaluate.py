@@ -25,6 +25,7 @@ from small import QUICK, write_small_task
 import tdac_agent
 from tdac_agent.episodes.learned import Learned
 from tdac_agent.episodes.sb3_file import SavedPolicy, read_metadata, write_metadata
+from tdac_agent.evaluation.entrants import entrants_of
 from tdac_agent.evaluation.evaluate import NO_DISTURBANCE, episode_seeds, evaluate
 from tdac_agent.evaluation.evaluation_report import compare
 from tdac_agent.evaluation.overlay import COLOURS
@@ -32,6 +33,7 @@ from tdac_agent.evaluation.unfinished import FOLDER
 from tdac_agent.metrics.exact import sign_test
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.measures import (
     measure,
@@ -367,10 +369,21 @@ def test_metadata_is_read_inside_and_beside(tmp_path, small_task):
     saved = SavedPolicy(algo="ppo", wrappers=WRAPPERS, tasks=("small",), steps=10)
     file.with_suffix(".json").write_text(saved.model_dump_json())
     assert read_metadata(file) == saved
+    hashes = {entrants_of([file])[0].sha256}
+    other = saved.model_copy(update={"wrappers": WRAPPERS[:1]})
+    file.with_suffix(".json").write_text(other.model_dump_json())
+    hashes.add(entrants_of([file])[0].sha256)
+    hashes.add(sha256_of(file.read_bytes()))
+    assert len(hashes) == 3  # a network with other observations is another policy
     for steps in (11, 12):
         write_metadata(file, saved.model_copy(update={"steps": steps}))
         assert read_metadata(file).steps == steps
     sb3.PPO.load(file, device="cpu")
+    assert entrants_of([file])[0].sha256 == sha256_of(file.read_bytes())
+    folder = tmp_path / "training"
+    folder.mkdir()
+    shutil.copy(file, folder / "policy.zip")
+    assert entrants_of([folder])[0].policy.file == folder / "policy.zip"
     other = shutil.copy(file, tmp_path / "other.zip")
     with zipfile.ZipFile(other) as archive:
         assert archive.namelist().count("tdac.json") == 1

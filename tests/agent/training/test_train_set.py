@@ -230,7 +230,7 @@ def test_the_commands_in_turn(tdac, tmp_path, few, config):
     assert code == 1  # after two rollouts
     assert "worlds of train (2 of dev in evaluations)" in out
     assert "not learnt" in out
-    assert f"to compare: tdac evaluate out/policy.zip builtin --set {level}" in out
+    assert f"to compare: tdac bench out/policy.zip builtin --set {level}" in out
     assert str(level) in tdac("runs", ".")[1]
     code, out, _ = tdac(
         "evaluate", "out/policy.zip", "--set", level, "-n", 2, "--csv", "rows.csv"
