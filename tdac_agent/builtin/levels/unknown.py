@@ -20,6 +20,8 @@ with open("params.json") as file:
     PARAMS = json.load(file)
 ROBOT = PARAMS["robot"]
 RADIUS, AXLE, RANGE = ROBOT["radius"], ROBOT["axle_length"], ROBOT["range_max"]
+NOISE = PARAMS["disturbances"]["range_noise"]
+SHARP = min(RANGE, 0.6 / NOISE) if NOISE else RANGE  # px up to which rays are trusted
 DT, TOLERANCE = PARAMS["dt"], PARAMS["goal_tolerance"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
 RAYS = ROBOT["n_rays"]
@@ -57,7 +59,7 @@ SPIN = 2.0 * STEP / AXLE  # rad of a step on the spot
 TURNS = np.arange(120) * (2.0 * math.pi / 120)
 FULL_SPINS = np.remainder(TURNS + math.pi, 2.0 * math.pi) - math.pi
 LENGTHS = np.arange(1, 33) * 0.75  # px
-SAMPLES = np.arange(0.0, RANGE, 0.5)  # px along a ray
+SAMPLES = np.arange(0.0, SHARP, 0.5)  # px along a ray
 STEPS = np.maximum(np.abs(np.arange(-REACH, REACH + 1)) - 0.5, 0.0)
 BEND = np.abs(np.arange(BINS)[:, None] - np.arange(BINS))
 BEND = HALF * math.pi / BINS * np.minimum(BEND, BINS - BEND)  # price between bearings
@@ -112,6 +114,7 @@ class Maps:
 
     def add(self, x, y, heading, ranges):
         """Adds what the rays tell; returns whether any wall is new."""
+        ranges = np.minimum(ranges, SHARP)
         cosines, sines = np.cos(heading + FAN), np.sin(heading + FAN)
         along = np.minimum(SAMPLES, ranges[:, None] - 0.02)
         along = np.maximum(along, 0.0)
@@ -119,7 +122,7 @@ class Maps:
             x + along * cosines[:, None], y + along * sines[:, None]
         )
         self.crossed[rows, columns] = True
-        hit = ranges < RANGE - 1e-3
+        hit = ranges < SHARP - 1e-3
         tips = ranges + 1e-3
         rows, columns = self.indices(x + tips * cosines, y + tips * sines)
         rows, columns = rows[hit], columns[hit]
@@ -735,7 +738,7 @@ def observe(x, y, heading, ranges, goal):
             ]
             for a, b, h, r in STATE["scans"]
         ]
-        angle = lattice(np.vstack(places))
+        angle = 0.0 if NOISE else lattice(np.vstack(places))
         scans = STATE["scans"]
         if angle is not None:
             STATE["turn"] = angle
