@@ -8,11 +8,13 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import pandas as pd
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.bench.bench import RESULTS, SALT, TIMING, WORLD_TABLE, bench
+from tdac_agent.bench.entrants import Named, named
 from tdac_agent.bench.page import PAGE
 from tdac_agent.bench.record import Bench, BenchPair, BenchRow, BenchSet, Interval
 from tdac_agent.bench.shown import merged, read, write_merged
@@ -74,26 +76,35 @@ def run(
             progress.print(line, highlight=False, soft_wrap=True)
 
     before = read(folder) if (folder / RESULTS).is_file() else None
-    with ChildPool() as child_pool, WarmJudge(child_pool) as judge, bar:
-        found = bench(
-            entrants,
-            [name for name in sets.split(",") if name],
-            split,
-            worlds,
-            out=folder,
-            salt_file=salt_file,
-            tier=tier,
-            judge=judge,
-            watch=watch,
-            executor=None if executor is None else executor_of(executor),
-            workers=workers or len(os.sched_getaffinity(0)),
-        )
+    names = [name for name in sets.split(",") if name]
+    try:
+        with ChildPool() as child_pool, WarmJudge(child_pool) as judge, bar:
+            found = bench(
+                entrants,
+                names,
+                split,
+                worlds,
+                out=folder,
+                salt_file=salt_file,
+                tier=tier,
+                judge=judge,
+                watch=watch,
+                executor=None if executor is None else executor_of(executor),
+                workers=workers or len(os.sched_getaffinity(0)),
+            )
+    except KeyboardInterrupt:
+        text = f"the episodes so far are in {folder}; to go on, give the same command"
+        if out is None:
+            text += f" with --out {shlex.quote(str(folder))}"
+        progress.print(escape(text), soft_wrap=True)
+        raise
     if as_json:
         sys.stdout.write(found.model_dump_json(indent=2) + "\n")
     else:
         show(found, console)
         _say_where(folder, salt_file, console)
         _say_replaced(before, found, folder, console)
+        _say_how_to_watch(found, named(entrants), names, folder, console)
     return 0 if any(each.time for each in found.rows) else 1
 
 
@@ -129,6 +140,30 @@ def _say_replaced(
             f"These results replace those of {', '.join(gone)}. What they did is kept "
             f"in {folder}: name them as well, and nothing is driven again.",
         )
+
+
+def _say_how_to_watch(
+    found: Bench,
+    entrants: Sequence[Named],
+    names: Sequence[str],
+    folder: Path,
+    console: Console,
+) -> None:
+    """Prints how to see the first failure of the user's first controller."""
+    own = [e for e in entrants if len(e.words) == 1 and e.words[0].endswith(".py")]
+    rows = folder / WORLD_TABLE
+    if not own or not rows.is_file() or not any(row.time for row in found.rows):
+        return
+    entrant, table = own[0], pd.read_csv(rows)
+    for name, tasks in zip(names, found.sets, strict=True):
+        mine = table[(table["set"] == tasks.name) & (table["entrant"] == entrant.name)]
+        failed = mine[mine["success"] == 0]["index"]
+        if failed.size and tasks.split != "hidden":
+            play = ["tdac", "play", entrant.words[0], "--set", name]
+            play += ["--split", tasks.split, "--index", str(failed.iloc[0])]
+            line = f"watch the first failure: [bold]{escape(shlex.join(play))}[/]"
+            console.print(line, soft_wrap=True, highlight=False)
+            return
 
 
 def show_folders(folders: Sequence[Path], out: Path | None, as_json: bool) -> int:

@@ -351,6 +351,11 @@ def test_the_command(tdac, tmp_path, level, files):
     assert said.startswith(again.rstrip())
     record = Bench.model_validate_json(tdac("bench", *words, "--json")[1])
     assert record == read(out)
+    (watch,) = re.findall("watch the first failure: (.*)", said)
+    assert (
+        watch
+        == f"tdac play {out.parent / 'still.py'} --set {level} --split dev --index 0"
+    )
     assert all(len(line) <= 80 for line in said.splitlines() if "0.000 (" in line)
 
 
