@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shlex
 import sys
@@ -23,6 +24,7 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import executor_of
 from tdac_agent.library.listing import next_folder
 from tdac_agent.metrics.paired import LEAST_P
@@ -61,7 +63,7 @@ def run(
     check_tier(tier)
     if workers is not None and executor is None:
         raise TaskError("--workers needs --executor local or --executor ray")
-    folder = out or next_folder("bench")
+    folder, before = out or next_folder("bench"), None
     console, progress = Console(stderr=as_json), Console(stderr=True)
     bar = policy_bar(progress)
     row = bar.add_task("", total=worlds, successes=0, doing="preparing")
@@ -75,7 +77,8 @@ def run(
             line = f"{doing}, {successes} of {worlds} reached"
             progress.print(line, highlight=False, soft_wrap=True)
 
-    before = read(folder) if (folder / RESULTS).is_file() else None
+    with contextlib.suppress(RunError):  # none yet, or not readable
+        before = read(folder)
     names = [name for name in sets.split(",") if name]
     try:
         with ChildPool() as child_pool, WarmJudge(child_pool) as judge, bar:
