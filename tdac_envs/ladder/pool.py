@@ -14,6 +14,8 @@ import json
 import math
 import mmap
 import os
+import re
+import shutil
 import tempfile
 import zlib
 from collections import OrderedDict
@@ -38,6 +40,10 @@ _MAPPED = 16_384
 """Mapped tasks that a process keeps; Linux allows 65,530 mappings."""
 _IN_MEMORY = 256
 """Tasks without a file that a process keeps in memory."""
+_LEAST_FREE = 2_000_000_000
+"""Bytes that are left free on the disk."""
+_FOLDER = re.compile("[0-9a-f]{16}-[0-9a-f]{16}")
+"""Name of the folder of a set: hashes of the set and of the code."""
 _ALIGNED = 8
 """Alignment of the arrays, bytes."""
 _MOVERS = "traits", "now", "points", "people", *Places._fields
@@ -103,7 +109,22 @@ def pool_folder(set_sha256: str) -> Path | None:
     if caches is None:
         return None
     folder = caches / "tdac" / "worlds" / f"{set_sha256[:16]}-{_sources()}"
-    return folder if is_usable(folder) else None
+    fresh = not folder.exists()
+    if not is_usable(folder):
+        return None
+    if fresh:
+        _remove_others(folder)
+    return folder
+
+
+def _remove_others(folder: Path) -> None:
+    """Removes worlds that another version of the code has made: gigabytes per level.
+
+    Files that another process has mapped stay readable for it.
+    """
+    for other in folder.parent.iterdir():
+        if _FOLDER.fullmatch(other.name) and not other.name.endswith(_sources()):
+            shutil.rmtree(other, ignore_errors=True)
 
 
 @cache
@@ -115,7 +136,10 @@ def _sources() -> str:
 
 
 def _write(path: Path, task: Map2DTask) -> None:
-    """Writes a task completely or not at all."""
+    """Writes a task completely or not at all.
+
+    Without room on the disk, it is made anew next time.
+    """
     terrain, movers = task.terrain, task.movers
     arrays: dict[str, NDArray[Any]] = {
         "ends": np.array([*task.start, *task.goal, task.horizon], np.float64),
@@ -130,8 +154,9 @@ def _write(path: Path, task: Map2DTask) -> None:
     parts = [len(head).to_bytes(8, "little"), head.encode("ascii")]
     parts += [np.ascontiguousarray(array).tobytes() for array in arrays.values()]
     body = b"".join(part + bytes(-len(part) % _ALIGNED) for part in parts)
+    if shutil.disk_usage(path.parent).free < _LEAST_FREE:
+        return
     check = zlib.crc32(body).to_bytes(8, "little")
-    # Without room on the disk, the task is made anew next time.
     with contextlib.suppress(OSError):
         handle, name = tempfile.mkstemp(dir=path.parent)
         try:

@@ -2,6 +2,7 @@
 
 import itertools
 import pickle
+import shutil
 import warnings
 
 import gymnasium as gym
@@ -251,6 +252,31 @@ def test_a_drawn_world_stays_at_hand():
     copy = pickle.loads(pickle.dumps(pool))
     assert len(pickle.dumps(pool)) < 100_000
     assert np.array_equal(copy.task(2).field, task.field)
+
+
+def test_worlds_of_another_version_are_removed():
+    """Each version of the code would leave gigabytes; other folders are kept."""
+    tasks = load_set("unknown")
+    folder = pool_folder(tasks.sha256)
+    older = folder.with_name(f"{folder.name[:16]}-{'0' * 16}")
+    shutil.copytree(folder, older)
+    own = folder.with_name("notes")
+    own.mkdir()
+    assert pool_folder(tasks.sha256) == folder
+    assert older.exists()  # the next start of this version finds its folder
+    other = pool_folder(load_set("known").sha256)
+    assert {path.name for path in folder.parent.iterdir()} == {
+        folder.name, other.name, own.name
+    }  # fmt: skip
+
+
+def test_room_is_left_on_the_disk(monkeypatch):
+    """Worlds are then made each time."""
+    tasks = load_set("unknown")
+    monkeypatch.setattr("tdac_envs.ladder.pool._LEAST_FREE", 10**18)
+    task = TrainingPool(tasks).task(3)
+    assert np.array_equal(task.field, tasks.task("train", 3).field)
+    assert not list(pool_folder(tasks.sha256).iterdir())
 
 
 def test_without_a_cache_worlds_are_made_each_time(tmp_path, monkeypatch):
