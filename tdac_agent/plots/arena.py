@@ -79,7 +79,8 @@ def plot_scores(rows: pd.DataFrame) -> Figure:
 
 def _dot(axes: Axes, own: pd.DataFrame, entrant: str, place: float) -> None:
     if entrant not in own.index or pd.isna(own.loc[entrant, "time"]):
-        axes.text(0.5, place, "–", ha="center", va="center", fontsize=8, color="#888")
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 2}
+        axes.text(0.5, place, "–", ha="center", va="center", color="#666666", bbox=box)
         return
     row = own.loc[entrant]
     kind = list(_KINDS).index(row["kind"])
