@@ -94,7 +94,7 @@ def watched(name, folder, child_pool, index):
         worlds=WORLDS,
         controller=folder / "controller.py",
         test=None,
-        told=False,
+        per_world=False,
         tier="auto",
         limits=limits_of(tasks),
         out=folder / "results",
