@@ -31,6 +31,7 @@ LEFT_OUT = {
     "needs a server of models": re.compile("localhost:"),
     "needs another program": re.compile("command:"),
     "needs a person": re.compile("manual:"),
+    "needs the results of a clone": re.compile("results/"),
     "needs a display": re.compile(r"^tdac play (?!.*--video)|studio --open"),
 }
 NEEDS = {
@@ -91,6 +92,7 @@ PREPARED = {
     "campaigns/my": "tdac campaign my.yaml",
     r"demo-1|--rules": "tdac demo",
     "--rules": "tdac rules export runs/demo-1 --out rules.md",
+    "runs/ppo/": "tdac train --set unknown --steps 4096 --out runs/ppo",
     r"\.zip|ppo-maze-1": "tdac train --task maze --steps 4096",
 }
 """Commands that must have run before others, by what these name."""
