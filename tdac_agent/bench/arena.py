@@ -88,7 +88,7 @@ def part_of(entrant: Named, tasks: TaskSet) -> Part:
         members = tuple(member_of(word, tasks) for word in entrant.words)
     except (TaskError, ControllerFileError) as error:
         return Part(tasks, entrant, problem=str(error))
-    kinds = dict.fromkeys(member.algo or member.kind for member in members)
+    kinds = dict.fromkeys(m.saved.algo if m.saved else m.kind for m in members)
     if len(kinds) > 1:
         problem = f"its files are not seeds of one training: {', '.join(kinds)}"
         return Part(tasks, entrant, problem=problem)

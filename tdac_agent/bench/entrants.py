@@ -14,9 +14,9 @@ from tdac_agent.bench.privileged import (
 )
 from tdac_agent.bench.record import Kind
 from tdac_agent.bench.rivals import rival_names, rival_on
-from tdac_agent.episodes.sb3_file import POLICY
+from tdac_agent.episodes.sb3_file import POLICY, SavedPolicy
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.evaluation.entrants import BUILTIN, Entrant, is_training, nothing
+from tdac_agent.evaluation.entrants import BUILTIN, Entrant, is_training, not_found
 from tdac_agent.evaluation.set_entrants import set_entrants
 from tdac_agent.evaluation.set_learned import LearnedRuns
 from tdac_agent.evaluation.set_report import SetReport
@@ -85,16 +85,14 @@ class Member:
     tuned: bool | None = None
 
     @property
-    def algo(self) -> str | None:
-        """Algorithm of its training, if it is known."""
-        saved = None if self.learned is None else self.learned.saved
-        return None if saved is None else saved.algo
+    def saved(self) -> SavedPolicy | None:
+        """What a policy records about its training, if anything."""
+        return None if self.learned is None else self.learned.saved
 
     @property
     def steps(self) -> int | None:
         """Steps of its training, if they are known."""
-        saved = None if self.learned is None else self.learned.saved
-        return None if saved is None else saved.steps
+        return None if self.saved is None else self.saved.steps
 
 
 def named(words: Sequence[str]) -> tuple[Named, ...]:
@@ -143,7 +141,7 @@ def _check(word: str) -> None:
     if word == BUILTIN or path.is_file() or is_training(path):
         return
     if not (path / "controller.py").is_file():
-        raise ControllerFileError(nothing("entrant", word, (BUILTIN, *rival_names())))
+        raise ControllerFileError(not_found("entrant", word, (BUILTIN, *rival_names())))
 
 
 def member_of(word: str, tasks: TaskSet) -> Member:

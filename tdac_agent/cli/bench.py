@@ -10,16 +10,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
-from rich.box import SIMPLE_HEAD
 from rich.markup import escape
-from rich.table import Table
 
 from tdac_agent.bench.bench import RESULTS, SALT, TIMING, WORLD_TABLE, bench
 from tdac_agent.bench.entrants import Named, named
 from tdac_agent.bench.page import PAGE
-from tdac_agent.bench.record import Bench, BenchPair, BenchRow, BenchSet, Interval
+from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, write_merged
 from tdac_agent.bench.shown import reveal as reveal_folder
+from tdac_agent.cli.bench_view import show
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.policy_bar import policy_bar
@@ -27,24 +26,9 @@ from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import executor_of
 from tdac_agent.library.listing import next_folder
-from tdac_agent.metrics.paired import LEAST_P
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TaskError
-
-NONE = "–"
-# Widest name of an entrant, so that a table fits into 80 columns.
-WIDEST = 14
-FEW = 20
-"""Worlds below which a bootstrap claims too much."""
-LEGEND = (
-    "time: mean of success x OT / T (SCT; least possible / actual time), with a 95 % "
-    "interval by bootstrap over worlds (and seeds). reached: with the exact 95 % "
-    "interval; by bootstrap if there are several seeds. path: mean of success x L / "
-    "driven (SPL; shortest / actual path). contacts: with a wall / a mover while "
-    "driving / a mover while standing. late: cut off at the horizon; error: its own, "
-    "or too much CPU time."
-)
 
 
 def run(
@@ -188,161 +172,3 @@ def reveal(folder: Path, salt_file: Path) -> int:
     text = f"wrote {WORLD_TABLE}, {SALT} to {folder}: its worlds are public now"
     Console().print(escape(text), soft_wrap=True)
     return 0
-
-
-def show(found: Bench, console: Console) -> None:
-    """Prints a table for each set, one over all, and how far the first is ahead."""
-    for own in found.sets:
-        rows = found.of_set(own.name)
-        knows_map = any(row.knows == "+ map" for row in rows)
-        console.print(_table(own, rows, console.width))
-        console.print()
-        for row in rows:
-            for note in _notes(row, knows_map):
-                print_sentences(console, note, indent=2)
-    if found.overall:
-        console.print(_overall(found))
-        console.print()
-        there = {each.entrant for each in found.overall}
-        there |= {row.entrant for row in found.rows if row.kind == "privileged"}
-        if absent := [name for name in found.entrants if name not in there]:
-            note = f"not on all sets, and so not above: {', '.join(absent)}"
-            print_sentences(console, note, indent=2)
-    print_sentences(console, LEGEND)
-    if any(own.worlds < FEW for own in found.sets):
-        print_sentences(
-            console,
-            f"With fewer than {FEW} worlds, intervals by bootstrap are too narrow.",
-        )
-    first = found.entrants[0]
-    pairs = [pair for pair in found.pairs if first in (pair.one, pair.other)]
-    if pairs:
-        console.print()
-        console.print(_pairs(first, pairs))
-        text = (
-            "on the same worlds; p by bootstrap, at least the smallest one of a sign "
-            "test on so many worlds, adjusted for all pairs of a set (Holm). All "
-            f"pairs are in {RESULTS}."
-        )
-        print_sentences(console, text)
-
-
-def _table(own: BenchSet, rows: Sequence[BenchRow], room: int) -> Table:
-    table = Table(
-        title=escape(
-            f"{own.name} {own.sha256[:8]}: worlds 0 to {own.worlds - 1} of {own.split}"
-        ),
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-    )
-    longest = max(len(row.entrant) for row in rows)
-    width = max(min(longest, WIDEST + max(room - 80, 0)), len("entrant"))
-    table.add_column("entrant", overflow="fold", width=width)
-    for name in ("time (95 %)", "reached, %", "path", "contacts", "late", "error"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for row in rows:
-        table.add_row(escape(row.entrant), *_cells(row))
-    return table
-
-
-def _cells(row: BenchRow) -> list[str]:
-    if row.time is None or row.success is None or row.path is None:
-        return [NONE] * 6
-    kinds = ("wall", "mover", "mover_standing")
-    time, share = row.time, row.success
-    return [
-        f"{time.value:.3f} ({time.low:.2f}–{time.high:.2f})",
-        f"{100 * share.value:.1f} ({100 * share.low:.0f}–{100 * share.high:.0f})",
-        f"{row.path:.3f}",
-        "/".join(str(row.contacts.get(kind, 0)) for kind in kinds),
-        str(row.late),
-        str(row.errors),
-    ]
-
-
-def _notes(row: BenchRow, knows_map: bool) -> list[str]:
-    notes = []
-    if row.problem is not None:
-        notes.append(f"{row.entrant} did not drive: {row.problem}")
-    if row.kind == "privileged" and row.time is not None:
-        notes.append(
-            f"{row.entrant} knows the true world and all movers: not compared with "
-            "others"
-        )
-    if row.knows == "sensors" and knows_map:
-        notes.append(f"{row.entrant} does not get the map")
-    if row.tuned is False:
-        notes.append(f"{row.entrant} was not tuned for this level")
-    if row.kind == "learned" and len(row.files) == 1:
-        notes.append(f"{row.entrant}: a single seed")
-    if row.clock_dependent is not None:
-        notes.append(f"{row.entrant} is clock-dependent: {row.clock_dependent}")
-    if row.causes:
-        causes = ", ".join(f"{count} {name}" for name, count in row.causes.items())
-        notes.append(f"{row.entrant}, failures: {causes}")
-    counts = [each.hidden for each in row.files if each.hidden and each.hidden > 1]
-    # Nobody chooses among versions of what comes with the package.
-    if counts and row.kind not in ("builtin", "planner"):
-        notes.append(
-            f"{row.entrant}: evaluation {max(counts)} of its file on hidden worlds; "
-            "only the first one is to be reported"
-        )
-    return notes
-
-
-def _overall(found: Bench) -> Table:
-    table = Table(
-        title=f"all {len(found.sets)} sets, equal weights",
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-    )
-    table.add_column("entrant", overflow="fold")
-    for name in ("time", "95 %", "middle half", "reached"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for each in found.overall:
-        table.add_row(
-            escape(each.entrant),
-            f"{each.time.value:.3f}",
-            f"{each.time.low:.3f}–{each.time.high:.3f}",
-            f"{each.middle:.3f}",
-            f"{100 * each.success:.1f} %",
-        )
-    return table
-
-
-def _pairs(first: str, pairs: Sequence[BenchPair]) -> Table:
-    """By how much the first entrant is ahead of each other one."""
-    table = Table(
-        title=escape(f"time score of {first}, minus that of"),
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-    )
-    table.add_column("entrant", overflow="fold")
-    table.add_column("set")
-    for name in ("difference", "95 %", "p"):
-        table.add_column(name, justify="right", no_wrap=True)
-    for pair in pairs:
-        ahead = pair.ahead if pair.one == first else _negative(pair.ahead)
-        other = pair.other if pair.one == first else pair.one
-        colour = "green" if ahead.low > 0 else "red" if ahead.high < 0 else "yellow"
-        table.add_row(
-            escape(other),
-            escape(pair.set or "all"),
-            f"[{colour}]{ahead.value:+.3f}[/]",
-            f"{ahead.low:+.3f} to {ahead.high:+.3f}",
-            f"{'≤ ' if pair.p <= LEAST_P else ''}{pair.p_holm:.2g}",
-        )
-    return table
-
-
-def _negative(found: Interval) -> Interval:
-    return Interval(value=-found.value, low=-found.high, high=-found.low)

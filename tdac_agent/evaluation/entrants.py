@@ -100,7 +100,7 @@ def _entrant(given: str, wrappers: Sequence[str] | None) -> Entrant:
         found = _controller(given, path / "controller.py")
         return replace(found, env=_env_of(path), set_file=_set_of(path))
     if not path.is_file():
-        raise ControllerFileError(nothing("policy", given, sorted((*OURS, BUILTIN))))
+        raise ControllerFileError(not_found("policy", given, sorted((*OURS, BUILTIN))))
     if path.suffix == ".zip":
         return _learned(given, path, wrappers)
     if path.suffix != ".py":
@@ -116,7 +116,7 @@ def is_training(path: Path) -> bool:
     return (path / POLICY).is_file() and not (path / "controller.py").exists()
 
 
-def nothing(what: str, given: str, names: Sequence[str]) -> str:
+def not_found(what: str, given: str, names: Sequence[str]) -> str:
     """The message that there is no such file or program of ours.
 
     Args:
