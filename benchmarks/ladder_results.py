@@ -3,6 +3,7 @@
     python -m benchmarks.ladder_results drive OUT [--levels L...] [--kinds K...]
                                         [--split test] [-n 100] [--salt-file F]
     python -m benchmarks.ladder_results show RESULTS OUT
+    python -m benchmarks.ladder_results hidden PUBLIC HIDDEN...
 
 `drive` benches the entrants of each kind on each level, in OUT/KIND-LEVEL:
 
@@ -11,8 +12,13 @@
   files are resampled like the seeds of a training: no best answer is chosen,
 - `learned`: the policies of `results/ladder/learned`, with all their seeds.
 
-After an interruption the same command goes on. `show` puts folders of such folders
-together and writes `scores.svg`, the other figures, and `table.md`.
+With `--split hidden` and no salt file, a salt is drawn for all of them, and revealed at
+the end. After an interruption the same command goes on. `show` puts folders of such
+folders together and writes `scores.svg`, the other figures, and `table.md`.
+
+`hidden` prints how the results on hidden worlds agree with those on public ones: the
+scores side by side, Kendall's tau of the order of the entrants on each level, and what
+became of the differences that are significant on public worlds.
 """
 
 from __future__ import annotations
@@ -22,12 +28,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
+from scipy import stats
 
 from tdac_agent.bench.bench import WORLD_TABLE, bench
 from tdac_agent.bench.figures import draw_figures, frame_of
 from tdac_agent.bench.record import Bench, BenchRow, Interval
 from tdac_agent.bench.rivals import levels_of, rival_names
-from tdac_agent.bench.shown import merged
+from tdac_agent.bench.shown import merged, reveal
+from tdac_agent.evaluation.salt import SEALED, drawn_salt
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -37,6 +45,7 @@ RESULTS = Path(__file__).parents[1] / "results" / "ladder"
 KINDS = "programs", "answers", "learned"
 ANSWERS = "first-answers"
 LEARNED = "ppo", "ppo-with-map", "recurrent-ppo"
+SIGNIFICANT = 0.05
 
 
 def entrants(kind: str, level: str, out: Path) -> list[str]:
@@ -68,6 +77,12 @@ def _answers(level: str, folder: Path) -> Iterator[Path]:
 
 def drive(options: argparse.Namespace) -> None:
     """Benches all kinds of entrants on all levels."""
+    salt: Path | None = options.salt_file
+    drawn = options.split == "hidden" and salt is None
+    if drawn:
+        options.out.mkdir(parents=True, exist_ok=True)
+        salt = drawn_salt(options.out / SEALED, reuse=True)
+    driven = []
     with WarmJudge() as judge:
         for level in options.levels or set_names():
             for kind in options.kinds or KINDS:
@@ -80,22 +95,86 @@ def drive(options: argparse.Namespace) -> None:
                     options.split,
                     options.n,
                     out=options.out / f"{kind}-{level}",
-                    salt_file=options.salt_file,
+                    salt_file=salt,
                     judge=judge,
                 )
                 for row in found.rows:
                     score = row.time.value if row.time else row.problem
                     print(level, row.entrant, score, flush=True)
+                driven.append(options.out / f"{kind}-{level}")
+    for folder in driven if drawn else ():
+        assert salt is not None
+        reveal(folder, salt)
 
 
 def show(options: argparse.Namespace) -> None:
     """Draws the figures of several folders together, and writes their table."""
-    folders = sorted(path.parent for path in options.results.glob("*/bench.json"))
+    folders = _folders(options.results)
     found = merged(folders)
     options.out.mkdir(parents=True, exist_ok=True)
     table = pd.concat([pd.read_csv(folder / WORLD_TABLE) for folder in folders])
     draw_figures(found, table, options.out)
     write_atomic(options.out / "table.md", _table(found))
+
+
+def hidden(options: argparse.Namespace) -> None:
+    """Prints how hidden worlds agree with public ones."""
+    public, *others = [
+        merged(_folders(each)) for each in (options.public, *options.hidden)
+    ]
+    heads = [
+        f"{each.sets[0].split}, {each.sets[0].worlds} worlds"
+        for each in (public, *others)
+    ]
+    print(f"| level | entrant | {' | '.join(heads)} |")
+    print(f"|---|---|{'---:|' * len(heads)}")
+    for own in public.sets:
+        for row in public.of_set(own.name):
+            scores = [
+                _scores(each, own.name).get(row.entrant) for each in (public, *others)
+            ]
+            if None not in scores:
+                cells = " | ".join(f"{score:.3f}" for score in scores)
+                print(f"| `{own.name}` | {row.entrant} | {cells} |")
+    for other in others:
+        print(f"\nsalt {str(other.sets[0].salt_sha256)[:8]}:")
+        print(
+            "| level | Kendall's tau | significant in public | also here | opposite |"
+        )
+        print("|---|---:|---:|---:|---:|")
+        for own in public.sets:
+            one, two = _scores(public, own.name), _scores(other, own.name)
+            both = sorted(one.keys() & two.keys())
+            tau = stats.kendalltau(
+                *([each[name] for name in both] for each in (one, two))
+            )
+            ahead, here = _ahead(public, own.name), _ahead(other, own.name)
+            opposite = ahead & {(worse, better) for better, worse in here}
+            print(
+                f"| `{own.name}` | {tau.statistic:.2f} | {len(ahead)} "
+                f"| {len(ahead & here)} | {len(opposite)} |"
+            )
+
+
+def _folders(results: Path) -> list[Path]:
+    return sorted(path.parent for path in results.glob("*/bench.json"))
+
+
+def _scores(found: Bench, level: str) -> dict[str, float]:
+    """The mean time score of each entrant that drove."""
+    rows = [row for row in found.of_set(level) if row.kind != "privileged"]
+    return {row.entrant: row.time.value for row in rows if row.time is not None}
+
+
+def _ahead(found: Bench, level: str) -> set[tuple[str, str]]:
+    """Pairs of which the first one is significantly ahead of the second one."""
+    pairs = [
+        pair for pair in found.pairs if pair.set == level and pair.p_holm < SIGNIFICANT
+    ]
+    return {
+        (pair.one, pair.other) if pair.ahead.value > 0.0 else (pair.other, pair.one)
+        for pair in pairs
+    }
 
 
 def _table(found: Bench) -> str:
@@ -139,6 +218,10 @@ def main() -> None:
     showing.add_argument("results", type=Path)
     showing.add_argument("out", type=Path)
     showing.set_defaults(run=show)
+    comparing = commands.add_parser("hidden")
+    comparing.add_argument("public", type=Path)
+    comparing.add_argument("hidden", type=Path, nargs="+")
+    comparing.set_defaults(run=hidden)
     options = parser.parse_args()
     options.run(options)
 
