@@ -10,20 +10,22 @@ Best of N: the first answers drive on `dev` worlds, 128 episodes together, and t
 one is taken. Its score is that of the same hidden worlds.
 
 OUT/gain.csv has a row for each run: scores, paired differences with 95 % intervals
-by bootstrap over worlds, candidates, and characters asked and answered. After an
-interruption, the same command continues.
+by bootstrap over worlds, candidates, and characters asked and answered; OUT/gain.md is
+the same as a table. After an interruption, the same command continues.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy import stats
 
 from benchmarks.recorded_answers import driven_on, episodes_in, interval
 from tdac_agent.evaluation.kept_sets import kept_report
@@ -121,6 +123,45 @@ def hidden_scores(
     return episodes_in(kept)["time_score"].to_numpy(np.float64)
 
 
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """The rows in Markdown, and the mean differences of all runs."""
+    heads = (
+        "level",
+        "run",
+        "candidates",
+        "episodes",
+        "asked",
+        "answered",
+        "first answer",
+        "selected",
+        "more than the first",
+        "best of N",
+        "more than best of N",
+    )
+    lines = [f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
+    for row in rows:
+        cells = [f"`{row['level']}`", row["run"], row["candidates"], row["episodes"]]
+        cells += [f"{row[name] / 1000:.0f} k" for name in ("asked", "answered")]
+        cells += [f"{row[name]:.3f}" for name in ("first", "last")]
+        cells += [_difference(row, "first"), f"{row['best_of_n']:.3f} ({row['n']})"]
+        cells += [_difference(row, "best_of_n")]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    lines.append("")
+    for name, words in (("first", "the first answer"), ("best_of_n", "best of N")):
+        over = np.array([row[f"over_{name}"] for row in rows], np.float64)
+        p = stats.wilcoxon(over).pvalue
+        lines.append(
+            f"All runs: {over.mean():+.3f} more than {words}; {(over > 0.0).sum()} of "
+            f"{len(over)} better (p = {p:.2g}, Wilcoxon's signed-rank test)."
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _difference(row: dict[str, Any], name: str) -> str:
+    over = f"over_{name}"
+    return f"{row[over]:+.3f} ({row[f'{over}_low']:+.3f} to {row[f'{over}_high']:+.3f})"
+
+
 def candidate(run: Path, k: int, j: int) -> Path:
     """File of a candidate of a run."""
     return run / "iterations" / f"k{k:02}" / f"j{j}" / "controller.py"
@@ -138,6 +179,7 @@ def main() -> None:
         for level in options.levels:
             rows += gains(level, options.worlds, options.out, judge)
     write_atomic(options.out / "gain.csv", pd.DataFrame(rows).to_csv(index=False))
+    write_atomic(options.out / "gain.md", table(rows))
 
 
 if __name__ == "__main__":
