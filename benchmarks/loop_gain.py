@@ -124,7 +124,7 @@ def hidden_scores(
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """The rows in Markdown, and the mean differences of all runs."""
+    """The rows in Markdown, and the mean differences of runs with a repair."""
     heads = (
         "level",
         "run",
@@ -132,27 +132,31 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
         "episodes",
         "asked",
         "answered",
-        "first answer",
+        "first candidate",
         "selected",
-        "more than the first",
+        "selected - first",
         "best of N",
-        "more than best of N",
+        "selected - best of N",
     )
     lines = [f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
     for row in rows:
         cells = [f"`{row['level']}`", row["run"], row["candidates"], row["episodes"]]
         cells += [f"{row[name] / 1000:.0f} k" for name in ("asked", "answered")]
         cells += [f"{row[name]:.3f}" for name in ("first", "last")]
-        cells += [_difference(row, "first"), f"{row['best_of_n']:.3f} ({row['n']})"]
+        cells += [
+            _difference(row, "first"),
+            f"{row['best_of_n']:.3f} (answer {row['n']})",
+        ]
         cells += [_difference(row, "best_of_n")]
         lines.append(f"| {' | '.join(map(str, cells))} |")
     lines.append("")
-    for name, words in (("first", "the first answer"), ("best_of_n", "best of N")):
-        over = np.array([row[f"over_{name}"] for row in rows], np.float64)
+    repaired = [row for row in rows if row["candidates"] > 1]
+    for name, words in (("first", "the first candidate"), ("best_of_n", "best of N")):
+        over = np.array([row[f"over_{name}"] for row in repaired], np.float64)
         p = stats.wilcoxon(over).pvalue
         lines.append(
-            f"All runs: {over.mean():+.3f} more than {words}; {(over > 0.0).sum()} of "
-            f"{len(over)} better (p = {p:.2g}, Wilcoxon's signed-rank test)."
+            f"With repairs, selected - {words}: {over.mean():+.3f}; {(over > 0.0).sum()} "
+            f"of {len(over)} above 0 (p = {p:.2g}, Wilcoxon's signed-rank test)."
         )
     return "\n".join(lines) + "\n"
 

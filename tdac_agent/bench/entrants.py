@@ -74,7 +74,7 @@ class Member:
         source: The file, if it is a program.
         lineage: Id of the run that wrote the program, if one did.
         learned: The policy, if it was trained with stable-baselines3.
-        tuned: Whether its constants were tuned for the level; None if it has none.
+        tuned: Whether its constants were tuned for the set; None if it has none.
     """
 
     kind: Kind

@@ -57,7 +57,7 @@ class BenchRow(_Record):
     kind: Kind | None = None
     knows: str | None = Field(None, description="What it may use.")
     tuned: bool | None = Field(
-        None, description="Whether its constants were tuned for this level."
+        None, description="Whether its constants were tuned for this set."
     )
     steps: int | None = Field(
         None, description="Training steps, up to what was saved, of all its seeds."

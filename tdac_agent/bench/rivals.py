@@ -36,7 +36,7 @@ class Rival:
 
     Attributes:
         source: Its file, with the values that were chosen for the level.
-        tuned: Whether values were chosen for the level; None if it has none.
+        tuned: Whether values were chosen for this set; None if it has none.
     """
 
     source: str
@@ -59,10 +59,11 @@ def rival_on(name: str, tasks: TaskSet) -> Rival:
         known = ", ".join(rival.levels)
         raise TaskError(f"{name} needs what is observed in {known}")
     assert level is not None
-    # Some sets with the observations of a level have values of their own.
+    # Some sets with the observations of a level have values of their own; on the
+    # others, those of the level are used.
     own = _tuned().get(name, {})
     values = own.get(tasks.name, own.get(level, {}))
-    tuned = bool(values) if rival.ranges else None
+    tuned = tasks.name in own if rival.ranges else None
     return Rival(with_values(source_of(name), values), tuned)
 
 

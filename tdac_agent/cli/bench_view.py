@@ -114,7 +114,7 @@ def _notes(row: BenchRow, knows_map: bool) -> list[str]:
     if row.knows == "sensors" and knows_map:
         notes.append(f"{row.entrant} does not get the map")
     if row.tuned is False:
-        notes.append(f"{row.entrant} was not tuned for this level")
+        notes.append(f"{row.entrant} was not tuned for this set")
     if row.kind == "learned" and len(row.files) == 1:
         notes.append(f"{row.entrant}: a single seed")
     if row.clock_dependent is not None:

@@ -67,6 +67,10 @@ def test_files_have_the_constants_that_are_tuned():
 
 def test_what_is_not_tuned_is_said():
     assert rival_on("go-to-goal", load_set("known")).tuned is None
+    assert rival_on("mppi", load_set("unknown")).tuned
+    on_barn = rival_on("mppi", load_set("barn-slow"))
+    assert on_barn.tuned is False
+    assert on_barn.source == rival_on("mppi", load_set("unknown")).source
     with pytest.raises(ValueError, match="expected one line 'NO = "):
         with_values(source_of("dwa"), {"NO": 1.0})
 
