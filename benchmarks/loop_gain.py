@@ -155,8 +155,9 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
         over = np.array([row[f"over_{name}"] for row in repaired], np.float64)
         p = stats.wilcoxon(over).pvalue
         lines.append(
-            f"With repairs, selected - {words}: {over.mean():+.3f}; {(over > 0.0).sum()} "
-            f"of {len(over)} above 0 (p = {p:.2g}, Wilcoxon's signed-rank test)."
+            f"With repairs, selected - {words}: {over.mean():+.3f}, "
+            f"{(over > 0.0).sum()} of {len(over)} above 0 "
+            f"(p = {p:.2g}, Wilcoxon's signed-rank test)."
         )
     return "\n".join(lines) + "\n"
 
