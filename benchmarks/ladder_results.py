@@ -118,42 +118,41 @@ def show(options: argparse.Namespace) -> None:
 
 
 def hidden(options: argparse.Namespace) -> None:
-    """Prints how hidden worlds agree with public ones."""
-    public, *others = [
-        merged(_folders(each)) for each in (options.public, *options.hidden)
-    ]
-    heads = [
-        f"{each.sets[0].split}, {each.sets[0].worlds} worlds"
-        for each in (public, *others)
-    ]
-    print(f"| level | entrant | {' | '.join(heads)} |")
-    print(f"|---|---|{'---:|' * len(heads)}")
+    """Prints how results on hidden worlds agree with those on public ones."""
+    public = merged(_folders(options.public))
+    others = [merged(_folders(folder)) for folder in options.hidden]
+    names = [folder.name for folder in options.hidden]
+    print(_row("level", "ahead in public", *(f"in {name}" for name in names)))
+    print(_row("---", *["---:"] * (1 + len(others))))
     for own in public.sets:
-        for row in public.of_set(own.name):
-            scores = [
-                _scores(each, own.name).get(row.entrant) for each in (public, *others)
-            ]
-            if None not in scores:
-                cells = " | ".join(f"{score:.3f}" for score in scores)
-                print(f"| `{own.name}` | {row.entrant} | {cells} |")
-    for other in others:
-        print(f"\nsalt {str(other.sets[0].salt_sha256)[:8]}:")
-        print(
-            "| level | Kendall's tau | significant in public | also here | opposite |"
-        )
-        print("|---|---:|---:|---:|---:|")
-        for own in public.sets:
-            one, two = _scores(public, own.name), _scores(other, own.name)
-            both = sorted(one.keys() & two.keys())
-            tau = stats.kendalltau(
-                *([each[name] for name in both] for each in (one, two))
-            )
-            ahead, here = _ahead(public, own.name), _ahead(other, own.name)
-            opposite = ahead & {(worse, better) for better, worse in here}
-            print(
-                f"| `{own.name}` | {tau.statistic:.2f} | {len(ahead)} "
-                f"| {len(ahead & here)} | {len(opposite)} |"
-            )
+        ahead = len(_ahead(public, own.name))
+        cells = [_agreement(public, other, own.name) for other in others]
+        print(_row(f"`{own.name}`", ahead, *cells))
+    print()
+    counts = [f"{found.sets[0].worlds} worlds" for found in (public, *others)]
+    heads = map(", ".join, zip(["public", *names], counts, strict=True))
+    print(_row("level", "entrant", *heads))
+    print(_row("---", "---", *["---:"] * len(counts)))
+    for own in public.sets:
+        scores = [_scores(found, own.name) for found in (public, *others)]
+        for name in scores[0]:
+            cells = [f"{each[name]:.3f}" if name in each else "" for each in scores]
+            print(_row(f"`{own.name}`", name, *cells))
+
+
+def _agreement(public: Bench, other: Bench, level: str) -> str:
+    """What became of the differences that are significant on public worlds."""
+    ahead, here = _ahead(public, level), _ahead(other, level)
+    opposite = ahead & {(worse, better) for better, worse in here}
+    one, two = _scores(public, level), _scores(other, level)
+    both = sorted(one.keys() & two.keys())
+    tau = stats.kendalltau([one[name] for name in both], [two[name] for name in both])
+    found = f"{len(ahead & here)} again, {len(opposite)} opposite"
+    return f"{found}, {len(here - ahead)} new; tau {tau.statistic:.2f}"
+
+
+def _row(*cells: object) -> str:
+    return f"| {' | '.join(map(str, cells))} |"
 
 
 def _folders(results: Path) -> list[Path]:
