@@ -156,7 +156,10 @@ def _row(*cells: object) -> str:
 
 
 def _folders(results: Path) -> list[Path]:
-    return sorted(path.parent for path in results.glob("*/bench.json"))
+    found = sorted(path.parent for path in results.glob("*/bench.json"))
+    if not found:
+        raise SystemExit(f"{results} has no folder with a bench.json")
+    return found
 
 
 def _scores(found: Bench, level: str) -> dict[str, float]:

@@ -82,6 +82,10 @@ class Arena:
         return None if self.salt_file is None else sha256_of(read_salt(self.salt_file))
 
 
+class DrivenElsewhere(RunError):
+    """The ledger has the result of a file, but its episodes are in another folder."""
+
+
 def part_of(entrant: Named, tasks: TaskSet) -> Part:
     """The files of an entrant for a set, or why there are none."""
     try:
@@ -92,6 +96,8 @@ def part_of(entrant: Named, tasks: TaskSet) -> Part:
     if len(kinds) > 1:
         problem = f"its files are not seeds of one training: {', '.join(kinds)}"
         return Part(tasks, entrant, problem=problem)
+    if len({member.sha256 for member in members}) < len(members):
+        return Part(tasks, entrant, problem="two of its files are the same")
     return Part(tasks, entrant, members)
 
 
@@ -104,7 +110,7 @@ def row_of(arena: Arena, part: Part) -> BenchRow:
     row = row.model_copy(update=_about(members, tasks))
     try:
         reports = [_report(arena, part, member) for member in members]
-    except ControllerFileError as error:
+    except (ControllerFileError, DrivenElsewhere) as error:
         return row.model_copy(update={"problem": str(error)})
     if refused := next((report for report, _ in reports if report.refused), None):
         return row.model_copy(update={"problem": "; ".join(refused.told)})
@@ -194,15 +200,15 @@ def sealed_episodes(folder: Path, sha256: str) -> tuple[WorldEpisode, ...]:
         sha256: Hash of the file.
 
     Raises:
-        RunError: They are not there, since the worlds were driven elsewhere.
+        DrivenElsewhere: They are not there.
     """
     path = folder / SEALED / ROWS_FILE
     try:
         lines = read_file(path, RECORD_BYTES).splitlines()
     except OSError:
-        raise RunError(
-            f"{path} is missing: the file {sha256[:8]} was driven on these hidden "
-            "worlds before; use the folder of that bench, or another salt"
+        raise DrivenElsewhere(
+            f"the file {sha256[:8]} was driven on these hidden worlds before, and its "
+            f"episodes are not in {folder}; tdac bench show puts the folders together"
         ) from None
     return tuple(map(WorldEpisode.model_validate_json, lines))
 

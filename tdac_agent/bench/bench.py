@@ -137,7 +137,7 @@ def publish(out: Path, rows: Sequence[dict[str, Any]], salt_file: Path | None) -
     """Writes a row for each episode, and the salt of worlds that were hidden."""
     write_atomic(out / WORLD_TABLE, pd.DataFrame(rows).to_csv(index=False))
     if salt_file is not None:
-        write_atomic(out / SALT, f"{salt_file.read_bytes().hex()}\n")
+        write_atomic(out / SALT, f"{read_salt(salt_file).hex()}\n")
 
 
 def _record(out: Path, parts: Sequence[Part], worlds: int) -> None:

@@ -140,8 +140,14 @@ def _check(word: str) -> None:
     path = Path(word)
     if word == BUILTIN or path.is_file() or is_training(path):
         return
-    if not (path / "controller.py").is_file():
-        raise ControllerFileError(not_found("entrant", word, (BUILTIN, *rival_names())))
+    if (path / "controller.py").is_file():
+        return
+    if path.is_dir():
+        raise ControllerFileError(
+            f"no entrant in the folder {word}: it has neither controller.py nor a "
+            f"{POLICY} of tdac train"
+        )
+    raise ControllerFileError(not_found("entrant", word, (BUILTIN, *rival_names())))
 
 
 def member_of(word: str, tasks: TaskSet) -> Member:

@@ -83,6 +83,8 @@ def merged(folders: Sequence[Path]) -> Bench:
                     f"{folder / RESULTS}: {row.entrant!r} on {row.set} is not that of "
                     "the earlier folders; rename one (NAME=FILE)"
                 )
+            if key in rows and row.time is None:
+                continue  # its episodes are in an earlier folder
             rows[key] = row
             if row.time is not None and row.kind != "privileged":
                 driven[row.set][row.entrant] = _driven(table, row)

@@ -25,7 +25,7 @@ LEGEND = (
     "interval; by bootstrap if there are several seeds. path: mean of success x L / "
     "driven (SPL; shortest / actual path). contacts: with a wall / a mover while "
     "driving / a mover while standing. late: cut off at the horizon; error: its own, "
-    "or too much CPU time."
+    "or too much CPU time; all three count the episodes of all files of an entrant."
 )
 
 

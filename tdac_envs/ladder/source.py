@@ -110,12 +110,16 @@ class SetSource:
 
 
 def read_salt(path: str | Path) -> bytes:
-    """The salt in a file.
+    """The salt in a file: its bytes, or in a file `*.hex` those that it spells.
 
     Raises:
         TaskError: The file cannot be read.
     """
+    spelt = Path(path).suffix == ".hex"
     try:
-        return read_file(path, MOST_SALT)
+        raw = read_file(path, 2 * MOST_SALT + 1 if spelt else MOST_SALT)
+        return bytes.fromhex(raw.decode()) if spelt else raw
     except OSError as error:
         raise TaskError(f"salt file {path}: {one_line_reason(error)}") from None
+    except ValueError:
+        raise TaskError(f"salt file {path}: expected hexadecimal digits") from None

@@ -170,13 +170,21 @@ def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
     assert "Replays" not in (out / "bench.html").read_text()
     assert stat.S_IMODE((out / "sealed").stat().st_mode) == 0o700
     other = tmp_path / "other"
-    with pytest.raises(RunError, match="was driven on these hidden worlds before"):
-        bench(files[:1], [level], out=other, **given)
+    entered = ["again=" + files[0].partition("=")[2], f"new={tmp_path / 'new.py'}"]
+    (tmp_path / "new.py").write_text(f"{AHEAD}# another file\n")
+    before, new = bench(entered, [level], out=other, **given).rows
+    assert before.time is None
+    assert "was driven on these hidden worlds before" in before.problem
+    assert new.worlds == 2
     (tmp_path / "wrong").write_bytes(bytes(32))
     with pytest.raises(TaskError, match="is not the salt of"):
         reveal(out, tmp_path / "wrong")
     reveal(out, salt)
     assert bytes.fromhex((out / "salt.hex").read_text()) == salt.read_bytes()
+    reveal(other, out / "salt.hex")
+    assert (other / "salt.hex").read_text() == (out / "salt.hex").read_text()
+    both = merged([out, other])
+    assert [row.time is None for row in both.rows] == [False, False, True, False]
     table = pd.read_csv(out / "worlds.csv")
     for row in found.rows:
         own = table[table.entrant == row.entrant]
@@ -391,6 +399,10 @@ def test_names_and_seeds(tmp_path, files, monkeypatch):
     assert [each.name for each in words] == ["a", "b", "x"]
     problem = part_of(words[-1], load_set("known")).problem
     assert problem == "its files are not seeds of one training: planner, controller"
+    (twice,) = named(["twice=still.py,still.py"])
+    assert part_of(twice, load_set("known")).problem == "two of its files are the same"
+    with pytest.raises(ControllerFileError, match="it has neither contr"):
+        named([str(tmp_path)])
 
 
 def test_nobody_drives(tdac, tmp_path, level, files):

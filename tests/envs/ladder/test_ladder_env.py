@@ -14,6 +14,7 @@ from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.pool import TrainingPool, pool_folder
 from tdac_envs.ladder.set_file import set_names
+from tdac_envs.ladder.source import read_salt
 
 KEYS = {
     "known": {"pose", "goal", "wheel_speeds", "ranges"},
@@ -337,6 +338,11 @@ def test_hidden_worlds_need_a_salt(tmp_path):
         make(split="hidden")
     with pytest.raises(TaskError, match=r"salt file .*no\.salt: No such file"):
         make(split="hidden", salt_file=tmp_path / "no.salt")
+    (tmp_path / "a.hex").write_text("no digits")
+    with pytest.raises(TaskError, match=r"a\.hex: expected hexadecimal digits"):
+        make(split="hidden", salt_file=tmp_path / "a.hex")
+    (tmp_path / "a.hex").write_text(f"{bytes(32).hex()}\n")
+    assert read_salt(tmp_path / "a.hex") == bytes(32)
     goals = []
     for number in range(2):
         path = tmp_path / f"{number}.salt"
