@@ -138,9 +138,8 @@ def _check(word: str) -> None:
         ControllerFileError: There is none.
     """
     path = Path(word)
-    if word == BUILTIN or path.is_file() or is_training(path):
-        return
-    if (path / "controller.py").is_file():
+    given = path, path / "controller.py"
+    if word == BUILTIN or is_training(path) or any(map(Path.is_file, given)):
         return
     if path.is_dir():
         raise ControllerFileError(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
@@ -12,6 +11,7 @@ from tdac_agent.bench.bench import RESULTS
 from tdac_agent.bench.record import Bench, BenchPair, BenchRow, BenchSet, Interval
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.titled_table import titled_table
 from tdac_agent.metrics.paired import LEAST_P
 
 NONE = "–"
@@ -67,15 +67,8 @@ def show(found: Bench, console: Console) -> None:
 
 
 def _table(own: BenchSet, rows: Sequence[BenchRow], room: int) -> Table:
-    table = Table(
-        title=escape(
-            f"{own.name} {own.sha256[:8]}: worlds 0 to {own.worlds - 1} of {own.split}"
-        ),
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
+    table = titled_table(
+        f"{own.name} {own.sha256[:8]}: worlds 0 to {own.worlds - 1} of {own.split}"
     )
     longest = max(len(row.entrant) for row in rows)
     width = max(min(longest, WIDEST + max(room - 80, 0)), len("entrant"))
@@ -133,14 +126,7 @@ def _notes(row: BenchRow, knows_map: bool) -> list[str]:
 
 
 def _overall(found: Bench) -> Table:
-    table = Table(
-        title=f"all {len(found.sets)} sets, equal weights",
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-    )
+    table = titled_table(f"all {len(found.sets)} sets, equal weights")
     table.add_column("entrant", overflow="fold")
     for name in ("time", "95 %", "middle half", "reached"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -157,14 +143,7 @@ def _overall(found: Bench) -> Table:
 
 def _pairs(first: str, pairs: Sequence[BenchPair]) -> Table:
     """By how much the first entrant is ahead of each other one."""
-    table = Table(
-        title=escape(f"time score of {first}, minus that of"),
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-    )
+    table = titled_table(f"time score of {first}, minus that of")
     table.add_column("entrant", overflow="fold")
     table.add_column("set")
     for name in ("difference", "95 %", "p"):

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
@@ -16,6 +15,7 @@ from tdac_agent.cli.evaluate_view import NONE, PAIRED, comparison_table
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.titled_table import titled_table
 from tdac_agent.evaluation.evaluate import EPISODES
 from tdac_agent.evaluation.set_evaluate import POLICIES, evaluate_on_set
 from tdac_agent.evaluation.set_evaluation import SetEvaluation, SetRow
@@ -111,14 +111,7 @@ def show(found: SetEvaluation, console: Console) -> None:
 
 
 def _table(title: str, found: SetEvaluation) -> Table:
-    table = Table(
-        title=escape(title),
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        show_edge=False,
-    )
+    table = titled_table(title)
     longest = max(len(row.policy) for row in found.rows)
     table.add_column("policy", overflow="fold", min_width=min(longest, WIDEST))
     return table

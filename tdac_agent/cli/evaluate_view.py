@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.titled_table import titled_table
 from tdac_agent.evaluation.evaluation_report import (
     EvaluatedTask,
     Evaluation,
@@ -81,7 +81,7 @@ def _table(
         f"{task.called or task.name}: {found.episodes} episodes each, "
         f"{starts.get(found.variation, 'the nominal start')}, seed {found.seed}"
     )
-    table = _plain_table(title)
+    table = titled_table(title, gap=0)
     longest = max(len(row.policy) for row in rows)
     table.add_column("policy", overflow="fold", min_width=min(longest, WIDEST))
     table.add_column("knows", no_wrap=True)
@@ -107,17 +107,6 @@ def _table(
     return table
 
 
-def _plain_table(title: str) -> Table:
-    return Table(
-        title=escape(title),
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        padding=0,
-        show_edge=False,
-    )
-
-
 def _notes(rows: Sequence[PolicyRow]) -> list[str]:
     """Notes on the policies, and the reasons of their failures with counts."""
     lines = []
@@ -131,7 +120,7 @@ def _notes(rows: Sequence[PolicyRow]) -> list[str]:
 
 def comparison_table(pairs: Sequence[PairedComparison], *, several: bool) -> Table:
     """One row per pair of policies; with a column for the task if `several`."""
-    table = _plain_table("The same episodes, paired")
+    table = titled_table("The same episodes, paired", gap=0)
     for name in (*(("task",) if several else ()), "policies"):
         table.add_column(name, overflow="fold")
     table.add_column("only one", justify="right")
