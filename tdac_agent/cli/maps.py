@@ -15,6 +15,7 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_finite, check_heading, check_radius
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.environments.map2d.setting import robot_text
+from tdac_agent.tasks.units import Point
 from tdac_envs.core.errors import PicturedError, TaskError
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
@@ -38,7 +39,6 @@ from tdac_envs.mapping.ros_writer import ROS_FILES, write_ros_map
 from tdac_envs.mapping.wording import obstacles_text, scale_text
 
 SHOWN, EXPLAINED = 8, 2
-Point = tuple[float, float]
 LEGEND = (
     "margin: distance that the planner keeps in addition to the body radius",
     "grid path: length of the path from pixel to pixel that keeps this margin",

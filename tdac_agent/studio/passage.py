@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from tdac_agent.tasks.units import Point
 from tdac_envs.epuck.prisms import ROUND, Prisms
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.map2d.task import Map2DTask
 
-Point = tuple[float, float]
 Points = NDArray[np.float64]
 BETWEEN = 0.002
 """Distance between two points of a wall of a world, m."""

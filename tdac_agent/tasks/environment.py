@@ -8,17 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tdac_agent.tasks.setting import JudgedEnv, Nominal, Setting
-from tdac_agent.tasks.units import Units
+from tdac_agent.tasks.units import Point, Units
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template
-    from tdac_agent.episodes.pictures import Pictures
+    from tdac_agent.tasks.parts import Pictures, Surroundings
     from tdac_agent.tasks.task import Task
     from tdac_agent.tasks.task_file import TaskFile
-    from tdac_agent.verification.diagnosis.surroundings import Surroundings
     from tdac_agent.verification.suite.oracle import Oracle
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tdac_agent.tasks.units import Units
+from tdac_agent.tasks.units import Point, Units
 from tdac_envs.drive.task import Pose
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

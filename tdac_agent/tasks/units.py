@@ -13,6 +13,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+Point = tuple[float, float]
 Points = NDArray[np.float64]
 Place = Literal["px", "m"]
 

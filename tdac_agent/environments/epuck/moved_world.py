@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tdac_agent.tasks.units import Point
 from tdac_envs.worlds.footprint import Disc, Footprint, Polygon, Rectangle
 from tdac_envs.worlds.world import Arena, Obstacle, Part, World
 
-Point = tuple[float, float]
 _FIRST = ("WorldInfo", "Viewpoint")
 _POSE = re.compile(
     r"^( +)Pose \{\n +translation (\S+) (\S+) (\S+)\n(?: +rotation 0 0 1 (\S+)\n)?",

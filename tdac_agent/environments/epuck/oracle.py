@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_agent.tasks.units import Point
 from tdac_envs.epuck.gaps import nearest_gap
 from tdac_envs.epuck.prisms import Owned, Prisms
 from tdac_envs.worlds.bodies import at_body_height, bodies, floor_under
 from tdac_envs.worlds.footprint import Disc, Rectangle
 from tdac_envs.worlds.world import Arena, Part, World
 
-Point = tuple[float, float]
 POINTS = 400
 _AROUND = 0.05
 

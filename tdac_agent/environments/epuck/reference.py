@@ -9,7 +9,8 @@ import math
 
 import numpy as np
 
-from tdac_agent.verification.suite.reference import Point, without_flat_points
+from tdac_agent.tasks.units import Point
+from tdac_agent.verification.suite.reference import without_flat_points
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.paths import open_field, path_entry
 from tdac_envs.epuck.task import EPuckTask

@@ -11,7 +11,7 @@ import numpy as np
 
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.start_frame import StartFrame
-from tdac_agent.tasks.units import METRES, Points, Units
+from tdac_agent.tasks.units import METRES, Point, Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_envs.drive.task import Pose
 from tdac_envs.epuck.gaps import part_gap
@@ -21,8 +21,6 @@ from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.grid.plan import Path, first_beyond
 from tdac_envs.worlds.bodies import BODY_RADIUS, at_body_height
 from tdac_envs.worlds.world import Obstacle
-
-Point = tuple[float, float]
 
 FENCE = "fence around the world"
 # Largest angle between a sensor's axis and the bearing of what it detects, rad.

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from tdac_agent.environments.epuck.moved_world import Motion, reordered, turned_groups
-from tdac_agent.environments.epuck.oracle import Point, WorldCase, gap_to, prisms_of
+from tdac_agent.environments.epuck.oracle import WorldCase, gap_to, prisms_of
+from tdac_agent.tasks.units import Point
 from tdac_agent.verification.suite.oracle import Oracle
 from tdac_envs.worlds.bodies import bodies
 from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle, ring

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tdac_agent.tasks.environment import Environment, Names, Point
+from tdac_agent.tasks.environment import Environment, Names
 from tdac_agent.tasks.setting import Nominal, Setting
-from tdac_agent.tasks.units import PIXELS
+from tdac_agent.tasks.units import PIXELS, Point
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template

@@ -13,11 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.verification.suite.reference import (
-    Point,
-    steer,
-    without_flat_points,
-)
+from tdac_agent.tasks.units import Point
+from tdac_agent.verification.suite.reference import steer, without_flat_points
 from tdac_envs.grid.grid import BoolGrid, body_free
 from tdac_envs.grid.plan import Path, descend, distance_field
 from tdac_envs.map2d.straight import is_line_free

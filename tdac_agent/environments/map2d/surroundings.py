@@ -11,7 +11,7 @@ import numpy as np
 from tdac_agent.environments.map2d.touch import nearest_touch
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.start_frame import StartFrame
-from tdac_agent.tasks.units import PIXELS, Points, Units
+from tdac_agent.tasks.units import PIXELS, Point, Points, Units
 from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import body_free
@@ -19,8 +19,6 @@ from tdac_envs.grid.plan import Path, descend, first_beyond
 from tdac_envs.map2d.rays import sees
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import path_entry
-
-Point = tuple[float, float]
 
 _PARTS = 0.0, -0.95, 0.95, -0.5, 0.5
 

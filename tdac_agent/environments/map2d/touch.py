@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.verification.diagnosis.touch import Point, Touch
+from tdac_agent.tasks.units import Point
+from tdac_agent.verification.diagnosis.touch import Touch
 from tdac_envs.drive.task import Pose
 from tdac_envs.map2d.task import Map2DTask
 

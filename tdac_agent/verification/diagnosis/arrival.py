@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from tdac_agent.episodes.trajectory import Rollout, Trajectory
+from tdac_agent.tasks.parts import Surroundings
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.motion import (
     flips,
@@ -24,7 +25,6 @@ from tdac_agent.verification.diagnosis.stall import (
     standing_since,
     why_stalled,
 )
-from tdac_agent.verification.diagnosis.surroundings import Surroundings
 
 # Share of the episode without progress from which a robot is stalled, not too slow.
 _STALLED = 0.2

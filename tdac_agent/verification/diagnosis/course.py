@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.verification.diagnosis.surroundings import Surroundings
+from tdac_agent.tasks.parts import Surroundings
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import Path
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from tdac_agent.episodes.trajectory import Rollout, Trajectory
 from tdac_agent.storage.plain import plain
+from tdac_agent.tasks.parts import Surroundings
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.arrival import near_goal, why_no_arrival
@@ -27,7 +28,6 @@ from tdac_agent.verification.diagnosis.mover import (
 from tdac_agent.verification.diagnosis.report import Cause, Diagnosis
 from tdac_agent.verification.diagnosis.stall import PROGRESS, percent
 from tdac_agent.verification.diagnosis.surroundings import (
-    Surroundings,
     rollout_on_screen,
     surroundings_of,
 )

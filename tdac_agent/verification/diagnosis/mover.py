@@ -12,12 +12,11 @@ from itertools import groupby
 import numpy as np
 
 from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.tasks.parts import Surroundings
+from tdac_agent.tasks.units import Point
 from tdac_agent.verification.diagnosis.motion import forward, wheels_turn
-from tdac_agent.verification.diagnosis.surroundings import Surroundings
 from tdac_envs.drive.task import Pose
 from tdac_envs.movers.state import STANDING_SECONDS
-
-Point = tuple[float, float]
 
 APPROACH = 0.5
 """A mover came from the direction of its motion in this time before the contact, s."""

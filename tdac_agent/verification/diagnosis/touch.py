@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tdac_agent.tasks.units import PIXELS, Units
-
-Point = tuple[float, float]
+from tdac_agent.tasks.units import PIXELS, Point, Units
 
 _SIDES = (
     "front",

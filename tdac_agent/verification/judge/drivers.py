@@ -13,7 +13,8 @@ import numpy as np
 from tdac_agent.episodes.episode import Driver
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import JudgedEnv
-from tdac_agent.verification.suite.reference import Point, steer
+from tdac_agent.tasks.units import Point
+from tdac_agent.verification.suite.reference import steer
 from tdac_envs.drive.env import Observation
 from tdac_envs.learning.guidance import Route, route_to_goal
 from tdac_envs.learning.wrappers import Frame

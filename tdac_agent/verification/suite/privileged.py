@@ -13,7 +13,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import Nominal
-from tdac_agent.verification.suite.reference import Point
+from tdac_agent.tasks.units import Point
 from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 
 REFERENCE, DO_NOTHING, SLOW = "reference", "do-nothing", "slow"

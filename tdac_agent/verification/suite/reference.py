@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+from tdac_agent.tasks.units import Point
 from tdac_envs.drive.stepping import wrap_angle
-
-Point = tuple[float, float]
 
 _ALIGNED = 1e-6  # rad
 
