@@ -24,6 +24,7 @@ class _Rival(BaseModel):
 
     title: str
     paper: str
+    parts: tuple[str, ...] = Field(description="Files of `parts`, before its own.")
     levels: tuple[str, ...] = Field(description="Levels whose observations it uses.")
     ranges: dict[str, tuple[float, float]] = Field(
         description="Constants of the file that are tuned, with their bounds."
@@ -78,9 +79,10 @@ def ranges_of(name: str) -> dict[str, tuple[float, float]]:
 
 
 def source_of(name: str) -> str:
-    """The file of a rival, with its own values."""
-    file = FOLDER / f"{name.replace('-', '_')}.py"
-    return file.read_text(encoding="utf-8")
+    """The file of a rival with its own values, after the parts that it shares."""
+    parts = [FOLDER / "parts" / f"{part}.py" for part in _known()[name].parts]
+    files = [*parts, FOLDER / f"{name.replace('-', '_')}.py"]
+    return "\n\n".join(file.read_text(encoding="utf-8") for file in files)
 
 
 def with_values(source: str, values: dict[str, float]) -> str:

@@ -10,18 +10,6 @@ that of the goal, with the weight 1. It has no memory. Without a pose, the robot
 located by dead reckoning.
 """
 
-import json
-import math
-
-import numpy as np
-
-with open("params.json") as file:
-    PARAMS = json.load(file)
-ROBOT = PARAMS["robot"]
-RADIUS, RANGE = ROBOT["radius"], ROBOT["range_max"]
-VIEW = math.radians(ROBOT["field_of_view_deg"])
-SPIN = 2.0 * ROBOT["max_wheel_speed"] * PARAMS["dt"] / ROBOT["axle_length"]  # rad
-
 ALPHA = 20.0
 """Weight of the gap at 1 px from the nearest obstacle, px."""
 FRONT = 180.0
@@ -35,32 +23,8 @@ TURN_GAIN = 0.7
 SLOW = 12.0
 """Free distance ahead below which the robot drives slower, px."""
 
-FAN = np.linspace(-VIEW / 2.0, VIEW / 2.0, ROBOT["n_rays"])
 AHEAD = np.abs(FAN) <= math.radians(FRONT) / 2.0 + 1e-6
 BODY = RADIUS + ROOM
-
-
-class Odometer:
-    """The pose: observed, or from dead reckoning."""
-
-    def __init__(self):
-        self.x = self.y = self.heading = 0.0
-
-    def update(self, obs):
-        """Takes over an observation."""
-        if "pose" in obs:
-            self.x, self.y, self.heading = (float(value) for value in obs["pose"])
-        else:
-            self.move(*(float(value) for value in obs["odometry"]))
-
-    def move(self, length, turn):
-        """Drives an arc."""
-        self.x += length * math.cos(self.heading + turn / 2.0)
-        self.y += length * math.sin(self.heading + turn / 2.0)
-        self.heading = math.remainder(self.heading + turn, math.tau)
-
-
-STATE = {}
 
 
 def free_lengths(ranges, angles):

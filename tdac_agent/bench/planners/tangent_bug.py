@@ -12,19 +12,7 @@ remembered for a while, since the sensors of most levels do not see behind. With
 pose, the robot is located by dead reckoning.
 """
 
-import json
-import math
-
-import numpy as np
-
-with open("params.json") as file:
-    PARAMS = json.load(file)
-ROBOT = PARAMS["robot"]
-RADIUS, RANGE = ROBOT["radius"], ROBOT["range_max"]
-VIEW = math.radians(ROBOT["field_of_view_deg"])
-SPIN = 2.0 * ROBOT["max_wheel_speed"] * PARAMS["dt"] / ROBOT["axle_length"]  # rad
-FAN = np.linspace(-VIEW / 2.0, VIEW / 2.0, ROBOT["n_rays"])
-TOLERANCE, DT = PARAMS["goal_tolerance"], PARAMS["dt"]
+TOLERANCE = PARAMS["goal_tolerance"]
 
 ROOM = 0.5
 """Room that the body keeps to obstacles, px."""
@@ -45,29 +33,6 @@ DIRECTIONS = np.arange(180) * (math.tau / 180.0)
 """Directions that are looked at, rad."""
 BACK = 60
 """Directions by which following looks back to the side of the boundary."""
-
-
-class Odometer:
-    """The pose: observed, or from dead reckoning."""
-
-    def __init__(self):
-        self.x = self.y = self.heading = 0.0
-
-    def update(self, obs):
-        """Takes over an observation."""
-        if "pose" in obs:
-            self.x, self.y, self.heading = (float(value) for value in obs["pose"])
-        else:
-            self.move(*(float(value) for value in obs["odometry"]))
-
-    def move(self, length, turn):
-        """Drives an arc."""
-        self.x += length * math.cos(self.heading + turn / 2.0)
-        self.y += length * math.sin(self.heading + turn / 2.0)
-        self.heading = math.remainder(self.heading + turn, math.tau)
-
-
-STATE = {}
 
 
 def remembered(pose, ranges):
