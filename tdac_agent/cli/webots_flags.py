@@ -49,8 +49,8 @@ def webots_run(
         Optional[float],  # noqa: UP045
         number_flag(
             min=1,
-            help="Time that the controller may compute, s.  [default: 10 s and the "
-            "simulated time of all steps]",
+            help="CPU time of the controller, s; it may sleep as long.  [default: 10 s "
+            "and the simulated time of all steps]",
         ),
     ] = None,
     start: Annotated[

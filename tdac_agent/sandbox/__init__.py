@@ -14,6 +14,7 @@ from tdac_agent.sandbox.errors import (
     ControllerProtocolError,
     ControllerTimeout,
     EnvRefusalError,
+    MachineBusyError,
     SandboxError,
 )
 from tdac_agent.sandbox.exposure import installed_packages
@@ -49,6 +50,7 @@ __all__ = [
     "EpisodeEnv",
     "Handle",
     "Limits",
+    "MachineBusyError",
     "NoRoomError",
     "SandboxError",
     "Tier",

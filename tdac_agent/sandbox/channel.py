@@ -7,6 +7,7 @@ import math
 import os
 import select
 import time
+from collections.abc import Callable
 
 from tdac_agent.sandbox.inner.wire import HEADER
 from tdac_agent.sandbox.waiting import RunQueue
@@ -23,6 +24,11 @@ MOST_WAITED_SECONDS = 300.0
 BUSY_SHARE = 0.9
 
 
+Deadline = float | Callable[[], float]
+"""A value of `time.monotonic`, or a function that returns the seconds left and may
+raise `DeadlineError`."""
+
+
 class ChannelClosedError(Exception):
     """The child closed its end of the channel, most likely by exiting."""
 
@@ -32,11 +38,12 @@ class DeadlineError(Exception):
 
     Args:
         busy: Whether the child was on a CPU for nearly all of its time.
+        machine: Whether it only waited for a CPU, so that the machine is to blame.
     """
 
-    def __init__(self, *, busy: bool) -> None:
+    def __init__(self, *, busy: bool, machine: bool = False) -> None:
         super().__init__()
-        self.busy = busy
+        self.busy, self.machine = busy, machine
 
 
 class FrameError(Exception):
@@ -81,7 +88,9 @@ class Channel:
         for descriptor in (answers, output):
             self._poll.register(descriptor, select.POLLIN)
 
-    def send(self, kind: int, sequence: int, payload: bytes, deadline: float) -> None:
+    def send(
+        self, kind: int, sequence: int, payload: bytes, deadline: Deadline
+    ) -> None:
         """Write one frame, reading printed output meanwhile."""
         data = memoryview(HEADER.pack(len(payload), kind, sequence) + payload)
         while data:
@@ -92,7 +101,7 @@ class Channel:
             except BrokenPipeError:
                 raise ChannelClosedError from None
 
-    def _wait_writable(self, deadline: float) -> None:
+    def _wait_writable(self, deadline: Deadline) -> None:
         self._poll.register(self._requests, select.POLLOUT)
         try:
             for descriptor, _ in self._events(deadline):
@@ -103,7 +112,7 @@ class Channel:
         finally:
             self._poll.unregister(self._requests)
 
-    def receive(self, deadline: float) -> tuple[int, int, bytes]:
+    def receive(self, deadline: Deadline) -> tuple[int, int, bytes]:
         """Return kind, sequence number and payload of the one expected frame."""
         parts: list[bytes] = []
         have, need = 0, HEADER.size
@@ -139,7 +148,12 @@ class Channel:
             raise ChannelClosedError
         return part
 
-    def _events(self, deadline: float) -> list[tuple[int, int]]:
+    def _events(self, deadline: Deadline) -> list[tuple[int, int]]:
+        if callable(deadline):
+            while (left := deadline()) > 0:
+                if events := self._poll.poll(math.ceil(left * 1000)):
+                    return events
+            raise DeadlineError(busy=False)
         left = deadline - time.monotonic()
         if left > SOON_SECONDS and self._seen_deadline != deadline:
             events = self._poll.poll(math.ceil(SOON_SECONDS * 1000))

@@ -10,6 +10,7 @@ from typing import Any, NoReturn
 from tdac_agent.sandbox.channel import (
     Channel,
     ChannelClosedError,
+    Deadline,
     DeadlineError,
     FrameError,
     OutputFloodError,
@@ -20,6 +21,7 @@ from tdac_agent.sandbox.errors import (
     ControllerOutputFlood,
     ControllerProtocolError,
     ControllerTimeout,
+    MachineBusyError,
     SandboxError,
 )
 from tdac_agent.sandbox.explain import controller_error, explain_end
@@ -70,7 +72,7 @@ class Conversation:
         return result
 
     def send(
-        self, kind: Kind, value: Any, phase: str, deadline: float, seconds: float
+        self, kind: Kind, value: Any, phase: str, deadline: Deadline, seconds: float
     ) -> None:
         """Send one frame."""
         if self._fault is not None:
@@ -92,7 +94,9 @@ class Conversation:
             payload = encode(value)
         return payload
 
-    def receive(self, phase: str, deadline: float, seconds: float) -> tuple[int, Any]:
+    def receive(
+        self, phase: str, deadline: Deadline, seconds: float
+    ) -> tuple[int, Any]:
         """Return kind and value of the answer to the last frame that was sent."""
         try:
             kind, sequence, payload = self._channel.receive(deadline)
@@ -126,6 +130,8 @@ class Conversation:
         raise fault
 
     def _fail(self, error: Exception, phase: str, seconds: float) -> NoReturn:
+        if isinstance(error, DeadlineError) and error.machine:
+            self.give_up(MachineBusyError(phase, seconds))
         if isinstance(error, DeadlineError):
             self.give_up(ControllerTimeout(phase, seconds, busy=error.busy))
         if isinstance(error, FrameError):

@@ -9,6 +9,21 @@ class SandboxError(Exception):
     """The sandbox itself failed; this says nothing about the controller."""
 
 
+class MachineBusyError(SandboxError):
+    """A controller waited for a CPU until the time for its whole run was up.
+
+    Args:
+        phase: What the controller was doing.
+        seconds: CPU time that it may use, s.
+    """
+
+    def __init__(self, phase: str, seconds: float) -> None:
+        super().__init__(
+            f"the machine is too busy: {phase} did not get the {seconds:g} s of CPU "
+            "time that it may use; try again when a core is free"
+        )
+
+
 class ControllerFault(Exception):
     """A fault of the controller, which a verdict counts as failed.
 
@@ -74,7 +89,7 @@ class ControllerTimeout(ControllerFault):
 
     def __init__(self, phase: str, seconds: float, *, busy: bool = False) -> None:
         super().__init__(f"{phase} did not end within {seconds:g} s", phase)
-        self.seconds = seconds
+        self.seconds, self.busy = seconds, busy
         self.is_retryable = not busy
 
 
@@ -91,7 +106,7 @@ class ControllerOverdrawn(ControllerTimeout):
     def __init__(self, phase: str, used: float, allowed: float, what: str) -> None:
         text = f"used {used:.2f} s of CPU time for {what}; {allowed:.2f} s are allowed"
         ControllerFault.__init__(self, text, phase)
-        self.seconds = allowed
+        self.seconds, self.busy = allowed, True
         self.is_retryable = used <= 2.0 * allowed
 
 

@@ -16,6 +16,8 @@ from tdac_agent.sandbox.ending import ChildUsage, ProcessEnd, usage_of_tree
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
 from tdac_agent.sandbox.inner.wire import Handle, Kind, is_name
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
+from tdac_agent.sandbox.own_time import OwnTime
+from tdac_agent.sandbox.waiting import RunQueue
 from tdac_agent.sandbox.zygote import Forked
 
 
@@ -197,7 +199,7 @@ class Child:
         Args:
             env: Answers the controller's requests.
             max_steps: Passed to the controller.
-            timeout: Seconds that the controller itself may take in total.
+            timeout: Seconds that the controller may compute, and sleep, in total.
             deadline: Value of `time.monotonic` at which the call ends, whether the
                 controller or `env` took the time.
         """
@@ -220,7 +222,7 @@ class Child:
         Args:
             world: Answers the program's requests in this process.
             arguments: Command-line arguments.
-            timeout: Seconds that the program itself may take in total.
+            timeout: Seconds that the program may compute, and sleep, in total.
             grace: Seconds that it may take after the world has ended.
         """
         return self._converse(
@@ -248,29 +250,35 @@ class Child:
             value: Payload of the request.
             phase: Name of the request in messages.
             env: Answers the controller's requests.
-            timeout: Seconds that the controller itself may take in total.
+            timeout: Seconds that the controller may compute, and sleep, in total.
             max_left: Returns the current upper bound on the seconds left.
         """
-        left = min(timeout, max_left())
-        self._talk.send(kind, value, phase, time.monotonic() + left, timeout)
+        own = OwnTime(timeout, self._look)
+        left = max_left()
+        reply: tuple[Kind, Any] = (kind, value)
         while True:
-            start = time.monotonic()
-            asked, value = self._talk.receive(phase, start + left, timeout)
-            left -= time.monotonic() - start
+            own.begin_turn(left)
+            self._talk.send(*reply, phase, own.left, timeout)
+            asked, value = self._talk.receive(phase, own.left, timeout)
+            left -= own.end_turn()
             if asked == Kind.VALUE:
                 return value
             if asked not in {Kind.ENV_RESET, Kind.ENV_STEP}:
                 self._talk.breach("an unexpected answer", phase)
             try:
                 answer = env.reset() if asked == Kind.ENV_RESET else env.step(value)
-                reply: tuple[Kind, Any] = (Kind.ENV_REPLY, answer)
+                reply = (Kind.ENV_REPLY, answer)
             except EnvRefusalError as error:
                 reply = (Kind.ENV_REFUSAL, str(error))
             except BaseException:
                 self.close()
                 raise
             left = min(left, max_left())
-            self._talk.send(*reply, phase, time.monotonic() + left, timeout)
+
+    def _look(self) -> tuple[float, float, bool]:
+        """Return CPU time, run-queue wait time with the judge's own, and readiness."""
+        waited = self._line.waited() + RunQueue("thread-self").waited()
+        return self.cpu_seconds(), waited, self._line.is_ready()
 
 
 def _split(

@@ -36,10 +36,10 @@ class RunQueue:
     def stands(self) -> bool:
         """Whether it is ready to run but gets no CPU; takes about 25 ms."""
         before = self._statistics()
-        if before == (0, 0) or not self._is_ready():
+        if before == (0, 0) or not self.is_ready():
             return False
         time.sleep(TICKS_SECONDS)
-        return self._is_ready() and self._statistics() == before
+        return self.is_ready() and self._statistics() == before
 
     def _statistics(self) -> tuple[int, int]:
         try:
@@ -48,7 +48,8 @@ class RunQueue:
         except (OSError, ValueError, IndexError):
             return 0, 0
 
-    def _is_ready(self) -> bool:
+    def is_ready(self) -> bool:
+        """Whether it runs or waits for a CPU."""
         try:
             stat = Path(f"/proc/{self.pid}/stat").read_text()
         except OSError:

@@ -132,7 +132,7 @@ def _described(
 ) -> str:
     """The fault, and what to do about a time limit or a missing package."""
     if isinstance(fault, ControllerTimeout):
-        return _too_slow(fault.seconds, log.steps, env.nominal.horizon)
+        return _too_slow(fault, log.steps, env.nominal.horizon)
     text = " ".join(str(fault).split())  # the text of an exception may have many lines
     if not isinstance(fault, ControllerError):
         return text
@@ -152,16 +152,23 @@ def _described(
     )
 
 
-def _too_slow(seconds: float, steps: int, horizon: int) -> str:
+def _too_slow(fault: ControllerTimeout, steps: int, horizon: int) -> str:
+    limit = f"{fault.seconds:g} s"
+    if not fault.busy:
+        return (
+            f"it slept or blocked for {limit}, the time limit, and had done {steps} of "
+            f"{horizon} steps; remove time.sleep, input and other calls that wait, or "
+            "set a longer limit with --seconds"
+        )
     if not steps:
         return (
-            f"it never called robot.step(), and after {seconds:g} s the time limit "
-            "ended it; call robot.step() in its loop, or set a longer limit with "
+            f"it never called robot.step(), and after {limit} of CPU time the time "
+            "limit ended it; call robot.step() in its loop, or set a longer limit with "
             "--seconds"
         )
     return (
-        f"it took {seconds:g} s for its own computation, the time limit, and had done "
-        f"{steps} of {horizon} steps; set a longer limit with --seconds"
+        f"it used {limit} of CPU time, the time limit, and had done {steps} of "
+        f"{horizon} steps; set a longer limit with --seconds"
     )
 
 

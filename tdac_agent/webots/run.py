@@ -20,6 +20,7 @@ from tdac_agent.sandbox import (
     ControllerFault,
     EnvRefusalError,
     Limits,
+    MachineBusyError,
     SandboxError,
     installed_packages,
     start,
@@ -37,6 +38,8 @@ LIMITS = Limits(output_bytes=16 << 20)
 GRACE_SECONDS = 1.0
 """Time for a controller after the end of a run, as in Webots."""
 START_SECONDS = 10.0
+SPARE_SECONDS = 10
+"""CPU time for starting and ending, so that the kernel's limit never comes first."""
 LARGEST_FOLDER = 64 << 20
 _NOT_COPIED = (PACKAGE.name, "__pycache__", "build")
 Watch = Callable[[int], None]
@@ -95,20 +98,20 @@ def run_controller(
         tier: Sandbox tier, or `auto`.
         limits: Resource limits of the controller; by default `LIMITS`, with as much
             CPU time as `seconds` allows.
-        seconds: Time that the controller itself may take; by default `START_SECONDS`
-            and the simulated time of all steps.
+        seconds: CPU time of the controller, and time that it may sleep; by default
+            `START_SECONDS` and the simulated time of all steps.
         watch: Called with the number of steps so far.
 
     Raises:
         ControllerFileError: The controller cannot be read.
-        Fault: The sandbox failed.
+        Fault: The sandbox failed, or the machine was too busy.
     """
     source = read_source(controller)
     server = StepServer(env, stage)
     if seconds is None:
         seconds = START_SECONDS + env.nominal.horizon * env.nominal.dt
     if limits is None:
-        most = max(LIMITS.cpu_seconds, math.ceil(seconds + GRACE_SECONDS))
+        most = max(LIMITS.cpu_seconds, math.ceil(seconds) + SPARE_SECONDS)
         limits = replace(LIMITS, cpu_seconds=most)
     fault: ControllerFault | None = None
     left_out: tuple[str, ...] = ()
@@ -139,6 +142,9 @@ def run_controller(
             pass
         except ControllerFault as error:
             fault = error
+        except MachineBusyError as error:
+            steps = f"{server.log.steps} of {env.nominal.horizon} steps"
+            raise Fault(f"{error}; it had done {steps}") from error
         except SandboxError as error:
             raise Fault(f"the sandbox failed: {error}") from error
         finally:

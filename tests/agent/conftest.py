@@ -3,6 +3,8 @@
 import os
 import shutil
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -35,6 +37,21 @@ def warm():
     """A judge that is ready, for tests that need nothing special of it."""
     with WarmJudge() as judge:
         yield judge
+
+
+@pytest.fixture
+def crowd():
+    """A CPU for which others compete all the time."""
+    cpu = min(os.sched_getaffinity(0))
+    command = [sys.executable, "-c", "print(flush=True)\nwhile True: pass"]
+    others = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(3)]
+    for other in others:
+        other.stdout.readline()  # it is at work
+        os.sched_setaffinity(other.pid, {cpu})
+    yield cpu
+    for other in others:
+        other.kill()
+        other.communicate()
 
 
 @pytest.fixture

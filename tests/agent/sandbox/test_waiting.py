@@ -1,8 +1,6 @@
 """A machine that is busy with other work makes no verdict."""
 
 import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -16,7 +14,6 @@ from tdac_agent.tasks.task import load_task
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/schedstat").exists(), reason="the kernel does not tell"
 )
-OTHERS = 3
 BUSY = """
 import time
 
@@ -34,21 +31,6 @@ def policy(obs):
     return (0.0, 0.0)
 """
 LIMITS = Limits(call_seconds=1.0, import_seconds=60.0, start_seconds=60.0)
-
-
-@pytest.fixture
-def crowd():
-    """A CPU for which others compete all the time."""
-    cpu = min(os.sched_getaffinity(0))
-    command = [sys.executable, "-c", "print(flush=True)\nwhile True: pass"]
-    others = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(OTHERS)]
-    for other in others:
-        other.stdout.readline()  # it is at work
-        os.sched_setaffinity(other.pid, {cpu})
-    yield cpu
-    for other in others:
-        other.kill()
-        other.communicate()
 
 
 @pytest.fixture

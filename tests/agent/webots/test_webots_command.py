@@ -229,14 +229,20 @@ STARTS = "from controller import Robot\nrobot = Robot()\n"
     [
         (
             "while True:\n    pass\n",
-            "it never called robot.step(), and after 1.5 s the time "
+            "it never called robot.step(), and after 1.5 s of CPU time the time "
             "limit ended it; call robot.step() in its loop, or set a longer limit with "
             "--seconds",
         ),
         (
             "robot.step(160)\nwhile True:\n    pass\n",
-            "it took 1.5 s for its own computation, the time limit, and had done 5 of "
-            "50 steps; set a longer limit with --seconds",
+            "it used 1.5 s of CPU time, the time limit, and had done 5 of 50 steps; "
+            "set a longer limit with --seconds",
+        ),
+        (
+            "import time\nrobot.step(160)\ntime.sleep(99)\n",
+            "it slept or blocked for 1.5 s, the time limit, and had done 5 of 50 "
+            "steps; remove time.sleep, input and other calls that wait, or set a "
+            "longer limit with --seconds",
         ),
     ],
 )

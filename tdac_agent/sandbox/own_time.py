@@ -1,0 +1,111 @@
+"""The time that a program takes for itself, and what used it up.
+
+A program and the judge take turns. In its turns, a program computes, sleeps, or waits
+for a CPU. It may compute and sleep for a given time each. Waiting is the machine's
+doing: it counts for nothing, and ends the run as a failure of the machine in the end.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from tdac_agent.sandbox.channel import MOST_WAITED_SECONDS, SOON_SECONDS, DeadlineError
+
+Blame = Literal["computed", "slept", "machine"]
+
+
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """How a program spent its turns.
+
+    Attributes:
+        wall: Length of its turns, s.
+        ran: CPU time, s.
+        waited: Run-queue wait time of the program and of the judge, s; 0 if the
+            kernel does not tell.
+        ready: Whether it runs or waits for a CPU now.
+    """
+
+    wall: float
+    ran: float
+    waited: float
+    ready: bool
+
+    @property
+    def slept(self) -> float:
+        """Time asleep, s."""
+        return max(0.0, self.wall - self.ran - self.waited)
+
+
+def blame(spent: Spent, seconds: float) -> Blame | None:
+    """Returns what used up `seconds`; None if there is time left.
+
+    A program that is ready is not asleep, whatever the measured times are: the last
+    wait in the queue is not counted yet, and the host of a virtual machine may have
+    taken its CPU away.
+    """
+    if spent.ran >= seconds:
+        return "computed"
+    if spent.slept >= seconds and not spent.ready:
+        return "slept"
+    if spent.wall >= 2.0 * seconds + MOST_WAITED_SECONDS:
+        return "machine"
+    return None
+
+
+def seconds_to_next_look(spent: Spent, seconds: float) -> float:
+    """Returns how long no time can be used up; at least a moment."""
+    return max(min(seconds - spent.ran, seconds - spent.slept), SOON_SECONDS / 5)
+
+
+class OwnTime:
+    """Limits the time that a program takes for itself.
+
+    Args:
+        seconds: Time that it may compute, and sleep.
+        look: Returns its CPU time and the run-queue wait time since it exists, and
+            whether it is ready. It is called only when time may be used up.
+    """
+
+    def __init__(
+        self, seconds: float, look: Callable[[], tuple[float, float, bool]]
+    ) -> None:
+        self._seconds, self._look = seconds, look
+        self._ran, self._waited, _ = look()
+        self._wall, self._next_look = 0.0, seconds
+        self._began, self._end = 0.0, math.inf
+
+    def begin_turn(self, at_most: float) -> None:
+        """Begins a turn that may last `at_most` seconds, whatever happens in it."""
+        self._began = time.monotonic()
+        self._end = self._began + at_most
+
+    def end_turn(self) -> float:
+        """Ends the turn; returns its length, s."""
+        turn = time.monotonic() - self._began
+        self._wall += turn
+        return turn
+
+    def left(self) -> float:
+        """Returns the seconds until the next call; at most 0 at the turn's end.
+
+        Raises:
+            DeadlineError: The time is used up.
+        """
+        now = time.monotonic()
+        wall = self._wall + now - self._began
+        if wall >= self._next_look:
+            self._next_look = wall + self._checked(wall)
+        return min(self._next_look - wall, self._end - now)
+
+    def _checked(self, wall: float) -> float:
+        ran, waited, ready = self._look()
+        spent = Spent(wall, ran - self._ran, waited - self._waited, ready)
+        cause = blame(spent, self._seconds)
+        if cause is not None:
+            raise DeadlineError(busy=cause == "computed", machine=cause == "machine")
+        return seconds_to_next_look(spent, self._seconds)
