@@ -213,7 +213,12 @@ class Child:
         )
 
     def run_program(
-        self, world: ProgramWorld, arguments: list[str], timeout: float, grace: float
+        self,
+        world: ProgramWorld,
+        name: str,
+        arguments: list[str],
+        timeout: float,
+        grace: float,
     ) -> Any:
         """Run the controller's file as a program that asks `world` for each step.
 
@@ -221,13 +226,14 @@ class Child:
 
         Args:
             world: Answers the program's requests in this process.
+            name: Name of the folder in which it runs.
             arguments: Command-line arguments.
             timeout: Seconds that the program may compute, and sleep, in total.
             grace: Seconds that it may take after the world has ended.
         """
         return self._converse(
             Kind.RUN_PROGRAM,
-            arguments,
+            (name, arguments),
             "the run",
             world,
             timeout,

@@ -13,6 +13,7 @@ from tdac_agent.sandbox import (
     ControllerFault,
     ControllerTimeout,
 )
+from tdac_agent.webots.project import has_module, project_of
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.log import Log, driven_length
 from tdac_envs.webots.stage import ControllerWorld
@@ -140,6 +141,12 @@ def _described(
     if fault.type_name != "ModuleNotFoundError" or missing is None:
         return text
     name = missing[1].partition(".")[0]
+    place = has_module(project_of(controller), name)
+    if place:
+        return (
+            f"{text}; {place} of the project is not on Python's path, nor is it in "
+            "Webots: extend sys.path, or put a copy of it beside the controller"
+        )
     beside = controller.resolve().parent.parent
     if (beside / name).is_dir() or (beside / f"{name}.py").is_file():
         return (

@@ -26,6 +26,8 @@ from tdac_agent.sandbox import (
     start,
 )
 from tdac_agent.verification.verify import read_source
+from tdac_agent.webots.copying import LARGEST
+from tdac_agent.webots.project import copier_of, copy_files, copy_folders
 from tdac_agent.webots.report import WebotsReport, report_of
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.log import Log
@@ -34,14 +36,12 @@ from tdac_envs.webots.server import RunEnded, StepServer
 from tdac_envs.webots.stage import ControllerWorld
 
 PACKAGE = Path(tdac_envs.webots.__file__).parent / "controller"
-LIMITS = Limits(output_bytes=16 << 20)
+LIMITS = Limits(output_bytes=16 << 20, scratch_bytes=2 * LARGEST)
 GRACE_SECONDS = 1.0
 """Time for a controller after the end of a run, as in Webots."""
 START_SECONDS = 10.0
 SPARE_SECONDS = 10
 """CPU time for starting and ending, so that the kernel's limit never comes first."""
-LARGEST_FOLDER = 64 << 20
-_NOT_COPIED = (PACKAGE.name, "__pycache__", "build")
 Watch = Callable[[int], None]
 
 
@@ -114,9 +114,10 @@ def run_controller(
         most = max(LIMITS.cpu_seconds, math.ceil(seconds) + SPARE_SECONDS)
         limits = replace(LIMITS, cpu_seconds=most)
     fault: ControllerFault | None = None
-    left_out: tuple[str, ...] = ()
+    copier = copier_of(controller)
     with tempfile.TemporaryDirectory(prefix="tdac-webots-") as folder:
-        _copy_files(Path(folder), controller, stage)
+        copy_files(Path(folder), controller, copier)
+        (Path(folder) / stage.name).write_text(stage.text, encoding="utf-8")
         try:
             child = start(
                 Path(folder),
@@ -135,9 +136,14 @@ def run_controller(
                 child.folder.work / PACKAGE.name,
                 ignore=shutil.ignore_patterns("__pycache__"),
             )
-            left_out = _copy_folders(child.folder.work, controller)
-            arguments = list(stage.arguments())
-            child.run_program(_World(server, watch), arguments, seconds, GRACE_SECONDS)
+            copy_folders(child.folder.work, controller, copier)
+            child.run_program(
+                _World(server, watch),
+                _folder_name(controller),
+                list(stage.arguments()),
+                seconds,
+                GRACE_SECONDS,
+            )
         except RunEnded:
             pass
         except ControllerFault as error:
@@ -152,9 +158,14 @@ def run_controller(
     if not server.log.poses:
         server.reset()
     report = report_of(controller, stage, server.log, env, fault, usage, child.tier)
-    if left_out:
-        report = replace(report, notes=(*report.notes, *left_out))
+    report = replace(report, notes=(*report.notes, *copier.notes))
     return WebotsRun(report, server.log)
+
+
+def _folder_name(controller: Path) -> str:
+    """Name of the controller's folder; another one if it cannot be sent."""
+    name = controller.resolve().parent.name
+    return name if name.isprintable() and name else "controller"
 
 
 def frames(env: EPuckEnv, log: Log, stride: int) -> Iterator[NDArray[np.uint8]]:
@@ -177,54 +188,3 @@ def _picture(env: EPuckEnv) -> NDArray[np.uint8]:
     frame = env.render()
     assert frame is not None
     return frame
-
-
-def _copy_files(folder: Path, controller: Path, stage: ControllerWorld) -> None:
-    """Copies all files of the controller's folder, and the world.
-
-    Raises:
-        ControllerFileError: The files cannot be read, or are too large.
-    """
-    room = LARGEST_FOLDER
-    try:
-        for entry in sorted(controller.resolve().parent.iterdir()):
-            if not entry.is_file():
-                continue
-            room -= entry.stat().st_size
-            if room < 0:
-                raise ControllerFileError(
-                    f"{entry.parent} has more than {LARGEST_FOLDER >> 20} MB; put "
-                    "the controller in a folder of its own"
-                )
-            shutil.copyfile(entry, folder / entry.name)
-    except OSError as error:
-        raise ControllerFileError(
-            f"cannot copy the folder of {controller}: {error}"
-        ) from error
-    (folder / stage.name).write_text(stage.text, encoding="utf-8")
-
-
-def _copy_folders(work: Path, controller: Path) -> tuple[str, ...]:
-    """Copies the subfolders beside the controller; returns notes on those left out."""
-    room, notes = LARGEST_FOLDER, list[str]()
-    for folder in sorted(controller.resolve().parent.iterdir()):
-        if not folder.is_dir() or folder.name in _NOT_COPIED or folder.name[0] == ".":
-            continue
-        try:
-            size = sum(part.stat().st_size for part in folder.rglob("*"))
-            if size > room:
-                notes.append(
-                    f"the folder {folder.name} beside the controller is not copied: "
-                    f"more than {LARGEST_FOLDER >> 20} MB"
-                )
-                continue
-            room -= size
-            shutil.copytree(
-                folder,
-                work / folder.name,
-                ignore=shutil.ignore_patterns("__pycache__", ".*"),
-                ignore_dangling_symlinks=True,
-            )
-        except (OSError, shutil.Error) as error:
-            notes.append(f"the folder {folder.name} cannot be copied: {error}")
-    return tuple(notes)
