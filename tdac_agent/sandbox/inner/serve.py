@@ -76,7 +76,8 @@ class Server:
         if kind == Kind.LOAD:
             return self._load()
         if kind == Kind.RUN_PROGRAM:
-            return run_program(self._read_source(), *value, Env(self))
+            name, arguments = value
+            return run_program(self._read_source(), name, arguments, Env(self))
         raise WireError(f"not a request: {kind}")
 
     def _use(self, kind: int, owner: object, name: str | None, *rest: Any) -> Any:
