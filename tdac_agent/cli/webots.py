@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -62,6 +62,8 @@ def run(
     }
     console = Console(stderr=as_json)
     env = stage.make_env(**options)
+    if not as_json:
+        _show_notes(stage.notes, console)
     with _bar(console) as bar:
         watch = _watcher(bar, controller.name, env.nominal.horizon)
         done = run_controller(
@@ -71,7 +73,7 @@ def run(
         record = {"schema_version": 1, **asdict(done.report)}
         sys.stdout.write(json.dumps(record, indent=2) + "\n")
     else:
-        _show(done.report, console)
+        _show(done.report, stage.notes, console)
     if video is not None:
         with console.status(f"drawing {escape(video.name)} …"):
             env = stage.make_env(**options, render_mode="rgb_array")
@@ -104,7 +106,13 @@ def _watcher(bar: Progress, name: str, most: int) -> Callable[[int], None]:
     return watch
 
 
-def _show(report: WebotsReport, console: Console) -> None:
+def _show_notes(notes: Iterable[str], console: Console) -> None:
+    for note in notes:
+        console.print(Text(f"note: {note}"), soft_wrap=True)
+
+
+def _show(report: WebotsReport, shown: tuple[str, ...], console: Console) -> None:
+    """Shows a report but for the notes that were shown before the run."""
     if report.sandbox == "rlimits":
         console.print(
             "[yellow]warning: with the sandbox tier rlimits, the controller can access "
@@ -114,8 +122,7 @@ def _show(report: WebotsReport, console: Console) -> None:
     if report.error is not None:
         console.print("[red]the controller failed[/]")
         console.print(Text(f"  {report.error}\n{report.traceback}"), soft_wrap=True)
-    for note in report.notes:
-        console.print(Text(f"note: {note}"), soft_wrap=True)
+    _show_notes((note for note in report.notes if note not in shown), console)
     console.print(_table(report))
     colour, word = ("green", "passed") if report.passed else ("red", "not passed")
     why = f": {escape(report.why_not)}" if report.why_not else ""

@@ -23,16 +23,17 @@ _PLACED = {
     "Compass": ("compass", 39),
     "InertialUnit": ("inertial unit", 46),
 }
-# Devices that are not modelled, and their default names.
-_DEFAULTS = {
+NAMES_OF = {
     "Altimeter": "altimeter", "Camera": "camera", "Connector": "connector",
     "Display": "display", "Emitter": "emitter", "Lidar": "lidar", "Pen": "pen",
     "Radar": "radar", "RangeFinder": "range-finder", "Receiver": "receiver",
     "Speaker": "speaker", "TouchSensor": "touch sensor", "LED": "led",
     "VacuumGripper": "vacuum gripper", "RotationalMotor": "rotational motor",
     "LinearMotor": "linear motor", "PositionSensor": "position sensor",
-    "Accelerometer": "accelerometer", "Gyro": "gyro",
+    "Accelerometer": "accelerometer", "Gyro": "gyro", "Brake": "brake",
+    "Microphone": "microphone", "Radio": "radio", "Skin": "skin",
 }  # fmt: skip
+"""Default names of devices, most of which are not modelled."""
 _MUTE_KINDS = {"Emitter", "Receiver", "Speaker", "LED"}
 _MUTE = (("Emitter", 43), ("Receiver", 56), ("Speaker", 59))
 _MOST_VALUES = 2_000_000
@@ -105,9 +106,9 @@ def find_devices(
     known = {device.name for device in devices}
     absent: list[str] = []
     for node, frame in mounted:
-        default, node_type = _PLACED.get(node.kind, (_DEFAULTS.get(node.kind, ""), 0))
+        default, node_type = _PLACED.get(node.kind, (NAMES_OF.get(node.kind, ""), 0))
         name = text(node, "name", default)
-        if name in known or not (node_type or node.kind in _DEFAULTS):
+        if name in known or not (node_type or node.kind in NAMES_OF):
             continue
         known.add(name)
         kind = node.kind if node_type or node.kind in _MUTE_KINDS else "Unknown"

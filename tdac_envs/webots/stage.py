@@ -21,6 +21,7 @@ from tdac_envs.webots.devices import DeviceFacts, find_devices
 from tdac_envs.webots.floors import find_floors
 from tdac_envs.webots.instruments import Instruments, find_instruments
 from tdac_envs.webots.lights import find_lights
+from tdac_envs.webots.missing import missing_devices
 from tdac_envs.webots.mounts import mounts
 from tdac_envs.webots.movable import Movable, find_movables
 from tdac_envs.webots.reach import (
@@ -39,6 +40,7 @@ from tdac_envs.worlds.wbt.protofiles import ProtoFolder
 from tdac_envs.worlds.wbt.reader import frame_of, read_text, read_world, with_goal
 from tdac_envs.worlds.wbt.robots import is_epuck
 from tdac_envs.worlds.wbt.tree import Node, parse
+from tdac_envs.worlds.wbt.unknown import unknown_fields
 from tdac_envs.worlds.world import World, check_modelled
 
 
@@ -197,7 +199,9 @@ def open_stage(
     top = frame_of(document)
     robot, own = _find_robot(document.nodes, top, path.name, controller)
     mounted = tuple(mounts(robot, own, in_file))
-    all_nodes = ProtoFolder(path.parent, document.version).expanded(document).nodes
+    protos = ProtoFolder(path.parent, document.version)
+    all_nodes = protos.expanded(document).nodes
+    notes += tuple(unknown_fields(document, protos.fields()))
     floors = find_floors(all_nodes, top, path.parent)
     lights = find_lights(document.nodes, top)
     instruments = find_instruments(robot, mounted, lights, floors)
@@ -206,6 +210,8 @@ def open_stage(
     scanners = find_scanners(mounted)
     limit = world.robot.max_wheel_speed
     devices, absent = find_devices(limit, mounted, instruments, cameras, scanners)
+    absent = tuple(dict.fromkeys((*absent, *too_large)))
+    notes += tuple(missing_devices(absent, mounted))
     frame = FileFrame.of(top, own, in_file.heading)
     scene = NodeTable(document.nodes)
     return ControllerWorld(
@@ -221,7 +227,7 @@ def open_stage(
         frame=frame,
         movables=find_movables(Ground.of(world), document.nodes, top),
         devices=devices,
-        absent=tuple(dict.fromkeys((*absent, *too_large))),
+        absent=absent,
         instruments=instruments,
         cameras=cameras,
         scanners=scanners,

@@ -66,6 +66,10 @@ class ProtoFolder:
         nodes = tuple(self._expand(node, 0) for node in document.nodes)
         return replace(document, nodes=nodes)
 
+    def fields(self) -> dict[str, Iterable[str]]:
+        """Names of the fields of each PROTO that was expanded."""
+        return {kind: proto.defaults for kind, proto in self._known.items() if proto}
+
     def _expand(self, node: Node, depth: int) -> Node:
         if node.kind in ROBOTS or is_epuck(node):
             return node

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from tdac_envs.worlds.wbt.found import WorldContent
 from tdac_envs.worlds.wbt.frames import Frame, world_frame
 from tdac_envs.worlds.wbt.protofiles import ProtoFolder
 from tdac_envs.worlds.wbt.tree import Document, Node, parse
+from tdac_envs.worlds.wbt.unknown import unknown_fields, without_lost_scales
 from tdac_envs.worlds.wbt.walk import walk
 from tdac_envs.worlds.world import INFINITE_FRICTION, EPuck, World
 
@@ -70,9 +71,7 @@ def read_world(
         goal: See `load_world`.
         folder: Folder of the file, for the project's PROTOs; None to use none.
     """
-    document = parse(content, name)
-    if folder is not None:
-        document = ProtoFolder(folder, document.version).expanded(document)
+    document, odd = _read(content, name, folder)
     info, frame = _world_info(document), frame_of(document)
     found = WorldContent()
     for node in document.nodes:
@@ -95,7 +94,17 @@ def read_world(
     )
     if goal is not None:
         world = with_goal(world, finite_point("goal", goal))
-    return replace(world, notes=(*found.notes, *_notes(world, found)))
+    return replace(world, notes=(*found.notes, *odd, *_notes(world, found)))
+
+
+def _read(content: str, name: str, folder: Path | None) -> tuple[Document, list[str]]:
+    """The nodes of a file, and notes on fields that they do not have."""
+    document = parse(content, name)
+    made, own = without_lost_scales(document), dict[str, Iterable[str]]()
+    if folder is not None:
+        protos = ProtoFolder(folder, document.version)
+        made, own = protos.expanded(made), protos.fields()
+    return made, unknown_fields(document, own)
 
 
 def with_goal(world: World, goal: tuple[float, float]) -> World:

@@ -151,3 +151,39 @@ def test_renamed_motors(tmp_path):
     x, _, heading = server.log.poses[-1]
     assert heading == pytest.approx(2.0 * 0.02 / 0.052 * 0.32, rel=1e-5)
     assert x > 0.01
+
+
+MISSING = """#VRML_SIM R2025a utf8
+RectangleArena { floorSize 2 2 }
+E-puck {
+  gpsSlot [ GPS { } ]
+  turretSlot [
+    TouchSensor { name "bumper" boundingObject Box { size 0.1 0.1 0.1 } }
+    Hokuyo { }
+    GPS { }
+    Pose { children [ Microphone { } Display { name "screen" } ] }
+  ]
+  groundSensorsSlot [ E-puckGroundSensors { } TouchSensor { } ]
+}
+"""
+
+
+def test_missing_devices_are_named_before_the_run(tmp_path):
+    """One line for those without data, and one for each node that is not read."""
+    file = tmp_path / "w.wbt"
+    file.write_text(MISSING)
+    stage = open_stage(file)
+    slot, silent, unknown = stage.notes
+    assert slot.startswith("line 4: field 'gpsSlot' of E-puck is not used")
+    for name in ("TouchSensor 'bumper'", "Microphone 'microphone'", "Display 'screen'",
+                 "TouchSensor 'touch sensor'"):  # fmt: skip
+        assert name in silent
+    assert "GPS" not in silent
+    assert unknown.startswith("line 7: Hokuyo on the robot is not modelled")
+
+
+@pytest.mark.parametrize("name", bundled_worlds())
+def test_nothing_is_missing_in_bundled_worlds(name):
+    """The standard devices of an e-puck need no note."""
+    stage = open_stage(world_file(name))
+    assert not any("not modelled:" in note or "line " in note for note in stage.notes)

@@ -1,0 +1,94 @@
+"""Finds fields that nodes do not have, which Webots and the reader skip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from tdac_envs.core.errors import hint
+from tdac_envs.core.intake import printable
+from tdac_envs.worlds.wbt.known_fields import KNOWN, LOST_SCALE
+from tdac_envs.worlds.wbt.tree import Document, Field, Node
+
+MOST_NOTES = 20
+_LOST_SCALE_IN = (2023, 2)
+_OWN = "Webots'"
+Own = Mapping[str, Iterable[str]]
+
+
+def without_lost_scales(document: Document) -> Document:
+    """The document without the field `scale` of nodes that no longer have it.
+
+    Webots skips it since R2023b; only Transform has kept it.
+    """
+    if document.release < _LOST_SCALE_IN:
+        return document
+    return replace(document, nodes=tuple(map(_without, document.nodes)))
+
+
+def _without(node: Node) -> Node:
+    lost = node.kind in LOST_SCALE
+    fields = {
+        name: _field_without(own)
+        for name, own in node.fields.items()
+        if not (lost and name == "scale")
+    }
+    same = all(fields.get(name) is own for name, own in node.fields.items())
+    return node if same else replace(node, fields=fields)
+
+
+def _field_without(own: Field) -> Field:
+    items = tuple(_without(i) if isinstance(i, Node) else i for i in own.items)
+    same = all(new is old for new, old in zip(items, own.items, strict=True))
+    return own if same else Field(items, own.offset)
+
+
+def unknown_fields(document: Document, own: Own) -> list[str]:
+    """Notes on fields that their nodes do not have.
+
+    Args:
+        document: The file, before PROTOs are expanded.
+        own: Fields of the project's own PROTOs, by name.
+    """
+    known = {kind: set(names) for kind, names in KNOWN.items()}
+    if document.release < _LOST_SCALE_IN:
+        for kind in LOST_SCALE - {"Pose"}:
+            known[kind].add("scale")
+    known |= {kind: set(names) for kind, names in own.items()}
+    found: dict[tuple[str, str], list[int]] = {}
+    for node in _nodes(document.nodes):
+        for name in node.fields:
+            if name in known.get(node.kind, node.fields):
+                continue
+            place = node.source.line(node.fields[name].offset)
+            found.setdefault((node.kind, name), []).append(place)
+    notes = [
+        _note(kind, name, lines, known[kind], "the project's" if kind in own else _OWN)
+        for (kind, name), lines in sorted(found.items(), key=lambda pair: min(pair[1]))
+    ]
+    more = f"{len(notes) - MOST_NOTES} further fields are not used, either"
+    return [*notes[:MOST_NOTES], *([more] if len(notes) > MOST_NOTES else [])]
+
+
+def _note(kind: str, name: str, lines: list[int], known: set[str], whose: str) -> str:
+    where = f"line {min(lines)}"
+    if len(lines) > 1:
+        where += f" and {len(lines) - 1} more"
+    field, node = printable(name), printable(kind)
+    return (
+        f"{where}: field {field!r} of {node} is not used; {whose} {node} has no such "
+        f"field{hint(field, sorted(known))}"
+    )
+
+
+def _nodes(nodes: Iterable[Node]) -> Iterable[Node]:
+    """All nodes of a file, each once although it may be used many times."""
+    stack, seen = list(nodes), set[int]()
+    while stack:
+        node = stack.pop()
+        if id(node) in seen:
+            continue
+        seen.add(id(node))
+        yield node
+        for own in node.fields.values():
+            stack.extend(item for item in own.items if isinstance(item, Node))
