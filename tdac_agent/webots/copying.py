@@ -71,7 +71,7 @@ class Copier:
         """
         before = self.room, self.files
         try:
-            self._tree(source, target, suffix, 0)
+            self._tree(source, target, suffix, ())
         except NoSpaceError:
             self.room, self.files = before
             shutil.rmtree(target, ignore_errors=True)
@@ -80,9 +80,14 @@ class Copier:
             return False
         return target.is_dir()
 
-    def _tree(self, source: Path, target: Path, suffix: str, depth: int) -> None:
+    def _tree(
+        self, source: Path, target: Path, suffix: str, above: tuple[Path, ...]
+    ) -> None:
         real = self._inside(source)
-        if real is None or depth > DEEPEST:
+        if real is None or real in above:  # a link to a folder above copies nothing
+            return
+        if len(above) > DEEPEST:
+            self._note(source, f"more than {DEEPEST} folders deep")
             return
         self._take(0)
         target.mkdir()
@@ -94,9 +99,9 @@ class Copier:
         for entry in entries:
             if entry.name in _HIDDEN or entry.name.startswith("."):
                 continue
-            inner = source / entry.name
-            if entry.is_dir():
-                self._tree(inner, target / entry.name, suffix, depth + 1)
+            inner = real / entry.name
+            if inner.is_dir():
+                self._tree(inner, target / entry.name, suffix, (*above, real))
             elif entry.name.endswith(suffix):
                 self.file(inner, target / entry.name)
 

@@ -35,7 +35,7 @@ def copy_files(folder: Path, controller: Path, copier: Copier) -> None:
     own = controller.resolve().parent
     try:
         for entry in sorted(own.iterdir()):
-            if entry.is_file():
+            if entry.is_file() and entry.name not in _NOT_COPIED:
                 copier.file(entry, folder / entry.name)
     except NoSpaceError:
         raise ControllerFileError(

@@ -25,10 +25,12 @@ from tdac_agent.sandbox import (
     installed_packages,
     start,
 )
+from tdac_agent.sandbox.inner.wire import WireError
 from tdac_agent.verification.verify import read_source
 from tdac_agent.webots.copying import LARGEST
 from tdac_agent.webots.project import copier_of, copy_files, copy_folders
 from tdac_agent.webots.report import WebotsReport, report_of
+from tdac_envs.core.errors import WorldError
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.log import Log
 from tdac_envs.webots.requests import RequestError
@@ -105,6 +107,7 @@ def run_controller(
     Raises:
         ControllerFileError: The controller cannot be read.
         Fault: The sandbox failed, or the machine was too busy.
+        WorldError: The world has too many nodes or devices for a controller.
     """
     source = read_source(controller)
     server = StepServer(env, stage)
@@ -153,6 +156,11 @@ def run_controller(
             raise Fault(f"{error}; it had done {steps}") from error
         except SandboxError as error:
             raise Fault(f"the sandbox failed: {error}") from error
+        except WireError as error:
+            raise WorldError(
+                f"{stage.name}: too large to be described to a controller: {error}; "
+                "leave out nodes that the robot does not need"
+            ) from error
         finally:
             usage = child.close()
     if not server.log.poses:

@@ -12,6 +12,7 @@ from tdac_envs.worlds.wbt.known_fields import KNOWN
 from tdac_envs.worlds.wbt.robots import ROBOTS
 from tdac_envs.worlds.wbt.tree import Node
 
+MOST_NAMED = 20
 _MODELLED = {
     "E-puckDistanceSensor", "E-puckGroundSensors", "RobotisLds01", "RpLidarA2",
     *ROBOTS,
@@ -38,18 +39,22 @@ def missing_devices(absent: Iterable[str], mounted: Iterable[Mount]) -> list[str
     notes = []
     if named:
         notes.append(
-            f"not modelled: {', '.join(named)}; getDevice finds what is named here, "
-            "but it gives no data and has no effect"
+            f"not modelled: {_listed(named)}; getDevice finds what is named here, but "
+            "it gives no data and has no effect"
         )
-    return notes + [_unknown(node) for node in nodes if _is_unknown(node)]
+    unknown = dict.fromkeys(printable(n.kind) for n in nodes if _is_unknown(n))
+    if unknown:
+        notes.append(
+            f"not modelled on the robot: {_listed(list(unknown))}; getDevice finds no "
+            "device in them"
+        )
+    return notes
 
 
 def _is_unknown(node: Node) -> bool:
     return node.kind not in KNOWN.keys() | NAMES_OF.keys() | _MODELLED | _NO_DEVICES
 
 
-def _unknown(node: Node) -> str:
-    return (
-        f"line {node.line}: {printable(node.kind)} on the robot is not modelled; "
-        "getDevice finds no device in it"
-    )
+def _listed(names: list[str]) -> str:
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -8,12 +8,14 @@ from dataclasses import replace
 from tdac_envs.core.errors import hint
 from tdac_envs.core.intake import printable
 from tdac_envs.worlds.wbt.known_fields import KNOWN, LOST_SCALE
+from tdac_envs.worlds.wbt.tokens import Source
 from tdac_envs.worlds.wbt.tree import Document, Field, Node
 
 MOST_NOTES = 20
 _LOST_SCALE_IN = (2023, 2)
 _OWN = "Webots'"
 Own = Mapping[str, Iterable[str]]
+Place = tuple[int, Source]
 
 
 def without_lost_scales(document: Document) -> Document:
@@ -55,25 +57,28 @@ def unknown_fields(document: Document, own: Own) -> list[str]:
         for kind in LOST_SCALE - {"Pose"}:
             known[kind].add("scale")
     known |= {kind: set(names) for kind, names in own.items()}
-    found: dict[tuple[str, str], list[int]] = {}
+    found: dict[tuple[str, str], list[Place]] = {}
     for node in _nodes(document.nodes):
-        for name in node.fields:
-            if name in known.get(node.kind, node.fields):
-                continue
-            place = node.source.line(node.fields[name].offset)
-            found.setdefault((node.kind, name), []).append(place)
+        names = known.get(node.kind, node.fields)
+        for name, field in node.fields.items():
+            if name not in names:
+                place = field.offset, node.source
+                found.setdefault((node.kind, name), []).append(place)
     notes = [
-        _note(kind, name, lines, known[kind], "the project's" if kind in own else _OWN)
-        for (kind, name), lines in sorted(found.items(), key=lambda pair: min(pair[1]))
+        _note(kind, name, places, known[kind], "the project's" if kind in own else _OWN)
+        for (kind, name), places in list(found.items())[:MOST_NOTES]
     ]
-    more = f"{len(notes) - MOST_NOTES} further fields are not used, either"
-    return [*notes[:MOST_NOTES], *([more] if len(notes) > MOST_NOTES else [])]
+    more = f"{len(found) - MOST_NOTES} further fields are not used, either"
+    return [*notes, *([more] if len(found) > MOST_NOTES else [])]
 
 
-def _note(kind: str, name: str, lines: list[int], known: set[str], whose: str) -> str:
-    where = f"line {min(lines)}"
-    if len(lines) > 1:
-        where += f" and {len(lines) - 1} more"
+def _note(
+    kind: str, name: str, places: list[Place], known: set[str], whose: str
+) -> str:
+    offset, source = places[0]
+    where = f"line {source.line(offset)}"
+    if len(places) > 1:
+        where += f" and {len(places) - 1} more"
     field, node = printable(name), printable(kind)
     return (
         f"{where}: field {field!r} of {node} is not used; {whose} {node} has no such "
@@ -82,13 +87,13 @@ def _note(kind: str, name: str, lines: list[int], known: set[str], whose: str) -
 
 
 def _nodes(nodes: Iterable[Node]) -> Iterable[Node]:
-    """All nodes of a file, each once although it may be used many times."""
-    stack, seen = list(nodes), set[int]()
+    """All nodes in the order of the file, each once although it may be used often."""
+    stack, seen = list(nodes)[::-1], set[int]()
     while stack:
         node = stack.pop()
         if id(node) in seen:
             continue
         seen.add(id(node))
         yield node
-        for own in node.fields.values():
-            stack.extend(item for item in own.items if isinstance(item, Node))
+        inner = (item for own in node.fields.values() for item in own.items)
+        stack.extend([item for item in inner if isinstance(item, Node)][::-1])

@@ -5,7 +5,8 @@ import os
 import pytest
 from worlds_for_controllers import OPEN
 
-from tdac_agent.webots.copying import MOST_NOTES, Copier, NoSpaceError
+from tdac_agent.sandbox.inner.program import PROJECT
+from tdac_agent.webots.copying import DEEPEST, MOST_NOTES, Copier, NoSpaceError
 from tdac_agent.webots.project import copier_of, copy_files, copy_folders, has_module
 from tdac_agent.webots.run import run_controller
 from tdac_envs.webots.stage import open_stage
@@ -120,17 +121,16 @@ def test_a_whole_folder_of_libraries_may_be_a_link(project, tmp_path):
 
 
 def test_links_in_the_project_are_followed_but_not_without_end(project, tmp_path):
-    """Links to folders above end the copying of that folder, which is left out."""
+    """Links to folders above, and to themselves, copy nothing."""
     root = project({"controllers/mine/mine.py": "", "libraries/good.py": ""})
     (root / "controllers" / "mine" / "same.py").symlink_to("../../libraries/good.py")
-    names, notes = copied(root, tmp_path)
-    assert (names, notes[1:]) == (["good.py", "mine.py", "same.py"], [])
+    (root / "libraries" / "itself").symlink_to("itself")
+    (root / "libraries" / "kit").mkdir()
     for name in ("a", "b", "c"):
-        (root / "libraries" / name).symlink_to("..")
-    (tmp_path / "work").rename(tmp_path / "before")
+        (root / "libraries" / name).symlink_to(".")
+        (root / "libraries" / "kit" / name).symlink_to("..")
     names, notes = copied(root, tmp_path)
-    assert names == ["mine.py", "same.py"]
-    assert "libraries is not copied to the controller: more than" in notes[0]
+    assert (names, len(notes)) == (["good.py", "mine.py", "same.py"], 1)
 
 
 def test_only_files_are_copied(project, tmp_path):
@@ -144,6 +144,24 @@ def test_only_files_are_copied(project, tmp_path):
     names, notes = copied(root, tmp_path)
     assert names == ["good.py", "mine.py"]
     assert any("controllers/large is not copied" in note for note in notes)
+
+
+def test_names_that_the_sandbox_uses_itself_are_left_out(run, tmp_path):
+    """Files and folders called as the package `controller`, or as the project."""
+    names = ("controllers/mine/controller", "controllers/mine/" + PROJECT,
+             "controllers/controller/x.py", "controllers/mine/build/x.py")  # fmt: skip
+    assert run(STEP, **dict.fromkeys(names, "x")).error is None
+
+
+def test_a_deep_folder_is_cut_off(project, tmp_path):
+    """A note says where."""
+    deep = "libraries/" + "d/" * DEEPEST
+    root = project(
+        {"controllers/mine/mine.py": "", f"{deep}/d/x.py": "", f"{deep}y": ""}
+    )
+    names, notes = copied(root, tmp_path)
+    assert names == ["mine.py", "y"]
+    assert f"more than {DEEPEST} folders deep" in notes[0]
 
 
 def test_notes_are_few_and_printable(tmp_path):

@@ -179,7 +179,17 @@ def test_missing_devices_are_named_before_the_run(tmp_path):
                  "TouchSensor 'touch sensor'"):  # fmt: skip
         assert name in silent
     assert "GPS" not in silent
-    assert unknown.startswith("line 7: Hokuyo on the robot is not modelled")
+    assert unknown.startswith("not modelled on the robot: Hokuyo;")
+
+
+def test_a_thousand_missing_devices_are_two_lines(tmp_path):
+    """Of many, the first ones are named."""
+    many = " ".join(f'Pen {{ name "{k}" }} Odd{k} {{ }}' for k in range(999))
+    file = tmp_path / "w.wbt"
+    file.write_text(MISSING.replace("Hokuyo { }", many))
+    notes = open_stage(file).notes[1:]
+    assert len(notes) == 2
+    assert all(len(note) < 800 and " more; getDevice" in note for note in notes)
 
 
 @pytest.mark.parametrize("name", bundled_worlds())
