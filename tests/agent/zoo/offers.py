@@ -1,8 +1,8 @@
 """Files that somebody else offers: what a command does with them, within which limits.
 
 An offer is a folder with hostile files and a command line that reads them. Whatever is
-in it, the command ends with the exit code that the offer names and one line, in little
-time and memory, and leaves nothing behind.
+in it, the command ends with the exit code that the offer names and one line, or none if
+the code is 0, in little time and memory, and leaves nothing behind.
 """
 
 from __future__ import annotations
@@ -120,12 +120,13 @@ def excesses(outcome: Outcome) -> list[str]:
 
 
 def line_problems(offer: Offer, code: int, errors: str) -> list[str]:
-    """What is wrong with an exit code and the line on stderr."""
+    """What is wrong with an exit code and the line on stderr; none if all is well."""
     found = []
+    lines = 1 if offer.code else 0
     if code != offer.code:
         found.append(f"exit {code}, expected {offer.code}: {errors[-400:]}")
-    elif len(errors.strip().splitlines()) != 1 or len(errors) > 1000:
-        found.append(f"expected one line: {errors[:400]}")
+    elif len(errors.strip().splitlines()) != lines or len(errors) > 1000:
+        found.append(f"expected {lines} lines: {errors[:400]}")
     elif not re.search(offer.says, errors):
         found.append(f"expected {offer.says!r}: {errors}")
     return found
