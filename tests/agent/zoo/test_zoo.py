@@ -115,7 +115,7 @@ def impatient():
 @pytest.mark.slow_after(3)
 @pytest.mark.parametrize("offer", AT_ONCE, ids=str)
 def test_a_hostile_file_is_refused_in_one_line(offer, tdac, tmp_path, impatient):
-    """With exit code 2 and no traceback, or none if it is harmless; nothing is written."""
+    """With exit code 2, or used without harm; no traceback, nothing is written."""
     if offer.needs:
         pytest.importorskip(offer.needs)
     here = tmp_path / "here"
