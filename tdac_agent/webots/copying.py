@@ -1,7 +1,8 @@
 """Copies what a Webots controller needs of its project, and nothing else.
 
-A project may come from anybody. Links that lead out of it, and anything but files and
-folders, are left out; the size, the number of files and the depth are bounded.
+A project may come from anybody, and its folder may be somebody's home. Links that lead
+out of the copied folders, and anything but files and folders, are left out; size, number
+of files and depth are bounded.
 """
 
 from __future__ import annotations
@@ -32,13 +33,15 @@ class Copier:
     """Copies parts of a project.
 
     Attributes:
-        root: Folder of the project, without links; nothing outside is copied.
+        root: Folder of the project, without links; notes name files relative to it.
+        within: Folders in it; nothing outside of them is copied.
         room: How many more bytes may be copied.
         files: How many more files may be copied.
         notes: What was left out, and why.
     """
 
     root: Path
+    within: tuple[Path, ...]
     room: int = LARGEST
     files: int = MOST_FILES
     notes: list[str] = field(default_factory=list)
@@ -106,14 +109,14 @@ class Copier:
                 self.file(inner, target / entry.name)
 
     def _inside(self, path: Path) -> Path | None:
-        """The path without links; None, and a note, if it is not in the project."""
+        """The path without links; None, and a note, if it leads elsewhere."""
         try:
             real = path.resolve(strict=True)
         except (OSError, RuntimeError):
             return None  # a link to nothing, or to itself
-        if real.is_relative_to(self.root):
+        if any(real.is_relative_to(folder) for folder in self.within):
             return real
-        self._note(path, "a link that leads out of the project")
+        self._note(path, "a link that leads out of the copied folders")
         return None
 
     def _take(self, size: int) -> None:

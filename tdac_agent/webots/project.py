@@ -23,7 +23,10 @@ def project_of(controller: Path) -> Path | None:
 
 def copier_of(controller: Path) -> Copier:
     """A copier for the files that the controller may have."""
-    return Copier(project_of(controller) or controller.resolve().parent)
+    project, own = project_of(controller), controller.resolve().parent
+    if project is None:
+        return Copier(own, (own,))
+    return Copier(project, (project / CONTROLLERS, project / LIBRARIES))
 
 
 def copy_files(folder: Path, controller: Path, copier: Copier) -> None:

@@ -157,10 +157,13 @@ def run_controller(
         except SandboxError as error:
             raise Fault(f"the sandbox failed: {error}") from error
         except WireError as error:
-            raise WorldError(
-                f"{stage.name}: too large to be described to a controller: {error}; "
-                "leave out nodes that the robot does not need"
-            ) from error
+            if server.log.steps:
+                fault = ControllerFault(f"asked for too much at once: {error}", "run")
+            else:
+                raise WorldError(
+                    f"{stage.name}: too large to be described to a controller: {error}"
+                    "; leave out nodes that the robot does not need"
+                ) from error
         finally:
             usage = child.close()
     if not server.log.poses:

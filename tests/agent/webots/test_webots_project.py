@@ -107,12 +107,25 @@ def test_links_out_of_the_project_are_left_out(project, tmp_path):
         (root / place / "root").symlink_to("/")
     names, notes = copied(root, tmp_path)
     assert names == ["good.py", "mine.py"]
-    told = [note for note in notes if "a link that leads out of the project" in note]
+    told = [
+        note for note in notes if "a link that leads out of the copied folders" in note
+    ]
     assert len(told) == 6
 
 
+def test_a_project_may_be_in_a_home(project, tmp_path):
+    """Links to other files of the project's folder, such as keys, are left out, too."""
+    root = project({"controllers/mine/mine.py": "", ".ssh/id": "", "data.txt": ""})
+    (root / "libraries").mkdir()
+    (root / "libraries" / "id").symlink_to("../.ssh/id")
+    (root / "controllers" / "mine" / "data").symlink_to("../../data.txt")
+    (root / "controllers" / "mine" / "home").symlink_to("../..")
+    names, notes = copied(root, tmp_path)
+    assert (names, len(notes)) == (["mine.py"], 3)
+
+
 def test_a_whole_folder_of_libraries_may_be_a_link(project, tmp_path):
-    """It is left out, too, if it leads out of the project."""
+    """It is left out, too, if it leads out of the copied folders."""
     root = project({"controllers/mine/mine.py": ""})
     (root / "libraries").symlink_to(tmp_path)
     names, notes = copied(root, tmp_path)
@@ -166,7 +179,7 @@ def test_a_deep_folder_is_cut_off(project, tmp_path):
 
 def test_notes_are_few_and_printable(tmp_path):
     """Names may have escapes; a thousand links are not a thousand notes."""
-    copier = Copier(tmp_path)
+    copier = Copier(tmp_path, (tmp_path,))
     for k in range(99):
         link = tmp_path / f"\x1b[31m{k}.py"
         link.symlink_to("/etc/hostname")
@@ -179,7 +192,7 @@ def test_the_room_is_for_all_files_together(tmp_path):
     """What no longer fits raises; a folder that does not fit takes no room."""
     (tmp_path / "in").mkdir()
     (tmp_path / "in" / "x").write_text("12345")
-    copier = Copier(tmp_path, room=9)
+    copier = Copier(tmp_path, (tmp_path,), room=9)
     copier.file(tmp_path / "in" / "x", tmp_path / "x")
     assert not copier.folder(tmp_path / "in", tmp_path / "out")
     assert (copier.room, (tmp_path / "out").exists()) == (4, False)

@@ -54,6 +54,14 @@ def _leading_out(root: Path) -> None:
         (root / folder / "all").symlink_to("/")
 
 
+def _in_a_home(root: Path) -> None:
+    """The project's folder has other files, to which it links."""
+    (root / ".keys").write_text(SECRET)
+    (root / "libraries" / "key.py").symlink_to("../.keys")
+    (root / "controllers" / "other" / "key.py").symlink_to("../../.keys")
+    (root / "controllers" / "c" / "home").symlink_to("../..")
+
+
 def _library_link(root: Path) -> None:
     (root / "libraries").rmdir()
     (root / "libraries").symlink_to("/")
@@ -121,6 +129,7 @@ DEVICES = " ".join(f'Pen {{ name "{"n" * 300}{k}" }}' for k in range(3000))
 FIELDS = " ".join(f"{'x' * 20}{k} {k}" for k in range(100_000))
 PROJECTS = [
     _project("leading-out", _leading_out),
+    _project("in-a-home", _in_a_home),
     _project("library-link", _library_link),
     _project("circles", _in_circles),
     _project("pipes", _pipes),
