@@ -1,8 +1,8 @@
 """Copies what a Webots controller needs of its project, and nothing else.
 
 A project may come from anybody, and its folder may be somebody's home. Links that lead
-out of the copied folders, and anything but files and folders, are left out; size, number
-of files and depth are bounded.
+out of the copied folders, and anything but files and folders, are left out; the size,
+the number of files and the depth are bounded.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 import tdac_envs.webots
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.sandbox import (
+    Child,
     ControllerError,
     ControllerFault,
     EnvRefusalError,
@@ -64,6 +65,11 @@ class _World:
     @property
     def is_over(self) -> bool:
         return self._server.is_over
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the controller has made a step."""
+        return self._server.log.steps > 0
 
     def reset(self) -> dict[str, Any]:
         try:
@@ -116,7 +122,6 @@ def run_controller(
     if limits is None:
         most = max(LIMITS.cpu_seconds, math.ceil(seconds) + SPARE_SECONDS)
         limits = replace(LIMITS, cpu_seconds=most)
-    fault: ControllerFault | None = None
     copier = copier_of(controller)
     with tempfile.TemporaryDirectory(prefix="tdac-webots-") as folder:
         copy_files(Path(folder), controller, copier)
@@ -140,30 +145,12 @@ def run_controller(
                 ignore=shutil.ignore_patterns("__pycache__"),
             )
             copy_folders(child.folder.work, controller, copier)
-            child.run_program(
-                _World(server, watch),
-                _folder_name(controller),
-                list(stage.arguments()),
-                seconds,
-                GRACE_SECONDS,
-            )
-        except RunEnded:
-            pass
-        except ControllerFault as error:
-            fault = error
+            fault = _run(child, _World(server, watch), controller, stage, seconds)
         except MachineBusyError as error:
             steps = f"{server.log.steps} of {env.nominal.horizon} steps"
             raise Fault(f"{error}; it had done {steps}") from error
         except SandboxError as error:
             raise Fault(f"the sandbox failed: {error}") from error
-        except WireError as error:
-            if server.log.steps:
-                fault = ControllerFault(f"asked for too much at once: {error}", "run")
-            else:
-                raise WorldError(
-                    f"{stage.name}: too large to be described to a controller: {error}"
-                    "; leave out nodes that the robot does not need"
-                ) from error
         finally:
             usage = child.close()
     if not server.log.poses:
@@ -171,6 +158,36 @@ def run_controller(
     report = report_of(controller, stage, server.log, env, fault, usage, child.tier)
     report = replace(report, notes=(*report.notes, *copier.notes))
     return WebotsRun(report, server.log)
+
+
+def _run(
+    child: Child,
+    world: _World,
+    controller: Path,
+    stage: ControllerWorld,
+    seconds: float,
+) -> ControllerFault | None:
+    """Runs a controller in a prepared child; returns how it failed, if it did.
+
+    Raises:
+        SandboxError: The sandbox failed, or the machine was too busy.
+        WorldError: The world has too many nodes or devices for a controller.
+    """
+    name, arguments = _folder_name(controller), list(stage.arguments())
+    try:
+        child.run_program(world, name, arguments, seconds, GRACE_SECONDS)
+    except RunEnded:
+        pass
+    except ControllerFault as error:
+        return error
+    except WireError as error:
+        if world.has_begun:
+            return ControllerFault(f"asked for too much at once: {error}", "the run")
+        raise WorldError(
+            f"{stage.name}: too large to be described to a controller: {error}; leave "
+            "out nodes that the robot does not need"
+        ) from error
+    return None
 
 
 def _folder_name(controller: Path) -> str:
