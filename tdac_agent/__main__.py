@@ -3,12 +3,15 @@
 import gc
 import sys
 
+from tdac_agent.interpreter import make_safe
+
 
 def main() -> None:
     """Runs the command line; Ctrl-C during its imports prints one line, too."""
     try:
         # Imported objects live until exit: collecting them is a waste of time.
         gc.disable()
+        make_safe()
         from tdac_agent.cli.main import main as command_line
 
         gc.freeze()

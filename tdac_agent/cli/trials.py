@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tdac_agent.errors import Fault
+from tdac_agent.interpreter import python, safe_environment
 from tdac_envs.core.errors import TdacError
 
 # On first use, a slow machine compiles for minutes.
@@ -32,12 +33,13 @@ def attempt(name: str) -> tuple[bool, str]:
     Returns:
         Whether it works, and a line on what works or why it does not.
     """
-    command = [sys.executable, "-P", "-m", __name__, name]
+    command = python("-m", __name__, name)
     try:
         done = subprocess.run(
             command,
             stdin=subprocess.DEVNULL,
             capture_output=True,
+            env=safe_environment(),
             check=False,
             timeout=SECONDS,
         )

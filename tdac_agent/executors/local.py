@@ -7,7 +7,6 @@ import os
 import selectors
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Generator, Iterator
 from contextlib import suppress
@@ -27,6 +26,7 @@ from tdac_agent.executors.executor import (
     Update,
     Work,
 )
+from tdac_agent.interpreter import python, safe_environment
 
 ERRORS = "errors.log"
 EXIT_SECONDS = 15.0
@@ -34,7 +34,8 @@ EXIT_SECONDS = 15.0
 MOST_JOBS = 500
 """Maximum number of jobs of one process, in case its memory grows."""
 CHUNK = 1 << 16
-ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "VECLIB_MAXIMUM")
+LIBRARIES = ("OMP", "OPENBLAS", "MKL", "NUMEXPR", "NUMBA", "VECLIB_MAXIMUM")
+ONE_THREAD = [f"{name}_NUM_THREADS" for name in LIBRARIES]
 
 
 @dataclass(slots=True, eq=False)
@@ -120,11 +121,11 @@ class _Pool:
     def _start(self) -> _Worker:
         arguments = [str(os.getpid()), self.work.module, json.dumps(self.work.terms)]
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tdac_agent.executors.worker", *arguments],
+            python("-m", "tdac_agent.executors.worker", *arguments),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self.errors,
-            env=os.environ | {f"{name}_NUM_THREADS": "1" for name in ONE_THREAD},
+            env=safe_environment() | dict.fromkeys(ONE_THREAD, "1"),
             # Ctrl-C interrupts only the driver, which passes it on.
             start_new_session=True,
         )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Generator
+from contextlib import chdir
 from importlib import import_module
 from typing import Any
 
@@ -24,6 +25,7 @@ from tdac_agent.executors.executor import (
     Update,
     Work,
 )
+from tdac_agent.interpreter import make_safe
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.extras import install_command
 
@@ -93,6 +95,7 @@ def _in_task(
 
 def _start(workers: int) -> Any:
     """Returns Ray, connected to the cluster in `RAY_ADDRESS` or to a new local one."""
+    make_safe()
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     # By default Ray runs tasks at low priority, and the judge would starve.
@@ -110,7 +113,9 @@ def _start(workers: int) -> Any:
     }
     options = {} if os.environ.get("RAY_ADDRESS") else local
     try:
-        ray.init(log_to_driver=False, logging_level=logging.ERROR, **options)
+        # Ray's processes take modules from the working directory of this moment.
+        with chdir("/"):
+            ray.init(log_to_driver=False, logging_level=logging.ERROR, **options)
     except Exception as error:  # of many types; after 30 s a plain Exception
         reason = " ".join(str(error).split())[:300]
         raise Fault(f"Ray did not start: {reason}") from error

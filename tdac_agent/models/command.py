@@ -10,6 +10,7 @@ import subprocess
 from contextlib import suppress
 
 from tdac_agent.errors import ProviderError
+from tdac_agent.interpreter import given_environment
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import ProviderFault, Reply, Request
 from tdac_agent.models.streamed import MAX_CHARS
@@ -64,7 +65,12 @@ class Command:
         pipe = subprocess.PIPE
         try:
             process = subprocess.Popen(
-                self._argv, stdin=pipe, stdout=pipe, stderr=pipe, start_new_session=True
+                self._argv,
+                stdin=pipe,
+                stdout=pipe,
+                stderr=pipe,
+                start_new_session=True,
+                env=given_environment(),
             )
         except OSError as error:
             raise ProviderFault(f"cannot start the program: {error.strerror}") from None

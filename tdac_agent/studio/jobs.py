@@ -1,31 +1,28 @@
 """Commands that the studio starts, as processes of their own.
 
 They outlive the studio. Each has a folder with its command (`job.json`) and its output
-(`output.txt`), by which another studio in the same folder finds it again.
+(`output.txt`), by which another studio in the same folder finds it again. A `job.json`
+that this installation did not write is shown, and is never started or stopped.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 import signal
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from tdac_agent.interpreter import python, safe_environment
 from tdac_agent.library.listing import next_folder
-from tdac_agent.storage.files import write_atomic
+from tdac_agent.studio.folder import STATE, made_within
+from tdac_agent.studio.job_file import JobFile, read_job, write_job
 from tdac_envs.core.intake import read_file
 
-STATE = ".studio"
-"""Folder of the studio in the folder where it was started."""
-FILES = f"{STATE}/files"
-"""Folder of what was uploaded or made for a run."""
-JOBS, ABOUT, OUTPUT, ENDING = "jobs", "job.json", "output.txt", "exit"
+JOBS, ABOUT, OUTPUT, ENDING = f"{STATE}/jobs", "job.json", "output.txt", "exit"
 MOST_BYTES = 1 << 20
 TAIL = 4000
 """Characters of an output that are shown."""
@@ -53,18 +50,20 @@ class Job:
     Attributes:
         folder: Its folder.
         words: The words after `tdac`.
-        started: When, ISO 8601.
+        started: When.
         pid: Process group.
         born: Start time of the process, which tells it from a later one with its pid.
         about: What it works on: a run folder, or a folder of results.
+        ours: Whether this installation started it, and its file is unchanged.
     """
 
     folder: Path
     words: tuple[str, ...]
-    started: str
+    started: datetime
     pid: int
     born: str
     about: str
+    ours: bool
 
     @property
     def command(self) -> str:
@@ -73,11 +72,11 @@ class Job:
 
     @property
     def running(self) -> bool:
-        """Whether it still runs."""
+        """Whether it still runs; nobody knows it of one that is not ours."""
         for process in list(_STARTED):
             if process.poll() is not None:
                 _STARTED.remove(process)
-        return bool(self.born) and _born(self.pid) == self.born
+        return self.ours and bool(self.born) and _born(self.pid) == self.born
 
     @property
     def code(self) -> int | None:
@@ -90,9 +89,7 @@ class Job:
     @property
     def seconds(self) -> float:
         """Time since it was started, s."""
-        return (
-            datetime.now(UTC) - datetime.fromisoformat(self.started)
-        ).total_seconds()
+        return (datetime.now(UTC) - self.started).total_seconds()
 
     def output(self) -> str:
         """The end of what it has printed."""
@@ -104,7 +101,7 @@ class Job:
 
     def stop(self) -> None:
         """Interrupts it, as Ctrl-C does."""
-        if self.running:
+        if self.running and _leads_group(self.pid):
             os.killpg(self.pid, signal.SIGINT)
 
 
@@ -117,17 +114,17 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
         about: What it works on.
 
     Raises:
-        OSError: The folder cannot be written.
+        OSError: The folder cannot be written, or a link leads out of it.
     """
     before = job_of(place, about)
     if before is not None and before.running and before.words == tuple(words):
         return before
-    folder = _new_folder(place / STATE / JOBS)
-    command = [sys.executable, "-m", "tdac_agent", *words]
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "100"}
+    folder = _new_folder(made_within(place, JOBS))
+    command = python("-m", "tdac_agent", *words)
+    environment = {**safe_environment(), "PYTHONUNBUFFERED": "1", "COLUMNS": "100"}
     with (folder / OUTPUT).open("wb") as output:
         process = subprocess.Popen(
-            [sys.executable, "-c", _WRAPPED, str(folder / ENDING), *command],
+            python("-c", _WRAPPED, str(folder / ENDING), *command),
             cwd=place,
             stdin=subprocess.DEVNULL,
             stdout=output,
@@ -136,22 +133,20 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
             env=environment,
         )
     _STARTED.append(process)
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    job = Job(folder, tuple(words), now, process.pid, _born(process.pid), about)
-    facts = {
-        "words": job.words,
-        "started": job.started,
-        "pid": job.pid,
-        "born": job.born,
-        "about": job.about,
-    }
-    write_atomic(folder / ABOUT, json.dumps(facts) + "\n")
-    return job
+    facts = JobFile(
+        words=tuple(words),
+        started=datetime.now(UTC).replace(microsecond=0),
+        pid=process.pid,
+        born=_born(process.pid),
+        about=about,
+    )
+    write_job(folder / ABOUT, facts)
+    return _job(folder, facts, ours=True)
 
 
 def jobs(place: Path) -> list[Job]:
     """The jobs that were started in a folder, the newest first."""
-    files = (place / STATE / JOBS).glob(f"*/{ABOUT}")
+    files = (place / JOBS).glob(f"*/{ABOUT}")
     found = [job for job in map(_read, files) if job is not None]
     return sorted(found, key=lambda job: (job.started, job.folder.name), reverse=True)
 
@@ -161,15 +156,19 @@ def _read(file: Path) -> Job | None:
     if file in _KNOWN:
         return _KNOWN[file]
     try:
-        facts = json.loads(read_file(file, MOST_BYTES))
-        words = tuple(map(str, facts.pop("words")))
-        job = Job(folder=file.parent, words=words, **facts)
-    except (OSError, ValueError, TypeError, KeyError):
+        facts = read_job(file)
+    except (OSError, ValueError):
         return None
     if len(_KNOWN) >= MOST_KNOWN:
         _KNOWN.clear()
-    _KNOWN[file] = job
-    return job
+    _KNOWN[file] = _job(file.parent, facts, ours=facts.is_ours(file))
+    return _KNOWN[file]
+
+
+def _job(folder: Path, facts: JobFile, *, ours: bool) -> Job:
+    return Job(
+        folder, facts.words, facts.started, facts.pid, facts.born, facts.about, ours
+    )
 
 
 def job_of(place: Path, about: str) -> Job | None:
@@ -194,6 +193,14 @@ def _new_folder(parent: Path) -> Path:
             number += 1
         else:
             return folder
+
+
+def _leads_group(pid: int) -> bool:
+    """Whether a process leads a group of its own, as each job does."""
+    try:
+        return pid > 1 and os.getpgid(pid) == pid != os.getpgrp()
+    except OSError:
+        return False
 
 
 def _born(pid: int) -> str:

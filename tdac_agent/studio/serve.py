@@ -15,8 +15,8 @@ from nicegui import ui
 
 from tdac_agent.loopback import listen
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.studio.folder import STATE
 from tdac_agent.studio.gate import Gate
-from tdac_agent.studio.jobs import STATE
 from tdac_agent.studio.pages import (
     bench,
     compare,

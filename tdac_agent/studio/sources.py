@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from tdac_agent.studio.board import names_of
-from tdac_agent.studio.jobs import FILES
+from tdac_agent.studio.folder import FILES
 
 YAML = ".yaml", ".yml"
 PICTURES = ".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".tif", ".tiff", ".webp"

@@ -17,6 +17,7 @@ from tdac_agent.evaluation.entrants import BUILTIN
 from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE, UNFINISHED
 from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_verify import MOST_EPISODES
+from tdac_agent.studio.folder import within
 from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
     JobButtons,
@@ -27,7 +28,6 @@ from tdac_agent.studio.pages.layout import (
     job_heading,
     shown_first,
     status_badge,
-    within,
 )
 from tdac_agent.studio.pages.worlds import policies_in
 from tdac_agent.studio.sources import folders_with

@@ -18,12 +18,12 @@ from tdac_agent.studio.comparison import (
     lines_of,
     settings_of,
 )
+from tdac_agent.studio.folder import within
 from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
     report_frame,
     shown_first,
-    within,
 )
 
 MOST_LINES = 3000

@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
-from tdac_agent.studio.pages.layout import within
+from tdac_agent.studio.folder import within
 
 # A report is made from files that others may have written: its frame can neither read
 # the studio's cookie nor ask it for anything.

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from nicegui import events, ui
 
-from tdac_agent.studio.jobs import FILES
+from tdac_agent.studio.folder import FILES, keep
 
 STYLE = """
 body { font-family: system-ui, sans-serif; background: #f6f6f3; color: #23262e; }
@@ -139,24 +139,15 @@ def address_of(page: str, at: str) -> str:
     return f"{page}?at={quote(at)}"
 
 
-def within(place: Path, at: str) -> Path | None:
-    """A path in the folder of the studio; None if it leads out of it."""
-    try:
-        found = (place / at).resolve()
-    except ValueError:  # a null byte
-        return None
-    return found if found.is_relative_to(place) else None
-
-
 async def keep_upload(event: events.UploadEventArguments, place: Path) -> str:
     """Keeps an uploaded file; returns its path, relative to the studio's folder.
 
     Its name has nothing that a path or a shell would read otherwise.
     """
     name = re.sub(r"[^\w.-]+", "-", Path(event.file.name).name).lstrip(".-") or "file"
-    (place / FILES).mkdir(parents=True, exist_ok=True)
-    await event.file.save(place / FILES / name)
-    return f"{FILES}/{name}"
+    at = f"{FILES}/{name}"
+    keep(place, at, await event.file.read())
+    return at
 
 
 def status_badge(status: str) -> None:

@@ -9,7 +9,8 @@ from nicegui import ui
 
 from tdac_agent.evaluation.robust_report import RobustReport
 from tdac_agent.runs.run_record import Run, load_run
-from tdac_agent.studio.jobs import STATE, job_of, start
+from tdac_agent.studio.folder import STATE
+from tdac_agent.studio.jobs import job_of, start
 from tdac_agent.studio.pages.films import show_film
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, read_file

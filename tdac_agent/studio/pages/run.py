@@ -13,6 +13,7 @@ from tdac_agent.library.listing import row_of
 from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
 from tdac_agent.runs.run_record import RUN_FILE, load_run
 from tdac_agent.studio.deployable import deployable
+from tdac_agent.studio.folder import within
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
     JobButtons,
@@ -22,7 +23,6 @@ from tdac_agent.studio.pages.layout import (
     report_frame,
     shown_first,
     status_badge,
-    within,
 )
 from tdac_agent.studio.pages.questions import Questions
 from tdac_agent.studio.pages.robustness import Robustness

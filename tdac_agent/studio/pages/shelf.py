@@ -15,6 +15,7 @@ from tdac_agent.campaign.drive import CONFIG_FILE
 from tdac_agent.library.listing import folders_of, row_of, variations_text
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
+from tdac_agent.studio.folder import within
 from tdac_agent.studio.jobs import Job, jobs
 from tdac_agent.studio.pages.bench import show_benches
 from tdac_agent.studio.pages.layout import (
@@ -22,7 +23,6 @@ from tdac_agent.studio.pages.layout import (
     framed,
     report_frame,
     shown_first,
-    within,
 )
 from tdac_agent.studio.sources import folders_with
 from tdac_envs.core.intake import read_zip

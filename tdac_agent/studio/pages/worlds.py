@@ -16,7 +16,8 @@ from tdac_agent.html_report.scene import data_address
 from tdac_agent.set_synthesis.synthesize import EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.jobs import FILES, STATE, free_folder, start
+from tdac_agent.studio.folder import FILES, STATE
+from tdac_agent.studio.jobs import free_folder, start
 from tdac_agent.studio.pages.films import show_film
 from tdac_agent.studio.pages.layout import (
     ShownCommand,

@@ -10,7 +10,7 @@ from nicegui import events, ui
 
 from tdac_agent.models.prices import load_prices
 from tdac_agent.models.tariff import MAX_COST
-from tdac_agent.studio.jobs import STATE
+from tdac_agent.studio.folder import STATE
 from tdac_agent.studio.pages.layout import keep_upload
 
 WHO = {

@@ -12,7 +12,6 @@ import os
 import select
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable
@@ -22,6 +21,7 @@ from functools import partial
 from pathlib import Path
 
 from tdac_agent.errors import Fault
+from tdac_agent.interpreter import PATHS, SAFE, python, safe_environment
 from tdac_agent.storage.locks import wait_for
 from tdac_agent.storage.secrets import SECRET
 from tdac_agent.tasks.task import Task, lay_out
@@ -31,7 +31,7 @@ from tdac_agent.verification.judge.worker_pool import end_with_parent
 # Environment variables of Python that the judge's process keeps. Others can change a
 # verdict; PYTHONOPTIMIZE, for example, removes every assertion.
 KEPT_VARIABLES = frozenset(
-    ["PYTHONPATH", "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
+    [SAFE, PATHS, "PYTHONHOME", "PYTHONUSERBASE", "PYTHONDONTWRITEBYTECODE"]
 )
 # A start on a busy machine may take minutes; a dead server is noticed at once.
 START_SECONDS = 600.0
@@ -68,7 +68,7 @@ class WarmJudge:
         self._turn, self._watch = turn, watch
         environment = {
             name: value
-            for name, value in os.environ.items()
+            for name, value in safe_environment().items()
             if (not name.startswith(("PYTHON", "PYTEST")) or name in KEPT_VARIABLES)
             and not SECRET.search(name)
         }
@@ -194,13 +194,7 @@ def _start_server(
 ) -> _Server:
     """Starts a server in a new interpreter, which reads a known task in advance."""
     process = subprocess.Popen(
-        [
-            sys.executable,
-            "-P",
-            "-m",
-            "tdac_agent.verification.judge.server",
-            *map(str, known),
-        ],
+        python("-m", "tdac_agent.verification.judge.server", *map(str, known)),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=log,

@@ -1,0 +1,55 @@
+"""The folder of the studio, in which others may have put files and links."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+from tdac_agent.storage.files import write_atomic
+
+STATE = ".studio"
+"""Folder of the studio in the folder where it was started."""
+FILES = f"{STATE}/files"
+"""Folder of what was uploaded or made for a run."""
+
+
+def within(place: Path, at: str) -> Path | None:
+    """A path in the folder of the studio; None if it leads out of it.
+
+    Args:
+        place: Folder of the studio.
+        at: The path, relative to it.
+    """
+    try:
+        found = (place / at).resolve()
+        inside = found.is_relative_to(place.resolve())
+    except (OSError, ValueError, RuntimeError):  # a null byte, or links in a circle
+        return None
+    return found if inside else None
+
+
+def made_within(place: Path, at: str) -> Path:
+    """Makes a folder in the folder of the studio, unless it is there.
+
+    Raises:
+        OSError: It cannot be made, or a link leads out of the folder of the studio.
+    """
+    if within(place, at) is None:
+        raise OSError(errno.EPERM, "leads out of this folder; remove the link", at)
+    (place / at).mkdir(parents=True, exist_ok=True)
+    return place / at
+
+
+def keep(place: Path, at: str, data: bytes) -> None:
+    """Writes a file in the folder of the studio; a link in its place is replaced.
+
+    Raises:
+        OSError: It cannot be written, or a link leads out of the folder of the studio.
+    """
+    folder = made_within(place, str(Path(at).parent))
+    write_atomic(folder / Path(at).name, data, lasting=False)
+
+
+def as_word(at: str) -> str:
+    """A path as a word of a command line that is not taken for a flag."""
+    return f"./{at}" if at.startswith("-") else at
