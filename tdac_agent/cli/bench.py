@@ -82,7 +82,7 @@ def run(
     except KeyboardInterrupt:
         text = f"the episodes so far are in {folder}; to go on, give the same command"
         if out is None:
-            text += f" with --out {shlex.quote(str(folder))}"
+            text += f" with {shlex.join(['--out', str(folder)])}"
         progress.print(escape(text), soft_wrap=True)
         raise
     if as_json:

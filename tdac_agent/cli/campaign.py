@@ -193,11 +193,10 @@ def _print_ending(
     for problem, count in progress.problems.most_common():
         print_sentences(console, f"{count} × {problem}", "yellow")
     console.print(progress_line(progress), soft_wrap=True)
-    console.print(
-        f"  tables in {folder}: {', '.join(path.name for path in tables)}\n"
-        f"  HTML report: tdac report {shlex.quote(str(folder))}",
-        soft_wrap=True,
-    )
+    names = ", ".join(path.name for path in tables)
+    report = shlex.join(["tdac", "report", str(folder)])
+    text = f"  tables in {folder}: {names}\n  HTML report: {report}"
+    console.print(escape(text), soft_wrap=True)
     if progress.finished < progress.planned:
         more = " with a higher --max-cost" if progress.exhausted else ""
         command = escape(wanted.command())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 
@@ -66,11 +67,9 @@ def export(folders: list[Path], out: Path) -> int:
         write_atomic(out, text)
     except OSError as error:
         raise RunError(f"cannot write {out}: {error.strerror}") from error
-    Console().print(
-        f"{escape(str(out))}: {len(rules)} of {number} rules in force; to use them: "
-        f"tdac synth --rules {escape(str(out))}",
-        soft_wrap=True,
-    )
+    use = shlex.join(["tdac", "synth", "--rules", str(out)])
+    text = f"{out}: {len(rules)} of {number} rules in force; to use them: {use}"
+    Console().print(escape(text), soft_wrap=True)
     return 0
 
 

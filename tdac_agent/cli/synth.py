@@ -20,7 +20,7 @@ from tdac_agent.runs.resume import (
     check_own,
     existing_run,
     resume_arguments,
-    resume_words,
+    resume_line,
 )
 from tdac_agent.runs.run_record import AGENT, Run, load_run
 from tdac_agent.synthesis.loop import synthesize
@@ -85,7 +85,7 @@ def resume(
     """
     before = load_run(folder)
     if before.learner == AGENT:
-        command = resume_words(before, folder)
+        command = resume_line(before, folder)
         raise RunError(f"the candidates of {folder} come from an agent: {command}")
     if before.on_set:
         from tdac_agent.cli import synth_set
@@ -141,7 +141,7 @@ def _so_far(folder: Path) -> str:
     """Where the unfinished run is, and the command to continue it."""
     if not (folder / TASK_FILE).is_file():
         return "the run had not begun"
-    command = f"tdac synth --resume {shlex.quote(str(folder))}"
+    command = shlex.join(["tdac", "synth", "--resume", str(folder)])
     # The first error is the one to report.
     with suppress(RunError):
         run = load_run(folder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from pathlib import Path
 from typing import Any
@@ -172,7 +173,8 @@ def _so_far(folder: Path) -> str:
     """Where the unfinished run is, and the command to continue it."""
     if not (folder / SET_FILE).is_file():
         return "the run had not begun"
-    return f"the run so far is in {folder}; to continue: tdac synth --resume {folder}"
+    command = shlex.join(["tdac", "synth", "--resume", str(folder)])
+    return f"the run so far is in {folder}; to continue: {command}"
 
 
 def _heading(wanted: dict[str, Any]) -> str:
@@ -243,12 +245,9 @@ def _show_selected(run: Run, console: Console) -> None:
         text = read_file(hidden, RECORD_BYTES)
         verify_set.show(SetReport.model_validate_json(text), console)
         return
-    console.print(
-        f"  not verified yet: tdac verify {run.controller} --set "
-        f"{run.folder / SET_FILE}",
-        soft_wrap=True,
-        highlight=False,
-    )
+    given = str(run.controller), "--set", str(run.folder / SET_FILE)
+    line = escape(f"  not verified yet: {shlex.join(['tdac', 'verify', *given])}")
+    console.print(line, soft_wrap=True, highlight=False)
 
 
 def _improvement(found: Improvement) -> str:

@@ -71,7 +71,7 @@ def run(
         try:
             points = train(plan, folder, watch, trust=trust)
         except KeyboardInterrupt:
-            command = f"tdac train --resume {shlex.quote(str(folder))}"
+            command = shlex.join(["tdac", "train", "--resume", str(folder)])
             console.print(escape(f"to continue: {command}"), soft_wrap=True)
             raise
     best = max(points, key=lambda point: point.worth)
@@ -200,12 +200,11 @@ def _show(
             highlight=False,
             soft_wrap=True,
         )
-    given = shlex.quote(str(file))
-    names = " ".join(f"--task {shlex.quote(name)}" for name in plan.tasks)
-    command = f"tdac evaluate {given} follow-guidance reference {names}"
+    words = ["evaluate", str(file), "follow-guidance", "reference"]
+    words += [word for name in plan.tasks for word in ("--task", name)]
     if plan.set is not None:
-        command = f"tdac bench {given} builtin --set {shlex.quote(plan.set)}"
-    line = escape(f"to compare: {command}")
+        words = ["bench", str(file), "builtin", "--set", plan.set]
+    line = escape(f"to compare: {shlex.join(['tdac', *words])}")
     console.print(line, soft_wrap=True, highlight=False)
 
 

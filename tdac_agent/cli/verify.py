@@ -176,9 +176,9 @@ def _without_controller(folder: Path) -> str:
     from tdac_agent.runs.run_record import RUN_FILE, load_run  # slow to import
 
     if (folder / RUN_FILE).is_file():
-        from tdac_agent.runs.resume import resume_words
+        from tdac_agent.runs.resume import resume_line
 
-        command = resume_words(load_run(folder), folder)
+        command = resume_line(load_run(folder), folder)
         return f"the run {folder} has no controller yet; to continue it: {command}"
     return f"there is no controller.py in {folder}"
 

@@ -20,7 +20,7 @@ from tdac_agent.models.provider import PICTURED
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import CandidateHistory, RunHistory, learner_named
 from tdac_agent.runs.improvement_record import read_improvement
-from tdac_agent.runs.resume import resume_words
+from tdac_agent.runs.resume import resume_line
 from tdac_agent.runs.run_record import (
     AGENT,
     GIVEN_FILE,
@@ -230,7 +230,7 @@ def _commands(history: RunHistory, name: str) -> Iterator[tuple[str, str]]:
     replay = ["tdac", "synth", *about, *limits, "--learner", f"replay:{name}"]
     yield shlex.join(replay), "repeat the run with the recorded answers"
     if not run.finished and history.status != "running":
-        more = run.enough.split()
+        more = () if run.enough is None else run.enough.words
         yield shlex.join(["tdac", "synth", "--resume", name, *more]), "resume the run"
     yield from _uses(history, name, about)
 
@@ -244,7 +244,7 @@ def _agent_commands(
     words += ["--episodes", str(run.episodes)] if run.on_set else []
     yield shlex.join(words), "let an agent repeat the run"
     if not run.finished and history.status != "running":
-        yield resume_words(run, name), "resume the run"
+        yield resume_line(run, name), "resume the run"
     yield from _uses(history, name, about)
 
 

@@ -138,8 +138,8 @@ def resume_command(run: Run) -> str:
     """The command that continues a run; empty if the run has finished."""
     if run.finished:
         return ""
-    more = f" {run.enough}" if run.enough else ""
-    return f"{resume_words(run, run.folder)}{more}"
+    more = () if run.enough is None else run.enough.words
+    return shlex.join([*resume_words(run, run.folder), *more])
 
 
 def next_folder(name: str, place: Path = Path(), taken: Collection[str] = ()) -> Path:

@@ -13,13 +13,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tdac_agent.errors import RunError
 from tdac_agent.storage.journal import append_record, read_records_from
 from tdac_agent.storage.locks import wait_for
 
 ROUNDING = 1e-9
+MOST_USD, MOST_TOKENS = 1e6, 10**12
+"""Largest limits that are suggested."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,45 @@ NOTHING = Amount()
 Limit = Literal["--max-cost", "--max-tokens"]
 
 
+class Enough(BaseModel):
+    """A limit with which a run can go on after its budget has ended it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    max_cost: float | None = Field(None, gt=0, le=MOST_USD, description="USD.")
+    max_tokens: int | None = Field(None, gt=0, le=MOST_TOKENS)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, value: Any) -> Any:
+        """Records were once written with the flag as a text."""
+        if isinstance(value, str):
+            flag, _, number = value.partition(" ")
+            return {flag.removeprefix("--").replace("-", "_"): number}
+        return value
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.max_cost is None) == (self.max_tokens is None):
+            raise ValueError("expected either max_cost or max_tokens")
+        return self
+
+    @property
+    def amount(self) -> float:
+        """The limit, in its unit."""
+        return self.max_cost or self.max_tokens or 0.0
+
+    @property
+    def words(self) -> tuple[str, str]:
+        """The flag and its value, as words of a command line."""
+        if self.max_cost is not None:
+            return "--max-cost", f"{self.max_cost:.12g}"
+        return "--max-tokens", str(self.max_tokens)
+
+    def __str__(self) -> str:
+        return " ".join(self.words)
+
+
 class BudgetExhausted(Exception):
     """The worst case of a call exceeds what is left.
 
@@ -65,8 +108,8 @@ class BudgetExhausted(Exception):
         self._limit = limit
         self._taken = taken
 
-    def flag(self, most: Amount, times: int = 1) -> str:
-        """Returns the flag with a sufficient limit, rounded up to whole cents.
+    def enough(self, most: Amount, times: int = 1) -> Enough:
+        """Returns a sufficient limit, rounded up to whole cents.
 
         Args:
             most: Amount needed in addition to what is taken.
@@ -74,8 +117,9 @@ class BudgetExhausted(Exception):
         """
         total = self._taken.plus(most).times(times)
         if self._limit == "--max-tokens":
-            return f"{self._limit} {total.tokens}"
-        return f"{self._limit} {math.ceil(100 * total.usd - ROUNDING) / 100:.12g}"
+            return Enough(max_tokens=min(max(total.tokens, 1), MOST_TOKENS))
+        cents = max(math.ceil(100 * total.usd - ROUNDING), 1)
+        return Enough(max_cost=min(cents / 100, MOST_USD))
 
 
 @dataclass(slots=True)

@@ -96,4 +96,6 @@ def _facts(run: Run, suite: Path | None) -> bytes | None:
         "template": file_sha256(template) if template.is_file() else "",
         "suite": tests,
     }
+    if run.enough is not None:
+        facts["enough"] = str(run.enough)
     return b"run|" + json.dumps(facts, sort_keys=True).encode()

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.models.budget import Amount
+from tdac_agent.models.budget import Amount, Enough
 from tdac_agent.models.provider import Kind, Reply, Request
 from tdac_agent.models.retry import FailedCall
 from tdac_agent.prompting.prompt import PromptTemplate
@@ -103,6 +103,8 @@ class Recorder:
             **facts: Further fields of the journal record.
         """
         folder = self.run.folder
+        # Most runs have neither template nor tests: they are known from here on.
+        self.run.mark = sign(self.run, None)
         self.save()
         write(folder)
         if template.text is not None:
@@ -317,13 +319,24 @@ class Recorder:
         """Keeps the rules that the run was given, as a rules file."""
         write_if_changed(self.run.folder / GIVEN_RULES_FILE, text)
 
-    def finish(self, status: Status, **facts: Any) -> None:
-        """Records the end of the run."""
-        self.run.status = status
+    def finish(
+        self, status: Status, enough: Enough | None = None, **facts: Any
+    ) -> None:
+        """Records the end of the run.
+
+        Args:
+            status: How it ended.
+            enough: Limit to resume it with, if the budget ended it.
+            **facts: Further fields of the journal record.
+        """
+        self.run.status, self.run.enough = status, enough
         self.run.reason = str(facts.get("reason", ""))
-        self.run.enough = str(facts.get("enough", ""))
         self.run.outlook = str(facts.get("outlook", ""))
         self.run.censored = not (self.run.finished or self.run.verified)
+        if self.run.mark:  # which covers the limit
+            tests = self.run.folder / OWN_SUITE
+            self.run.mark = sign(self.run, tests if tests.is_dir() else None)
+        facts |= {} if enough is None else {"enough": str(enough)}
         self.event("run.end", status=status, **facts)
         self.save()
 

@@ -86,17 +86,22 @@ def check_same(before: Run, now: Run) -> None:
         if getattr(before, name) != getattr(now, name)
     ]
     if differences:
-        command = resume_words(before, before.folder)
+        command = resume_line(before, before.folder)
         raise RunError(
             f"{before.folder} contains another run ({'; '.join(differences)}): give a "
             f"new folder with --out, or resume that run: {command}"
         )
 
 
-def resume_words(run: Run, folder: Path | str) -> str:
-    """The command that continues a run in a folder."""
-    command = "tdac mcp --out" if run.learner == AGENT else "tdac synth --resume"
-    return f"{command} {shlex.quote(str(folder))}"
+def resume_words(run: Run, folder: Path | str) -> tuple[str, ...]:
+    """The words of the command that continues a run in a folder."""
+    command = ("mcp", "--out") if run.learner == AGENT else ("synth", "--resume")
+    return "tdac", *command, str(folder)
+
+
+def resume_line(run: Run, folder: Path | str) -> str:
+    """The command line that continues a run in a folder."""
+    return shlex.join(resume_words(run, folder))
 
 
 def check_own(before: Run) -> None:
@@ -108,8 +113,9 @@ def check_own(before: Run) -> None:
     if not is_own_folder(before):
         raise RunError(
             f"{before.folder} contains a run that this installation did not begin "
-            f"and that claims to be {before.status}: test it with tdac verify "
-            f"{before.folder}, or give a new folder with --out"
+            f"and that claims to be {before.status}: test it with "
+            f"{shlex.join(['tdac', 'verify', str(before.folder)])}, or give a new "
+            "folder with --out"
         )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field
 
 from tdac_agent.errors import RunError
+from tdac_agent.models.budget import Enough
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.storage.locks import LOCK_FILE, is_held
 from tdac_agent.storage.printable_record import PrintableRecord
@@ -107,8 +108,8 @@ class Run(PrintableRecord):
     given_sha256: str | None = Field(
         None, description="Hash of the controller to start from."
     )
-    max_cost: float | None = Field(None, description="Limit, USD.")
-    max_tokens: int | None = None
+    max_cost: float | None = Field(None, ge=0, description="Limit, USD.")
+    max_tokens: int | None = Field(None, ge=0)
     cost: float | None = Field(None, description="USD of all answers; None if unknown.")
     cost_lost: float = Field(
         0.0, description="Upper bound for lost answers, USD, in addition to `cost`."
@@ -142,7 +143,9 @@ class Run(PrintableRecord):
     started: str
     seconds: float = 0.0
     reason: str = Field("", description="Why it ended, if by a fault or the budget.")
-    enough: str = Field("", description="Flag to resume with, if the budget ended it.")
+    enough: Annotated[Enough | None, BeforeValidator(lambda value: value or None)] = (
+        Field(None, description="Limit to resume with, if the budget ended it.")
+    )
     outlook: str = Field("", description="Limits that suffice, if the budget ended it.")
     censored: bool = Field(False, description="Ended before success or K.")
 

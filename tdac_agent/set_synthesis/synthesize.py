@@ -220,8 +220,9 @@ def _run(writing: _Writing) -> Run:
     try:
         _finish(writing)
     except OutOfBudget as error:
-        facts = {"enough": error.way_on, "outlook": error.outlook}
-        recorder.finish("budget", reason=str(error), **facts)
+        recorder.finish(
+            "budget", error.way_on, reason=str(error), outlook=error.outlook
+        )
     except KeyboardInterrupt:
         recorder.finish("interrupted")
         raise

@@ -6,6 +6,9 @@ import io
 import zipfile
 from pathlib import Path
 
+from tdac_agent.studio.folder import within
+from tdac_envs.core.intake import IMAGE_BYTES, read_file
+
 FILES = (
     "controller.py",
     "sensors.py",
@@ -23,6 +26,7 @@ def deployable(folder: Path) -> bytes:
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in FILES:
-            if (folder / name).is_file():
-                archive.write(folder / name, name)
+            file = within(folder, name)
+            if file is not None and file.is_file():
+                archive.writestr(name, read_file(file, IMAGE_BYTES))
     return packed.getvalue()

@@ -6,6 +6,7 @@ import errno
 from pathlib import Path
 
 from tdac_agent.storage.files import write_atomic
+from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 STATE = ".studio"
 """Folder of the studio in the folder where it was started."""
@@ -48,6 +49,14 @@ def keep(place: Path, at: str, data: bytes) -> None:
     """
     folder = made_within(place, str(Path(at).parent))
     write_atomic(folder / Path(at).name, data, lasting=False)
+
+
+def lines_in(file: Path) -> int:
+    """The number of lines of a file that grows; 0 if it cannot be read."""
+    try:
+        return len(read_file(file, RECORD_BYTES).splitlines())
+    except OSError:
+        return 0
 
 
 def as_word(at: str) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tdac_agent.studio.board import names_of
 from tdac_agent.studio.folder import FILES
+from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 YAML = ".yaml", ".yml"
 PICTURES = ".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".tif", ".tiff", ".webp"
@@ -53,7 +54,7 @@ def folders_with(place: Path, file: str) -> list[str]:
 def _image_of(path: Path) -> bool:
     """Whether a YAML file is that of a ROS map whose image is there."""
     try:
-        text = path.read_text(encoding="utf-8")[:10_000]
+        text = read_file(path, TEXT_BYTES).decode("utf-8")
     except (OSError, ValueError):
         return False
     named = re.search(r"^image:\s*[\"']?([^\"'\n#]+)", text, re.MULTILINE)

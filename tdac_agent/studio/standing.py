@@ -9,9 +9,11 @@ from typing import Any
 from tdac_agent.evaluation.kept_sets import ROWS_FILE, UNFINISHED
 from tdac_agent.html_report.names import candidate_name
 from tdac_agent.library.listing import variations_text
-from tdac_agent.runs.ownership import is_own_folder
-from tdac_agent.runs.run_record import JOURNAL, load_run
+from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
+from tdac_agent.runs.run_record import JOURNAL, Run, at_work, load_run
 from tdac_agent.storage.journal import read_records
+from tdac_agent.studio.folder import lines_in
+from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_envs.core.errors import TdacError
 
 COUNTED = "feedback", "validation", "improve"
@@ -79,10 +81,14 @@ def episodes_driven(folder: Path) -> str:
     if run.episodes is None:
         return ""
     ended = [each for each in records if each.get("event") == "drive.end"]
-    driven = sum(each.get("driven", 0) for each in ended if each.get("what") in COUNTED)
+    driven = sum(
+        each["driven"]
+        for each in ended
+        if each.get("what") in COUNTED and type(each.get("driven")) is int
+    )
     for rows in folder.glob(f"iterations/*/*/*/{UNFINISHED}/{ROWS_FILE}"):
         if rows.parent.parent.name.startswith(COUNTED):
-            driven += len(rows.read_bytes().splitlines())
+            driven += lines_in(rows)
     return f"{driven} of at most {run.episodes + run.improve} episodes driven"
 
 
@@ -95,11 +101,30 @@ def candidates_of(folder: Path) -> int:
 
 
 def is_from_elsewhere(folder: Path) -> bool:
-    """Whether another installation, or nobody known, began a run."""
+    """Whether another installation, or nobody known, began a run.
+
+    While a run's own files are being written, its mark does not hold yet.
+    """
+    at_first = not any((folder / name).is_file() for name in (TASK_FILE, SET_FILE))
+    if at_first and at_work(folder):
+        return False
     try:
         return not is_own_folder(load_run(folder))
     except (TdacError, OSError):
         return False
+
+
+def asked_by(run: Run) -> list[str] | None:
+    """What a run from elsewhere asks for to be continued; None for one of our own."""
+    if is_own_folder(run):
+        return None
+    tests = run.folder / OWN_SUITE
+    suite = tests if tests.is_dir() else None
+    asked = [wish.what for wish in wishes_of(run, suite, ())]
+    if run.enough is not None:
+        unit = "USD" if run.enough.max_tokens is None else "tokens"
+        asked.append(f"use up to {run.enough.words[1]} {unit} in all")
+    return asked
 
 
 def about_given(folder: Path) -> str:

@@ -41,16 +41,16 @@ class OutOfBudget(Exception):
         rest: What may be left of the run, including the question.
 
     Attributes:
-        way_on: Flag to resume the run with.
+        way_on: Limit to resume the run with.
         outlook: Limits that suffice for the rest of the run, in one line.
     """
 
     def __init__(self, error: BudgetExhausted, worst: Amount, rest: Rest) -> None:
         super().__init__(str(error))
-        least, whole = error.flag(worst), error.flag(rest.most)
+        least, whole = error.enough(worst), error.enough(rest.most)
         # Twice the minimum, so that the resumed run does not stop again at once.
-        twice = error.flag(worst, times=2)
-        self.way_on = min(twice, whole, key=lambda flag: float(flag.split()[1]))
+        twice = error.enough(worst, times=2)
+        self.way_on = min(twice, whole, key=lambda limit: limit.amount)
         self.outlook = f"at most this question is left: {least} is enough"
         if rest.questions > 1:
             self.outlook = (

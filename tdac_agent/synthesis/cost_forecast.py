@@ -153,5 +153,5 @@ def _needed(budget: Budget, worst: Amount) -> str:
     try:
         budget.reserve("first", worst)
     except BudgetExhausted as error:
-        return error.flag(worst)
+        return str(error.enough(worst))
     return ""

@@ -180,8 +180,9 @@ def _run(dialogue: Dialogue, given: str | None, tests: Tests, *, paid: bool) -> 
             _prove(recorder, tests)
         _search(dialogue, given, tests)
     except OutOfBudget as error:
-        facts = {"enough": error.way_on, "outlook": error.outlook}
-        recorder.finish("budget", reason=str(error), **facts)
+        recorder.finish(
+            "budget", error.way_on, reason=str(error), outlook=error.outlook
+        )
     except KeyboardInterrupt:
         recorder.finish("interrupted")
         raise

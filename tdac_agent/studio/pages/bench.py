@@ -17,7 +17,7 @@ from tdac_agent.evaluation.entrants import BUILTIN
 from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE, UNFINISHED
 from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_verify import MOST_EPISODES
-from tdac_agent.studio.folder import within
+from tdac_agent.studio.folder import as_word, lines_in, within
 from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
     JobButtons,
@@ -33,6 +33,10 @@ from tdac_agent.studio.pages.worlds import policies_in
 from tdac_agent.studio.sources import folders_with
 from tdac_envs.ladder.set_file import shipped_names
 
+FOREIGN = (
+    "This bench was not started here: the command above is only what its file says, "
+    "and cannot be continued from this page."
+)
 WORLDS = 20
 SECONDS = 1.0
 """Between two looks at the folder."""
@@ -144,6 +148,7 @@ class Watching:
         self._command = ShownCommand()
         with ui.row().classes("gap-2"):
             self._buttons = JobButtons(self._interrupt, self._go_on)
+        self._foreign = ui.label(FOREIGN).classes("note text-sm")
         self._results = ui.column().classes("w-full")
         with ui.element("pre").classes("output") as self._printed:
             self._output = ui.label()
@@ -160,17 +165,18 @@ class Watching:
         self._badge.clear()
         with self._badge:
             status_badge(status_of(self._folder, job))
-        self._command.show(
-            job.command if job is not None else f"tdac bench show {self._at}"
-        )
-        self._buttons.show(running=running, continues=job is not None and not done)
+        show = shlex.join(["tdac", "bench", "show", as_word(self._at)])
+        self._command.show(show if job is None else job.command)
+        self._foreign.visible = job is not None and not job.ours
+        continues = job is not None and job.ours and not done
+        self._buttons.show(running=running, continues=continues)
         self._printed.visible = not done
         self._bar.visible = job is not None and not done
         self._output.text = job.output() if job is not None else ""
         self._now.text = ""
         if job is not None and not done:
             self._bar.value, self._now.text = progress_of(job, self._folder)
-            if not running:
+            if continues and not running:
                 self._now.text += "; Continue resumes with the next episode"
         version = str(page.stat().st_mtime_ns) if done else ""
         if version != self._shown:
@@ -188,7 +194,7 @@ class Watching:
     def _go_on(self) -> None:
         """Starts the same command again: it goes on with the next episode."""
         job = bench_job(self._place, self._at)
-        if job is not None:
+        if job is not None and job.ours:
             start(self._place, job.words, self._at)
             self._look()
 
@@ -196,13 +202,7 @@ class Watching:
 def bench_job(place: Path, at: str) -> Job | None:
     """The newest command of the form that works on a bench."""
     job = job_of(place, at)
-    if (
-        job is None
-        or job.words[:1] != ("bench",)
-        or not {"--set", "-n"} <= {*job.words}
-    ):
-        return None
-    return job
+    return job if job is not None and bench_words(job) else None
 
 
 def named_entrants(chosen: Sequence[str]) -> list[str]:
@@ -227,15 +227,13 @@ def progress_of(job: Job, folder: Path) -> tuple[float, str]:
         job: Its command.
         folder: Folder of the bench.
     """
-    command = list(job.words)
-    at = command.index("--set")
-    worlds = int(command[command.index("-n") + 1])
-    most = worlds * (at - 1) * len(command[at + 1].split(","))
+    entrants, sets, worlds = _form_of(job)
+    most = worlds * len(entrants) * len(sets)
     driven = 0
     for kept in (DRIVEN, SEALED):
         driven += worlds * len(list(folder.glob(f"{kept}/*/*/{REPORT_FILE}")))
         for rows in folder.glob(f"{kept}/*/*/{UNFINISHED}/{ROWS_FILE}"):
-            driven += len(rows.read_bytes().splitlines())
+            driven += lines_in(rows)
     driven = min(driven, most)
     text = f"{driven} of {most} episodes driven"
     if job.running:
@@ -268,11 +266,21 @@ def show_benches(place: Path, title: str) -> None:
 
 
 def bench_words(job: Job) -> str:
-    """What drives where in a bench; empty for another command."""
-    if job.words[:1] != ("bench",) or "--set" not in job.words:
-        return ""
-    at = job.words.index("--set")
-    return f"{', '.join(job.words[1:at])} on {job.words[at + 1]}"
+    """What drives where in a bench of the form; empty for another command."""
+    entrants, sets, worlds = _form_of(job)
+    return f"{', '.join(entrants)} on {','.join(sets)}" if worlds else ""
+
+
+def _form_of(job: Job) -> tuple[Sequence[str], Sequence[str], int]:
+    """Entrants, task sets and worlds of each set; no worlds for another command."""
+    match job.words:
+        case ["bench", *_] if {"--set", "-n"} <= {*job.words[:-1]}:
+            at, number = job.words.index("--set"), job.words.index("-n")
+            worlds = job.words[number + 1]
+            known = worlds.isascii() and worlds.isdecimal() and len(worlds) < 8
+            entrants, sets = job.words[1:at], job.words[at + 1].split(",")
+            return entrants, sets, int(worlds) if known and entrants else 0
+    return (), (), 0
 
 
 def status_of(folder: Path, job: Job | None) -> str:

@@ -13,10 +13,12 @@ from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.studio.folder import within
 
-# A report is made from files that others may have written: its frame can neither read
-# the studio's cookie nor ask it for anything.
+# A report is made from files that others may have written, and a page in the folder may
+# be anyone's: its frame can neither read the studio's cookie, nor ask any server for
+# anything.
+RIGHTS = "sandbox allow-scripts; default-src 'unsafe-inline' data:"
 ISOLATED = {
-    "Content-Security-Policy": "sandbox allow-scripts",
+    "Content-Security-Policy": RIGHTS,
     "Cache-Control": "no-store",
 }
 SHOWN = {

@@ -40,7 +40,8 @@ class MapView:
 
     def begin(self, alt: str, reading: str, notes: Sequence[str]) -> None:
         """Describes another picture; the next click sets the start."""
-        self._image.props(f'alt="{alt}"')
+        self._image.props["alt"] = alt  # a file may have any name
+        self._image.update()
         self._reading.text = reading
         self._notes.clear()
         with self._notes:

@@ -11,8 +11,10 @@ from tdac_agent.runs.run_record import JOURNAL
 from tdac_agent.runs.run_record import PICTURE_FILE as PICTURE
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.journal import read_records
+from tdac_agent.storage.plain import printable
 from tdac_agent.studio.pages.layout import copied
 from tdac_envs.core.errors import TdacError
+from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 KINDS = {
     "generate": "a controller: one whole file in a ```python block",
@@ -50,7 +52,7 @@ class Questions:
         self._asked.clear()
         if question is None:
             return
-        text = question.read_text(encoding="utf-8", errors="replace")
+        text = _text(question)
         with self._asked, ui.card().classes("w-full"):
             unused = _last_unused(self._run)
             if unused:
@@ -83,11 +85,19 @@ class Questions:
 
 def asked_for(folder: Path, question: str) -> str:
     """What a question asks for, by the name under which the run keeps it."""
+    asked = _unnamed(question)
     for path in folder.glob("iterations/*/*/*.prompt*.md"):
-        kept = path.read_text(encoding="utf-8", errors="replace")
-        if _unnamed(kept) == _unnamed(question):
+        if _unnamed(_text(path)) == asked:
             return KINDS.get(path.name.partition(".")[0], "an answer")
     return "an answer"
+
+
+def _text(file: Path) -> str:
+    """What a question says; empty if it cannot be read."""
+    try:
+        return printable(read_file(file, RECORD_BYTES).decode("utf-8", "replace"))
+    except OSError:
+        return ""
 
 
 def _unnamed(question: str) -> str:

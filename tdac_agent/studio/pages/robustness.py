@@ -9,7 +9,7 @@ from nicegui import ui
 
 from tdac_agent.evaluation.robust_report import RobustReport
 from tdac_agent.runs.run_record import Run, load_run
-from tdac_agent.studio.folder import STATE
+from tdac_agent.studio.folder import STATE, as_word, made_within
 from tdac_agent.studio.jobs import job_of, start
 from tdac_agent.studio.pages.films import show_film
 from tdac_envs.core.errors import TdacError
@@ -81,7 +81,7 @@ class Robustness:
 
     def _begin(self) -> None:
         count = str(int(self._count.value or EPISODES))
-        words = ["verify", self._at, "--robust", count, "--out", self._out]
+        words = ["verify", as_word(self._at), "--robust", count, "--out", self._out]
         start(self._place, words, self._out)
 
     def _interrupt(self) -> None:
@@ -93,8 +93,8 @@ class Robustness:
         """Draws a video of an episode, and shows it."""
         film = f"{self._out}/seed-{seed}.mp4"
         if not (self._place / film).is_file():
-            (self._place / self._out).mkdir(parents=True, exist_ok=True)
-            words = ["play", self._at, "--seed", str(seed), "--video", film]
+            made_within(self._place, self._out)
+            words = ["play", as_word(self._at), "--seed", str(seed), "--video", film]
             start(self._place, words, film)
         self._film.clear()
         with self._film:

@@ -10,10 +10,9 @@ from typing import Any
 from nicegui import ui
 
 from tdac_agent.library.listing import row_of
-from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
 from tdac_agent.runs.run_record import RUN_FILE, load_run
 from tdac_agent.studio.deployable import deployable
-from tdac_agent.studio.folder import within
+from tdac_agent.studio.folder import as_word, within
 from tdac_agent.studio.jobs import Job, job_of, start
 from tdac_agent.studio.pages.layout import (
     JobButtons,
@@ -29,6 +28,7 @@ from tdac_agent.studio.pages.robustness import Robustness
 from tdac_agent.studio.standing import (
     SELECTED,
     about_given,
+    asked_by,
     candidates_of,
     episodes_driven,
     is_from_elsewhere,
@@ -38,6 +38,7 @@ from tdac_agent.studio.standing import (
 from tdac_envs.core.errors import TdacError
 
 ELSEWHERE = "This run was not begun here: its verdict is only what its files claim."
+NOTHING = "use this machine: its candidates run in the sandbox"
 FIRST = "The first candidate appears here as soon as it has been tested."
 LETTERS = "k: iteration; j: number of the repair, 0 for the first version."
 SECONDS = 1.0
@@ -127,7 +128,8 @@ class Watching:
         with self._badge:
             status_badge(status)
         go_on = row.get("go_on", "") if row else ""
-        self._command.show(job.command if job else go_on or f"tdac report {self._at}")
+        report = shlex.join(["tdac", "report", as_word(self._at)])
+        self._command.show(job.command if job else go_on or report)
         # An agent starts its server itself.
         continues = bool(go_on) and not row.get("agent") and status != "running"
         self._buttons.show(running=running, continues=continues)
@@ -172,7 +174,8 @@ class Watching:
         return f"{self._at}: hidden"
 
     def _hidden(self) -> None:
-        words = ["verify", f"{self._at}/controller.py", "--set", f"{self._at}/set.yaml"]
+        at = as_word(self._at)
+        words = ["verify", f"{at}/controller.py", "--set", f"{at}/set.yaml"]
         start(self._place, words, self._verdict_about)
 
     def _save(self) -> None:
@@ -189,17 +192,14 @@ class Watching:
         """Continues the run; one from elsewhere first lists what it asks for."""
         try:
             run = load_run(self._folder)
-            own = is_own_folder(run)
-            tests = self._folder / OWN_SUITE
-            suite = tests if tests.is_dir() else None
-            asked = [] if own else [wish.what for wish in wishes_of(run, suite, ())]
+            asked = asked_by(run)
         except (TdacError, OSError) as error:
             ui.notify(str(error), type="negative")
             return
-        if asked and not trusted:
+        if asked is not None and not trusted:
             self._ask(asked)
             return
-        more = shlex.split(run.enough) if run.enough else []
+        more = () if run.enough is None else run.enough.words
         words = ["synth", "--resume", self._at, *more]
         start(self._place, [*words, *(["--trust"] if asked else [])], self._at)
         self._wishes.clear()
@@ -208,7 +208,7 @@ class Watching:
         self._wishes.clear()
         with self._wishes, ui.card().classes("w-full"):
             ui.label("This run was not begun here. To continue, it asks to:")
-            for what in asked:
+            for what in asked or [NOTHING]:
                 ui.label(f"• {what}").classes("problem")
             ui.button(
                 "I trust it: continue", on_click=lambda: self._go_on(trusted=True)

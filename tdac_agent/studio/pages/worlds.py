@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import shlex
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from tdac_agent.html_report.scene import data_address
 from tdac_agent.set_synthesis.synthesize import EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.folder import FILES, STATE
+from tdac_agent.studio.folder import FILES, STATE, as_word, keep, made_within
 from tdac_agent.studio.jobs import free_folder, start
 from tdac_agent.studio.pages.films import show_film
 from tdac_agent.studio.pages.layout import (
@@ -196,8 +197,9 @@ class Looking:
             ui.notify("this world is not a map; choose another set", type="info")
             return
         at = f"{FILES}/{self._tasks.name}-{split}-{index}.npy"
-        (self._place / at).parent.mkdir(parents=True, exist_ok=True)
-        np.save(self._place / at, world.cells)
+        packed = io.BytesIO()
+        np.save(packed, world.cells)
+        keep(self._place, at, packed.getvalue())
         pose, goal = world.start, world.goal
         places = (*pose, *goal, self._tasks.file.robot.radius)
         values = ",".join(f"{float(value):.4g}" for value in places)
@@ -252,7 +254,7 @@ class Looking:
         for who in (self._one.value, self._other.value):
             kept = "".join(c if c.isalnum() else "-" for c in who)
             film = f"{STATE}/films/{name}-{split}-{index}-{kept}.mp4"
-            (self._place / film).parent.mkdir(parents=True, exist_ok=True)
+            made_within(self._place, f"{STATE}/films")
             world = ["--set", name, "--split", split, "--index", index]
             words = ["play", who, *world, "--video", film]
             job = start(self._place, words, film)
@@ -282,7 +284,8 @@ def policies_in(place: Path) -> list[str]:
     found += [file.with_name("controller.py") for file in place.glob("runs/*/set.yaml")]
     found += place.glob("runs/*/policy.zip")
     found += [*place.glob(f"{FILES}/*.py")]
-    return sorted(str(path.relative_to(place)) for path in found if path.exists())[:300]
+    names = (str(path.relative_to(place)) for path in found if path.exists())
+    return sorted(map(as_word, names))[:300]
 
 
 def as_address(picture: Image) -> str:

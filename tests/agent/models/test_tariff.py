@@ -129,7 +129,7 @@ def test_an_exhausted_budget_stops_a_run(
     price = 2.5 * 8000 + 10 * 4000
     assert run.cost == pytest.approx(price / 1e6)
     assert "0.0600 USD of 0.12 USD are spent or reserved" in run.reason
-    assert run.enough.startswith("--max-cost 0.2")
+    assert str(run.enough).startswith("--max-cost 0.2")
     assert model.answers == []
     # The same limit again asks nothing: exit 4, and what to do.
     monkeypatch.setenv("OPENAI_API_KEY", "sk-none")
@@ -143,7 +143,7 @@ def test_an_exhausted_budget_stops_a_run(
     model.answers = [code(good_source, 9000, 3000)]
     run = synthesize(task, model, out=out, **limits, judge=warm)
     assert (run.status, run.censored) == ("verified", False)
-    assert (run.reason, run.enough, run.outlook) == ("", "", "")
+    assert (run.reason, run.enough, run.outlook) == ("", None, "")
     price += 2.5 * 9000 + 10 * 3000
     assert run.cost == pytest.approx(price / 1e6)
     assert load_run(out) == run

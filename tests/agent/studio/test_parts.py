@@ -8,6 +8,7 @@ import shutil
 import time
 import zipfile
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import cv2
@@ -197,7 +198,8 @@ def test_files_of_one_name_are_told_apart():
 
 def test_a_bench_tells_how_far_it_is(tmp_path):
     words = ("bench", "builtin", "dwa", "--set", "known,lost", "-n", "10")
-    job = Job(tmp_path, words, "2026-01-01T00:00:00+00:00", 0, "", "bench-1")
+    now = datetime.now(UTC)
+    job = Job(tmp_path, words, now, 2, "", "bench-1", ours=True)
     assert progress_of(job, tmp_path)[0] == 0.0
     for name, file in (
         ("known/a", "set.json"),

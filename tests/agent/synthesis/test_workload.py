@@ -103,24 +103,24 @@ SPENT, NEXT = Amount(12000, 0.06), Amount(9000, 0.113)
 def test_what_is_enough_for_what():
     """The least for the next question, all for the rest, and something between."""
     told = exhausted(MONEY, SPENT, NEXT, Rest(58, Amount(10**6, 12.111)))
-    assert told.way_on == "--max-cost 0.35"
+    assert str(told.way_on) == "--max-cost 0.35"
     assert told.outlook == (
         "at most 58 questions are left: --max-cost 0.18 is enough for the next one, "
         "--max-cost 12.18 for all of them; the suggested limit is twice the first"
     )
     told = exhausted({"max_tokens": 20_000}, SPENT, NEXT, Rest(2, Amount(40_000, 0)))
-    assert told.way_on == "--max-tokens 42000"
+    assert str(told.way_on) == "--max-tokens 42000"
     assert "--max-tokens 21000 is enough for the next one" in told.outlook
     assert "--max-tokens 52000 for all of them" in told.outlook
     told = exhausted({"max_tokens": 20_000}, SPENT, NEXT, Rest(2, Amount(10_000, 0)))
-    assert told.way_on == "--max-tokens 22000"
+    assert str(told.way_on) == "--max-tokens 22000"
     assert told.outlook.endswith("--max-tokens 22000 for all of them")
 
 
 def test_no_more_is_named_than_can_be_taken():
     """The last question of a run needs no more than itself."""
     told = exhausted(MONEY, SPENT, NEXT, Rest(1, NEXT))
-    assert told.way_on == "--max-cost 0.18"
+    assert str(told.way_on) == "--max-cost 0.18"
     assert told.outlook == "at most this question is left: --max-cost 0.18 is enough"
 
 
@@ -135,7 +135,7 @@ def test_what_is_said_to_be_enough_is(limit, spent, worst, more):
     taken, next_one = Amount(usd=spent), Amount(usd=worst)
     rest = Rest(2, Amount(usd=worst + more))
     told = exhausted({"max_cost": limit}, taken, next_one, rest)
-    for flag in (told.way_on, *told.outlook.split("--max-cost ")[1:]):
+    for flag in (str(told.way_on), *told.outlook.split("--max-cost ")[1:]):
         enough = float(flag.removeprefix("--max-cost ").split()[0].rstrip(";"))
         assert enough <= spent + worst + more + 0.011
         budget = Budget(max_cost=enough)
