@@ -14,6 +14,7 @@ from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
 from tdac_agent.campaign.progress import Progress, RunEnded, RunUpdate
 from tdac_agent.executors.executor import Ended, Executor
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.links import refuse_links
 from tdac_agent.storage.locks import hold
 
 CONFIG_FILE = "campaign.yaml"
@@ -101,6 +102,7 @@ def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
 
     Raises:
         CampaignError: The folder cannot be used, or another driver uses it.
+        RunError: A link leads out of it.
     """
     lock = out / f".driver-{shard.i}-of-{shard.n}.lock"
     with ExitStack() as stack:
@@ -109,6 +111,7 @@ def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
                 reason = "is not empty; give another folder with --out"
                 raise CampaignError(f"{out} {reason}")
             (out / RUNS).mkdir(parents=True, exist_ok=True)
+            refuse_links(out)
             mine = stack.enter_context(hold(lock))
             if mine:
                 write_atomic(out / CONFIG_FILE, config)

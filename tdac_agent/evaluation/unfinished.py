@@ -12,6 +12,7 @@ from pathlib import Path
 
 from tdac_agent.errors import RunError
 from tdac_agent.storage.files import clear_unfinished
+from tdac_agent.storage.links import refuse_links
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.tasks.task import Task
@@ -28,7 +29,8 @@ def open_store(out: Path | None) -> Generator[Path]:
     An interrupted evaluation leaves the folder in `out`; without `out` it is temporary.
 
     Raises:
-        RunError: The folder cannot be written, or another evaluation writes to it.
+        RunError: The folder cannot be written, another evaluation writes to it, or a
+            link leads out of it.
     """
     with ExitStack() as stack:
         if out is None:
@@ -38,6 +40,7 @@ def open_store(out: Path | None) -> Generator[Path]:
         store = out.absolute() / FOLDER
         try:
             store.mkdir(parents=True, exist_ok=True)
+            refuse_links(out)
             mine = stack.enter_context(hold(store / LOCK_FILE))
         except OSError as error:
             raise RunError(f"cannot write to {store}: {error.strerror}") from error

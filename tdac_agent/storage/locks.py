@@ -10,6 +10,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from tdac_agent.errors import RunError
+from tdac_agent.storage.links import refuse_links
 
 LOCK_FILE = ".lock"
 TRIES = 5
@@ -44,11 +45,13 @@ def own_folder(out: Path, what: str) -> Generator[None]:
         what: What writes to it, for the message: `evaluation`.
 
     Raises:
-        RunError: It cannot be written, or another process holds its lock.
+        RunError: It cannot be written, another process holds its lock, or a link leads
+            out of it.
     """
     with ExitStack() as stack:
         try:
             out.mkdir(parents=True, exist_ok=True)
+            refuse_links(out)
             held = stack.enter_context(hold(out / LOCK_FILE))
         except OSError as error:
             raise RunError(f"cannot write to {out}: {error.strerror}") from error

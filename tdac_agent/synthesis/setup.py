@@ -24,6 +24,7 @@ from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, Run
 from tdac_agent.storage.files import clear_unfinished
 from tdac_agent.storage.journal import read_records, repair_end
+from tdac_agent.storage.links import refuse_links
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.tasks.installation import drawn_seed, lasting_secret
 from tdac_agent.tasks.provenance import sha256_of
@@ -178,11 +179,13 @@ def hold_folder(out: Path) -> Generator[None]:
     """Makes a run folder, and locks it against other processes.
 
     Raises:
-        RunError: The folder cannot be made, or another process is at work in it.
+        RunError: The folder cannot be made, another process is at work in it, or a link
+            leads out of it.
     """
     with ExitStack() as stack:
         try:
             out.mkdir(parents=True, exist_ok=True)
+            refuse_links(out)
             mine = stack.enter_context(hold(out / LOCK_FILE))
         except OSError as error:
             raise RunError(f"cannot write to {out}: {error.strerror}") from error

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tdac_agent.errors import RunError
+from tdac_agent.storage.links import refuse_links
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.training.checkpoint_marks import check
 from tdac_agent.training.curve import PLAN_FILE, Point
@@ -41,7 +43,7 @@ def train(
     Raises:
         NotTrustedError: The checkpoint was not written by this installation.
         RunError: The folder contains another training or something else, cannot be
-            used, or another process trains in it.
+            used, another process trains in it, or a link leads out of it.
         TaskError: The extra is missing, or a task has changed.
     """
     check_extra()
@@ -71,6 +73,7 @@ def check_extra() -> None:
 def _prepare(folder: Path, plan: TrainingPlan) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        refuse_links(folder)
         used = any(folder.iterdir())
     except OSError as error:
         raise RunError(f"cannot use {folder}: {error.strerror}") from error
@@ -82,7 +85,7 @@ def _prepare(folder: Path, plan: TrainingPlan) -> None:
         if longer != plan:
             raise RunError(
                 f"{folder} contains another training: give another folder with --out, "
-                f"or resume it unchanged with --resume {folder}"
+                f"or resume it unchanged with {shlex.join(['--resume', str(folder)])}"
             )
     elif used:
         raise RunError(f"{folder} is not empty and contains no training")

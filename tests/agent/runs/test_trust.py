@@ -11,10 +11,20 @@ import pytest
 import yaml
 from small import write_small_task
 
-from tdac_agent.prompting.prompt import PromptError, PromptTemplate, generate_prompt
-from tdac_agent.runs.ownership import is_own, is_own_folder
+from tdac_agent.models.budget import Enough
+from tdac_agent.prompting.prompt import (
+    PromptError,
+    PromptTemplate,
+    generate_prompt,
+    load_template,
+)
+from tdac_agent.runs.ownership import is_own, is_own_folder, sign
+from tdac_agent.runs.recorder import Recorder
+from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
+from tdac_agent.studio.standing import is_from_elsewhere
 from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.setup import hold_folder
 from tdac_agent.tasks.installation import lasting_secret
 from tdac_agent.tasks.task import display_name, load_task
 from tdac_agent.tasks.task_file import TaskFile
@@ -214,3 +224,49 @@ def test_the_verdict_names_the_folder(tdac, good):
     words = " ".join(out.split())
     assert "(task maze, not the bundled one (map " in words
     assert f"px) of {good}, profile policy" in words
+
+
+def test_a_limit_to_go_on_with_is_marked(run):
+    """Nobody can raise what a click on Continue may spend."""
+    known = load_run(run)
+    ended = known.model_copy(update={"enough": Enough(max_cost=0.7)})
+    ended.mark = sign(ended, run / "suite")
+    assert is_own_folder(ended)
+    more = ended.model_copy(update={"enough": Enough(max_cost=700)})
+    assert not is_own_folder(more)
+
+
+def test_a_run_that_begins_is_known(tmp_path):
+    """From its first file on; one that was left unfinished by others is not."""
+    begun = load_run(DEMO).model_copy(update={"folder": tmp_path, "mark": ""})
+    seen = []
+
+    def write(folder):
+        seen.append(is_own_folder(load_run(folder)))
+
+    template = load_template("full")
+    Recorder(begun).begin(write, ("task.yaml", "name: x\n"), template, None)
+    assert [*seen, is_own_folder(load_run(tmp_path))] == [True, True]
+
+
+def test_a_run_that_begins_with_tests_and_a_template_is_known(tmp_path):
+    """Its mark holds once they are written; meanwhile it is not called foreign."""
+    folder = tmp_path / "run"
+    begun = load_run(DEMO).model_copy(update={"folder": folder, "mark": ""})
+    seen = []
+
+    def write(_):
+        (folder / "suite").mkdir()
+        (folder / "suite" / "test_own.py").write_text("")
+        seen.append(is_from_elsewhere(folder))
+
+    template = PromptTemplate("mine.j2", "text")
+    with hold_folder(folder):
+        Recorder(begun).begin(
+            write, ("task.yaml", "name: x\n"), template, None, folder / "suite"
+        )
+    assert seen == [False]
+    assert is_own_folder(load_run(folder))
+    for unfinished in ("task.yaml", "prompt.j2"):
+        (folder / unfinished).unlink()
+    assert is_from_elsewhere(folder)

@@ -249,6 +249,39 @@ def limit_of_cost(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
+@attack(r"enough.max_cost: Input should be a valid number", works=False)
+def flags_of_a_limit(place: Place) -> list[str | Path]:
+    place.change(enough="--max-cost 1 --tier rlimits")
+    return ["synth", "--resume", place.run]
+
+
+LINK = r"is a link that leads out of \S+, and this command writes there"
+
+
+@attack(LINK, works=False)
+def journal_that_is_elsewhere(place: Place) -> list[str | Path]:
+    (place.run / "journal.jsonl").unlink()
+    (place.run / "journal.jsonl").symlink_to(place.target / "came")
+    place.change()
+    return ["synth", "--resume", place.run]
+
+
+@attack(LINK, works=False)
+def iterations_that_are_elsewhere(place: Place) -> list[str | Path]:
+    shutil.rmtree(place.run / "iterations")
+    (place.run / "iterations").symlink_to(place.target)
+    place.change()
+    return ["synth", "--resume", place.run]
+
+
+@attack(LINK, works=False)
+def blobs_that_are_elsewhere(place: Place) -> list[str | Path]:
+    shutil.rmtree(place.run / "blobs")
+    (place.run / "blobs").symlink_to(place.target)
+    place.change()
+    return ["synth", "--resume", place.run]
+
+
 @attack("claims to be verified: test it with tdac verify", works=False)
 def verdict_of_its_own(place: Place) -> list[str | Path]:
     (place.run / "controller.py").write_text(STILL)
@@ -320,6 +353,13 @@ def server_of_a_campaign(place: Place) -> list[str | Path]:
 def template_of_a_campaign(place: Place) -> list[str | Path]:
     (place.run.parent / "mine.j2").write_text(place.filled(TEMPLATE))
     return campaign(place, prompts=["mine.j2"])
+
+
+@attack(LINK, works=False)
+def runs_of_a_campaign_that_are_elsewhere(place: Place) -> list[str | Path]:
+    (place.run.parent / "campaign" / "runs").mkdir(parents=True)
+    (place.run.parent / "campaign" / "runs" / "x").symlink_to(place.target)
+    return campaign(place)
 
 
 @attack(r"run the tests in \S+ \(sha256 .*--trust")
