@@ -145,10 +145,14 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
 
 
 def jobs(place: Path) -> list[Job]:
-    """The jobs that were started in a folder, the newest first."""
+    """The jobs that were started in a folder: ours, then others, the newest first."""
     files = (place / JOBS).glob(f"*/{ABOUT}")
     found = [job for job in map(_read, files) if job is not None]
-    return sorted(found, key=lambda job: (job.started, job.folder.name), reverse=True)
+    return sorted(found, key=_order, reverse=True)
+
+
+def _order(job: Job) -> tuple[bool, datetime, str]:
+    return job.ours, job.started, job.folder.name
 
 
 def _read(file: Path) -> Job | None:
@@ -172,7 +176,7 @@ def _job(folder: Path, facts: JobFile, *, ours: bool) -> Job:
 
 
 def job_of(place: Path, about: str) -> Job | None:
-    """The newest job that works on something."""
+    """The newest job that works on something: one of ours, if there is one."""
     return next((job for job in jobs(place) if job.about == about), None)
 
 

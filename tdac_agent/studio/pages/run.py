@@ -129,7 +129,8 @@ class Watching:
             status_badge(status)
         go_on = row.get("go_on", "") if row else ""
         report = shlex.join(["tdac", "report", as_word(self._at)])
-        self._command.show(job.command if job else go_on or report)
+        begun = job.command if job is not None and job.ours else ""
+        self._command.show(begun or go_on or report)
         # An agent starts its server itself.
         continues = bool(go_on) and not row.get("agent") and status != "running"
         self._buttons.show(running=running, continues=continues)

@@ -219,3 +219,11 @@ def test_a_job_is_ours_in_a_later_studio(tmp_path):
     assert job_of(tmp_path, "x") == job
     assert job.ours
     wait(job)
+
+
+def test_a_job_from_elsewhere_hides_none_of_ours(tmp_path):
+    """Though it claims to be newer, and to work on the same."""
+    job = start(tmp_path, ["runs", "."], "bench-1")
+    put(tmp_path, {**FACTS, "started": "2999-01-01T00:00:00+00:00"}, "00002")
+    assert job_of(tmp_path, "bench-1") == job
+    wait(job)
