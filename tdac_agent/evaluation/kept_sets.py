@@ -14,7 +14,7 @@ from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.set_job import WorldEpisode
-from tdac_envs.core.intake import read_file
+from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 REPORT_FILE = "set.json"
 ROWS_FILE = "episodes.jsonl"
@@ -42,7 +42,7 @@ def unfinished(out: Path | None, about: dict[str, Any]) -> Generator[Path | None
         return
     folder, text = out / UNFINISHED, json.dumps(about, sort_keys=True)
     try:
-        same = (folder / ABOUT).read_text(encoding="utf-8") == text
+        same = read_file(folder / ABOUT, TEXT_BYTES) == text.encode()
     except (OSError, ValueError):
         same = False
     if not same:

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import io
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib import rc_context
+from matplotlib import matplotlib_fname, rc_context, rcdefaults
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from tdac_agent.storage.files import write_atomic
+
+# That of the working directory may be anyone's, and can have LaTeX started.
+if not os.path.isabs(matplotlib_fname()):
+    rcdefaults()
 
 # Okabe and Ito (2008): distinct with any colour vision and, in this order, in grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

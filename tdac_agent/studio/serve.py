@@ -14,8 +14,7 @@ import uvicorn
 from nicegui import ui
 
 from tdac_agent.loopback import listen
-from tdac_agent.storage.files import write_atomic
-from tdac_agent.studio.folder import STATE
+from tdac_agent.studio.folder import STATE, keep
 from tdac_agent.studio.gate import Gate
 from tdac_agent.studio.pages import (
     bench,
@@ -81,8 +80,7 @@ def opened_port(place: Path, port: int) -> socket.socket:
             raise
         opened = listen(0)
     with contextlib.suppress(OSError):  # a folder that cannot be written can be shown
-        note.parent.mkdir(exist_ok=True)
-        write_atomic(note, f"{opened.getsockname()[1]}\n")
+        keep(place, f"{STATE}/{PORT}", f"{opened.getsockname()[1]}\n".encode())
     return opened
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from tdac_agent.storage.files import sync_folder, write_atomic
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.trust import Wish, permit
+from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 CHECKPOINT, REPLAY = "checkpoint.zip", "replay.pkl"
 MARKS = "checkpoint.mark"
@@ -69,6 +70,8 @@ def _sha256(file: Path) -> str:
 
 
 def _lines(marks: Path) -> list[str]:
-    if not marks.is_file():
+    try:
+        text = read_file(marks, TEXT_BYTES).decode("utf-8", "replace")
+    except OSError:
         return []
-    return marks.read_text(encoding="utf-8", errors="replace").splitlines()[-KEPT:]
+    return text.splitlines()[-KEPT:]

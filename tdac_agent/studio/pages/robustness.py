@@ -80,6 +80,7 @@ class Robustness:
                     ).props("outline no-caps dense")
 
     def _begin(self) -> None:
+        made_within(self._place, self._out)
         count = str(int(self._count.value or EPISODES))
         words = ["verify", as_word(self._at), "--robust", count, "--out", self._out]
         start(self._place, words, self._out)

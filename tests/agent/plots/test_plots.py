@@ -1,6 +1,8 @@
 """Figures show the numbers that they are made from."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -260,3 +262,14 @@ def test_the_stages_of_preprocessing():
     np.testing.assert_array_equal(shown == 2, plain & ~grid.cells)
     x, y = np.rint(room.lines[0].get_xydata()).astype(int).T
     assert not grid.cells[y, x].any()
+
+
+def test_a_style_of_the_working_directory_is_not_used(tmp_path):
+    """It may be anyone's, and LaTeX would be started with its preamble."""
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\n")
+    code = (
+        "import tdac_agent.plots, matplotlib; print(matplotlib.rcParams['text.usetex'])"
+    )
+    words = [sys.executable, "-P", "-c", code]
+    told = subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
+    assert told.stdout == b"False\n"

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -14,8 +15,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_agent.errors import RunError
+from tdac_agent.library.listing import resume_command
+from tdac_agent.models.budget import Enough
 from tdac_agent.models.provider import Reply
 from tdac_agent.runs.recorder import difference
+from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import Attempt, Run, load_run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.loop import synthesize
@@ -54,6 +58,58 @@ def test_each_call_is_on_record_before_and_after(
     ]
     seconds = [event["seconds"] for event in events]
     assert seconds == sorted(seconds)
+
+
+def recorded(folder, **changes):
+    """A run whose record has some fields written otherwise."""
+    known = json.loads((DEMO / "run.json").read_text())
+    folder.mkdir()
+    (folder / "run.json").write_text(json.dumps({**known, **changes}))
+    return load_run(folder)
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        ("", None),
+        (None, None),
+        ("--max-cost 0.7", Enough(max_cost=0.7)),
+        ("--max-tokens 42000", Enough(max_tokens=42000)),
+        ({"max_cost": 0.7}, Enough(max_cost=0.7)),
+    ],
+    ids=str,
+)
+def test_a_limit_to_go_on_with(tmp_path, written, read):
+    """Old records have it as a text; what is written is read again."""
+    run = recorded(tmp_path / "run", enough=written, status="budget")
+    assert run.enough == read
+    (tmp_path / "run" / "run.json").write_text(run.model_dump_json())
+    assert load_run(tmp_path / "run") == run
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        *("--max-cost 1 --tier rlimits", "--max-cost", "--tier rlimits", "; true #"),
+        *("--max-cost nan", "--max-cost 1e400", "--max-cost -1", "--max-tokens 0.5"),
+        *({"max_cost": 0}, {"max_cost": 1, "max_tokens": 1}, {"max_cost": 1e9}),
+        *({"max_tokens": 10**13}, {"tier": "rlimits"}, ["--tier", "rlimits"], 7, True),
+    ],
+    ids=str,
+)
+def test_a_limit_is_a_number(tmp_path, written):
+    """Nothing else becomes a word of a command line."""
+    with pytest.raises(RunError, match=r"run\.json: enough"):
+        recorded(tmp_path / "run", enough=written, status="budget")
+
+
+@pytest.mark.parametrize("name", ["a b", "$(touch x)", "a; b", "a'b", "--tier", "a\nb"])
+def test_the_command_that_continues_a_run_is_words(tmp_path, name):
+    """Whatever its folder is called, and whichever limit is enough."""
+    folder = tmp_path / name
+    run = recorded(folder, enough="--max-cost 0.7", status="budget", tau=None)
+    words = ["tdac", "synth", "--resume", str(folder), "--max-cost", "0.7"]
+    assert shlex.split(resume_command(run)) == words
 
 
 def test_writing_is_atomic(tmp_path, monkeypatch):

@@ -18,6 +18,7 @@ from tdac_agent.studio.folder import STATE, as_word, keep, lines_in, made_within
 from tdac_agent.studio.jobs import start
 from tdac_agent.studio.pages.questions import asked_for
 from tdac_agent.studio.pages.worlds import policies_in
+from tdac_agent.studio.serve import opened_port
 from tdac_agent.studio.sources import sources_in
 from tdac_agent.studio.standing import episodes_driven
 
@@ -53,6 +54,7 @@ def test_a_link_in_place_of_a_folder_is_not_followed(place, name):
     if name == STATE:
         with pytest.raises(OSError, match="leads out of this folder"):
             start(place, ["runs"], "x")
+        opened_port(place, 0).close()
 
 
 def test_a_link_in_place_of_an_upload_is_replaced(place):
