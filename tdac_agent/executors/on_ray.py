@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Generator
-from contextlib import chdir
+from contextlib import chdir, suppress
 from importlib import import_module
 from typing import Any
 
@@ -56,7 +56,8 @@ def run_on_ray(work: Work[O], next_job: Next[J]) -> Generator[Update[J, O]]:
                 job = jobs.next()
                 if job is None:
                     break
-                pending[task.remote(job.to_json(), work.module, work.terms)] = job
+                given = job.to_json(), work.module, work.terms, os.getcwd()
+                pending[task.remote(*given)] = job
                 yield Begun(job)
             if not pending:
                 return
@@ -82,9 +83,11 @@ def _update(ray: Any, reference: Any, job: J, jobs: RetryQueue[J, O]) -> Update[
 
 
 def _in_task(
-    job: str, module: str, terms: dict[str, Any]
+    job: str, module: str, terms: dict[str, Any], place: str
 ) -> tuple[dict[str, Any] | None, str]:
     """Executes one job in a process of Ray; the outcome, or why there is none."""
+    with suppress(OSError):  # another machine may not have it
+        os.chdir(place)
     try:
         perform_job = import_module(module).perform_job
         with own_core() as turn, WarmJudge(turn=turn) as judge:
