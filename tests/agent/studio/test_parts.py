@@ -19,6 +19,8 @@ pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
 import tdac_agent
 from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.models.budget import Enough
+from tdac_agent.runs.ownership import sign
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import append_record
@@ -39,6 +41,7 @@ from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.shelf import unpack
 from tdac_agent.studio.standing import (
     about_given,
+    asked_by,
     episodes_driven,
     is_from_elsewhere,
     last_step,
@@ -249,6 +252,18 @@ def test_a_run_from_elsewhere_is_marked():
     folder = Path(tdac_agent.__file__).parent / "runs" / "demo"
     assert load_run(folder).status == "verified"
     assert is_from_elsewhere(folder)
+
+
+def test_a_run_from_elsewhere_always_asks():
+    """Also one that wants nothing special; the limit that it suggests is named."""
+    plain = load_run(DEMO).model_copy(
+        update={"learner": "builtin", "optimizer": "builtin", "seed": None}
+    )
+    assert asked_by(plain) == []
+    more = plain.model_copy(update={"enough": Enough(max_cost=0.7)})
+    assert asked_by(more) == ["use up to 0.7 USD in all"]
+    ours = more.model_copy(update={"mark": sign(more, None)})
+    assert asked_by(ours) is None
 
 
 def test_keys_drive(tmp_path):

@@ -95,7 +95,8 @@ def test_files_outside_of_the_folder(studio, ask, cookie):
     (studio.place / "own.png").write_bytes(b"picture")
     status, headers, _ = ask("/file?at=own.png", Cookie=cookie)
     assert status == 200
-    assert headers["Content-Security-Policy"] == "sandbox allow-scripts"
+    rights = "sandbox allow-scripts; default-src 'unsafe-inline' data:"
+    assert headers["Content-Security-Policy"] == rights
 
 
 def test_a_cookie_is_good_for_a_week_and_for_one_folder(tmp_path, monkeypatch):

@@ -240,7 +240,10 @@ class Canaries:
 
     def touched(self) -> dict[str, bool]:
         """What can be written to or called, and whether it was."""
-        written = {path.name: path.read_text() for path in self._target.glob("*")}
+        written = {
+            path.name: path.read_text() if path.is_file() else ""
+            for path in self._target.glob("*")
+        }
         return {
             "file written": written != {"kept.txt": "kept"},
             "code changed": _code_hash() != self._code,
