@@ -29,7 +29,7 @@ from tdac_agent.problems.problem import (
     raw,
     unusable,
 )
-from tdac_agent.prompting.extract import Answer, read_answer
+from tdac_agent.prompting.extract import POLICY, Answer, read_answer
 
 T = TypeVar("T")
 JUDGES = 1
@@ -85,7 +85,8 @@ def driven() -> Scorer:
 
 def answer_of(state: TaskState) -> Answer:
     """The controller in the last answer, or what is wrong with the answer."""
-    return read_answer(state.output.completion, must_define="policy")
+    ended = state.output.stop_reason == "stop"
+    return read_answer(state.output.completion, (POLICY,), ended=ended)
 
 
 async def in_thread(state: TaskState, work: Callable[[Problem, Poll], T]) -> T:

@@ -17,11 +17,10 @@ from tdac_agent.mcp.answers import (
 )
 from tdac_agent.mcp.instructions import instructions
 from tdac_agent.mcp.judging import Judging, Submission
+from tdac_agent.mcp.submitted import source_of
 from tdac_agent.mcp.watch import Watch
-from tdac_agent.prompting.extract import read_answer
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import JOURNAL, Run
-from tdac_agent.sandbox import MAX_SOURCE_BYTES
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.plain import one_line
 from tdac_agent.tasks.provenance import sha256_of
@@ -120,7 +119,7 @@ class Desk:
             Refused: The budget is spent, the run has ended, or the file is too large.
             Fault: The sandbox is broken; the submission does not count.
         """
-        source = _source_of(text)
+        source = source_of(text)
         self._check_open()
         if self.left.episodes is None:
             for each in self.submissions:
@@ -301,22 +300,3 @@ def _named(client: str) -> str:
 
 def _is_choice(record: dict[str, Any]) -> bool:
     return record.get("event") == CHOOSE and isinstance(record.get("k"), int)
-
-
-def _source_of(text: str) -> str:
-    """The source in a submitted text.
-
-    Raises:
-        Refused: It is too large, or empty.
-    """
-    size = len(text.encode("utf-8", "surrogatepass"))
-    if size > MAX_SOURCE_BYTES:
-        raise Refused(
-            f"the file has {size} bytes, and at most {MAX_SOURCE_BYTES} are allowed; "
-            "it was not judged and does not count"
-        )
-    if not text.strip():
-        raise Refused("the file is empty; it was not judged and does not count")
-    if text.lstrip().startswith("```"):
-        return read_answer(text).source or text
-    return text

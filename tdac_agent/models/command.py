@@ -12,6 +12,7 @@ from contextlib import suppress
 from tdac_agent.errors import ProviderError
 from tdac_agent.interpreter import given_environment
 from tdac_agent.models.choice import Options
+from tdac_agent.models.decoding import decode_answer
 from tdac_agent.models.provider import ProviderFault, Reply, Request
 from tdac_agent.models.streamed import MAX_CHARS
 from tdac_agent.storage.secrets import one_line, without_secrets
@@ -55,7 +56,7 @@ class Command:
         """Answers one request; see `Provider`."""
         prompt = request.prompt_naming(lambda picture: str(picture.file))
         answer = self._run(prompt.encode("utf-8", "replace"), request.seconds)
-        text = answer.decode("utf-8", "replace")
+        text = decode_answer(answer)
         if len(text) > MAX_CHARS:
             raise ProviderFault(f"the answer has more than {MAX_CHARS} characters")
         return Reply(without_secrets(text))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
+from tdac_agent.models.decoding import decode_answer
 from tdac_agent.models.provider import PermanentFault, Reply, Request
 from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.intake import RECORD_BYTES, read_file
@@ -106,7 +107,7 @@ class Manual:
         while True:
             now = read_file(path, RECORD_BYTES) if path.exists() else b""
             if now.strip() and now == before:
-                return now.decode("utf-8", "replace")
+                return decode_answer(now)
             before = now
             time.sleep(self._poll)
 

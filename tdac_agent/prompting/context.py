@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from tdac_agent.prompting.extract import POLICY
 from tdac_agent.prompting.manual import interface_of
 from tdac_agent.sandbox import Limits
 from tdac_agent.tasks.task import Task
@@ -59,3 +60,11 @@ def _of_any(task: Task) -> dict[str, Any]:
         "shortest": nominal.shortest,
         "instructions": task.spec.instructions.strip(),
     }
+
+
+def contract_of(task: Task) -> tuple[str, ...]:
+    """Returns the names that a controller of a task must define at its top level."""
+    if task.spec.profile != "paper":
+        return (POLICY,)
+    names = task.environment.names
+    return (POLICY, *names.constants, *names.functions, *names.classes)

@@ -15,7 +15,8 @@ from pydantic import (
     ValidationError,
 )
 
-from tdac_agent.prompting.extract import fenced_blocks
+from tdac_agent.prompting.fences import fenced_blocks
+from tdac_agent.prompting.plain_answer import plain_text, without_thinking
 from tdac_agent.prompting.rules import (
     MAX_RULE_CHARS,
     RepairRule,
@@ -99,6 +100,7 @@ def parse_operations(reply: str) -> list[Add | Edit | Drop]:
     Raises:
         RuleAnswerError: There is no such block, or its contents are invalid.
     """
+    reply = without_thinking(plain_text(reply)) or ""
     blocks = fenced_blocks(reply, frozenset({"json", ""}))
     if not blocks and reply.lstrip().startswith("["):
         blocks = [reply]

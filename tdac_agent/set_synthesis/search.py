@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.models.provider import is_fixed
-from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.feedback import Feedback
+from tdac_agent.prompting.python_source import same_code
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
 from tdac_agent.set_synthesis.pictures import world_picture

@@ -16,7 +16,7 @@ from tdac_agent.models.provider import (
     Request,
     is_concurrent,
 )
-from tdac_agent.prompting.extract import Answer, read_answer
+from tdac_agent.prompting.extract import POLICY, Answer, read_answer
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.given_rules import GIVEN, RUN_HEADING, written
 from tdac_agent.prompting.prompt import ONE_TASK, NamedPicture, repair_question
@@ -56,6 +56,7 @@ class Dialogue:
         calls: Asks every question.
         book: Rules of this run, in force and ended.
         about: What the scope `task` of a rule means.
+        contract: Names that a controller must define.
         earlier: The attempts so far, one line each.
     """
 
@@ -65,6 +66,7 @@ class Dialogue:
     calls: Calls
     book: RuleBook = field(default_factory=RuleBook)
     about: str = ONE_TASK
+    contract: tuple[str, ...] = (POLICY,)
     earlier: tuple[str, ...] = ()
     _failed: int = 0
     _unchanged: bool = False
@@ -275,7 +277,7 @@ class Dialogue:
             reply = self.calls.ask(model, request)
             # Two threads that parse at once make Python 3.11 fail with SystemError.
             with _PARSING:
-                answer = _file_in(reply)
+                answer = self._file_in(reply)
             if answer.source is not None:
                 return ModelAnswer(answer.source, reply.notes)
             problems.append(answer.problem)
@@ -283,6 +285,14 @@ class Dialogue:
         reasons = "; ".join(dict.fromkeys(problems))
         why = f"none of {MAX_ASKS} answers could be used: {reasons}"
         return ModelAnswer(None, (*reply.notes, why))
+
+    def _file_in(self, reply: Reply) -> Answer:
+        """The file in a reply; a truncated or refused reply has none."""
+        if reply.stop != "end":
+            return Answer(None, _ENDED[reply.stop])
+        # A server that names its model also reports why an answer ended.
+        ended = reply.model is not None
+        return read_answer(reply.text, self.contract, ended=ended)
 
     def _again(
         self, request: Request, reply: Reply, problem: str, asked: int
@@ -309,13 +319,6 @@ class Dialogue:
 def _stable(prompt: str) -> int:
     """Length of the part before the rules, which is the same in the whole run."""
     return max(0, prompt.find(BEGIN))
-
-
-def _file_in(reply: Reply) -> Answer:
-    """The file in a reply; a truncated or refused reply has none."""
-    if reply.stop != "end":
-        return Answer(None, _ENDED[reply.stop])
-    return read_answer(reply.text, must_define="policy")
 
 
 def same_as(k: int, j: int) -> str:

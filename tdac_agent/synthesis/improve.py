@@ -9,8 +9,8 @@ from typing import Generic, Protocol
 
 import numpy as np
 
-from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.improve import Tried, improve_text
+from tdac_agent.prompting.python_source import same_code
 from tdac_agent.runs.recorder import Recorder, difference
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.synthesis.archive import Archive, C, Figures, Member, Refused

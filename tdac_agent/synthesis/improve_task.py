@@ -11,8 +11,8 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.metrics.paired import paired_change
 from tdac_agent.models.picture import LARGEST_SIDE
-from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.feedback import feedback_of
+from tdac_agent.prompting.python_source import same_code
 from tdac_agent.runs.improvement_record import (
     IMPROVEMENT_FILE,
     MemberFigures,

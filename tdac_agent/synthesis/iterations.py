@@ -10,8 +10,8 @@ from typing import NamedTuple
 from tdac_agent.errors import Fault
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.models.provider import Provider
-from tdac_agent.prompting.extract import same_code
 from tdac_agent.prompting.feedback import feedback_of
+from tdac_agent.prompting.python_source import same_code
 from tdac_agent.synthesis.candidates import (
     Tests,
     deliver,

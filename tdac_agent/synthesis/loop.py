@@ -10,6 +10,7 @@ from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Provider
 from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.prompting.context import contract_of
 from tdac_agent.prompting.given_rules import given_lines
 from tdac_agent.prompting.prompt import generate_prompt, load_template
 from tdac_agent.prompting.rules import RuleBook
@@ -164,7 +165,8 @@ def synthesize(
             max_output,
         )
         question = partial(generate_prompt, task, template=template)
-        dialogue = Dialogue(question, *models, calls, book)
+        contract = contract_of(task)
+        dialogue = Dialogue(question, *models, calls, book, contract=contract)
         dialogue.begin()
         paid = any(model.paid for model in models)
         with ExitStack() as stack:

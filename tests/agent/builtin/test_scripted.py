@@ -30,7 +30,7 @@ def chosen(tmp_path, small_task):
 
 def answered(model, run=0, k=1, j=0, kind="generate"):
     reply = model.complete(Request(kind, "?", sample=(run, k, j)))
-    return read_answer(reply.text, must_define="policy").source
+    return read_answer(reply.text, ("policy",)).source
 
 
 def files(*names, **weights):

@@ -9,7 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tdac_agent.prompting.extract import extract_source, fenced_blocks, read_answer
+from tdac_agent.prompting.extract import extract_source, read_answer
+from tdac_agent.prompting.fences import fenced_blocks
+from tdac_agent.prompting.plain_answer import plain_text, readings, without_thinking
 
 FEW = settings(
     deadline=None,
@@ -55,13 +57,12 @@ def parses(source):
 
 def blocks_of(reply):
     """Everything between a fence and a later one that closes it, line by line."""
-    lines = reply.replace("\r\n", "\n").split("\n")
+    lines = reply.split("\n")
     bare = [line.strip(" \t") for line in lines]
     runs = [len(b) - len(b.lstrip(b[:1])) if b[:1] in ("`", "~") else 0 for b in bare]
     for first, last in itertools.combinations(range(len(lines)), 2):
         same = bare[first][:1] == bare[last][:1]
-        alone = not bare[last][runs[last] :].strip()
-        if runs[first] >= 3 and same and alone and runs[last] >= runs[first]:
+        if runs[first] >= 3 and same and runs[last] >= runs[first]:
             yield lines[first + 1 : last]
 
 
@@ -82,7 +83,9 @@ def check_reply(reply):
     source = extract_source(reply)
     if source is not None:
         assert parses(source)
-        assert any(is_quoted(source, lines) for lines in blocks_of(reply))
+        shown = readings(without_thinking(plain_text(reply)))
+        blocks = itertools.chain.from_iterable(map(blocks_of, shown))
+        assert any(is_quoted(source, lines) for lines in blocks)
 
 
 @FEW
@@ -350,6 +353,7 @@ def test_the_larger_tree_is_the_file():
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
+        ("", "it is empty"),
         ("Sorry.", "it has no fenced block"),
         ("```json\n{}\n```", "no fenced block of Python"),
         ("```python\nx = 1\n", "its last fenced block has no end"),
@@ -361,7 +365,7 @@ def test_the_larger_tree_is_the_file():
 )
 def test_what_is_wrong_is_said(text, problem):
     """An answer that cannot be used is asked for again with the reason."""
-    answer = read_answer(text, must_define="policy")
+    answer = read_answer(text, ("policy",))
     assert answer.source is None
     assert re.search(problem, answer.problem)
 
@@ -370,8 +374,8 @@ def test_what_is_wrong_is_said(text, problem):
 @given(replies | whole_replies().map(lambda parts: "".join(parts[1:])) | st.text())
 def test_an_answer_is_a_file_or_a_problem(reply):
     """Never both, never neither."""
-    for name in (None, "policy"):
-        answer = read_answer(reply, must_define=name)
+    for contract in ((), ("policy",), ("policy", "main")):
+        answer = read_answer(reply, contract)
         assert (answer.source is None) == bool(answer.problem)
         assert "\n" not in answer.problem
 
@@ -380,7 +384,7 @@ def test_an_answer_is_a_file_or_a_problem(reply):
 @given(replies | st.text())
 def test_fenced_blocks_stand_in_the_text(reply):
     """Every block is a quotation, and a bare one is found, too."""
-    text = reply.replace("\r\n", "\n")
+    text = plain_text(reply)
     for block in fenced_blocks(reply, frozenset({"", "python", "json"})):
         assert block in text
     assert fenced_blocks("a\n```json\n[]\n```\n", frozenset({"json"})) == ["[]"]
