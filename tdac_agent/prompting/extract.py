@@ -32,6 +32,7 @@ from tdac_agent.prompting.python_source import (
 )
 
 POLICY = "policy"
+MAX_FENCES = 2000
 _NO_FENCE = "it has no fenced block"
 _POLICY = re.compile(r"^[ \t]*def policy\b", re.MULTILINE)
 _DIFF = re.compile(r"^(?:@@ -|diff --git |<<<<<<< |\+\+\+ \S|\*\*\* Begin Patch)", re.M)
@@ -115,7 +116,10 @@ def _read(text: str, contract: frozenset[str], *, ended: bool) -> Answer:
         cut = Answer(None, f"{_NO_FENCE}, and its last line may be cut")
         return _checked(bare, parse(bare)) if ended or text[-1] == "\n" else cut
     lines = text.split("\n")
-    blocks = find_blocks(lines, find_fences(lines))
+    fences = find_fences(lines)
+    if len(fences) > MAX_FENCES:
+        return Answer(None, f"it has {len(fences)} fences, more than {MAX_FENCES}")
+    blocks = find_blocks(lines, fences)
     files = [_file(block, block.tree, contract) for block in blocks if block.tree]
     if POLICY in contract:
         files = [file for file in files if POLICY in file.names] or files

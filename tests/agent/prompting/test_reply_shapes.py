@@ -247,6 +247,13 @@ def test_an_exhausted_search_for_fences_is_no_file():
     assert answer.problem
 
 
+@pytest.mark.parametrize("fence", ["```\n", f"{BLOCK.strip()}<end>\n", "> ```\n"])
+def test_too_many_fences_are_no_file(fence):
+    """Their pairs are not even tried."""
+    answer = read_answer(fence * 2001, ("policy",))
+    assert re.search(r"has \d+ fences, more than 2000", answer.problem)
+
+
 COMMENTS = {
     "# ... (rest of the code unchanged) ...": True,
     "    # … existing functions …": True,
