@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tdac_agent.models.bounds import check_count
 from tdac_agent.models.faults import as_faults
 from tdac_agent.models.picture import MEDIA_TYPE, Picture
 from tdac_agent.models.provider import Reply, Request
-from tdac_agent.models.streamed import Stop, StreamedAnswer, count
+from tdac_agent.models.streamed import Stop, StreamedAnswer
 from tdac_agent.models.vendor import Vendor, VendorModel
 
 if TYPE_CHECKING:
@@ -106,11 +107,11 @@ def _count(
 ) -> None:
     """Stores the reported token counts, which cover the whole answer so far."""
     if usage.input_tokens is not None:
-        gathered.tokens_cached = count(usage.cache_read_input_tokens)
-        gathered.tokens_written = count(usage.cache_creation_input_tokens)
+        gathered.tokens_cached = check_count(usage.cache_read_input_tokens)
+        gathered.tokens_written = check_count(usage.cache_creation_input_tokens)
         cached = gathered.tokens_cached + gathered.tokens_written
-        gathered.tokens_in = count(usage.input_tokens) + cached
-    gathered.tokens_out = count(usage.output_tokens)
+        gathered.tokens_in = check_count(usage.input_tokens) + cached
+    gathered.tokens_out = check_count(usage.output_tokens)
 
 
 make = AnthropicModel.make

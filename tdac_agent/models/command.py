@@ -11,10 +11,11 @@ from contextlib import suppress
 
 from tdac_agent.errors import ProviderError
 from tdac_agent.interpreter import given_environment
+from tdac_agent.models.bounds import check_length
 from tdac_agent.models.choice import Options
 from tdac_agent.models.decoding import decode_answer
+from tdac_agent.models.exchange import exchange
 from tdac_agent.models.provider import ProviderFault, Reply, Request
-from tdac_agent.models.streamed import MAX_CHARS
 from tdac_agent.storage.secrets import one_line, without_secrets
 
 AFTER_KILL_SECONDS = 5.0
@@ -56,10 +57,7 @@ class Command:
         """Answers one request; see `Provider`."""
         prompt = request.prompt_naming(lambda picture: str(picture.file))
         answer = self._run(prompt.encode("utf-8", "replace"), request.seconds)
-        text = decode_answer(answer)
-        if len(text) > MAX_CHARS:
-            raise ProviderFault(f"the answer has more than {MAX_CHARS} characters")
-        return Reply(without_secrets(text))
+        return Reply(without_secrets(check_length(decode_answer(answer))))
 
     def _run(self, prompt: bytes, seconds: float) -> bytes:
         """Returns the program's output; afterwards its process group is killed."""
@@ -76,8 +74,8 @@ class Command:
         except OSError as error:
             raise ProviderFault(f"cannot start the program: {error.strerror}") from None
         try:
-            out, err = process.communicate(prompt, timeout=seconds)
-        except subprocess.TimeoutExpired:
+            out, err = exchange(process, prompt, seconds)
+        except TimeoutError:
             raise ProviderFault(f"no answer in {seconds:.0f} s") from None
         finally:
             _end(process)

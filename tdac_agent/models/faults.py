@@ -71,8 +71,15 @@ def _parse_body(body: object) -> tuple[set[str], str]:
     inner = body.get("error", body) if isinstance(body, dict) else body
     if not isinstance(inner, dict):
         return set(), inner if isinstance(inner, str) else ""
-    words = {str(inner[key]) for key in ("type", "code") if inner.get(key)}
-    return words, str(inner.get("message") or "")
+    words = {_word(inner.get(key)) for key in ("type", "code")} - {""}
+    return words, _word(inner.get("message"))
+
+
+def _word(value: object) -> str:
+    """Returns a text or a small number in the body of an error; else nothing."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return str(value) if 0 < value < 10**9 else ""
+    return value if isinstance(value, str) else ""
 
 
 def _message(
@@ -148,6 +155,8 @@ def as_faults(known: tuple[type[Exception], ...]) -> Generator[None]:
         yield
     except known as error:
         raise fault_of(error) from None
+    except RecursionError:
+        raise ProviderFault("malformed answer: it is nested too deeply") from None
     except malformed as error:
         reason = one_line(f"malformed answer ({type(error).__name__}: {error})")
         raise ProviderFault(reason) from None

@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 
 from tdac_agent.errors import ProviderError
+from tdac_agent.models.bounds import check_length
 from tdac_agent.models.choice import Options
 from tdac_agent.models.decoding import decode_answer
 from tdac_agent.models.provider import PermanentFault, Reply, Request
@@ -107,7 +108,7 @@ class Manual:
         while True:
             now = read_file(path, RECORD_BYTES) if path.exists() else b""
             if now.strip() and now == before:
-                return decode_answer(now)
+                return check_length(decode_answer(now))
             before = now
             time.sleep(self._poll)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from tdac_agent.models.bounds import check_count
 from tdac_agent.models.faults import as_faults
 from tdac_agent.models.picture import MEDIA_TYPE, Picture
 from tdac_agent.models.provider import Reply, Request
-from tdac_agent.models.streamed import Stop, StreamedAnswer, count
+from tdac_agent.models.streamed import Stop, StreamedAnswer
 from tdac_agent.models.vendor import Vendor, VendorModel
 
 if TYPE_CHECKING:
@@ -95,11 +96,11 @@ def _add_chunk(gathered: StreamedAnswer, chunk: ChatCompletionChunk) -> None:
         gathered.reason = choice.finish_reason or gathered.reason
     if chunk.usage is not None:
         details = chunk.usage.prompt_tokens_details
-        gathered.tokens_in = count(chunk.usage.prompt_tokens)
-        gathered.tokens_out = count(chunk.usage.completion_tokens)
+        gathered.tokens_in = check_count(chunk.usage.prompt_tokens)
+        gathered.tokens_out = check_count(chunk.usage.completion_tokens)
         if details is not None:
-            gathered.tokens_cached = count(details.cached_tokens)
-            gathered.tokens_written = count(details.cache_write_tokens)
+            gathered.tokens_cached = check_count(details.cached_tokens)
+            gathered.tokens_written = check_count(details.cache_write_tokens)
 
 
 make = OpenAIModel.make

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from tdac_agent.models.bounds import MAX_CHARS
 from tdac_agent.models.provider import ProviderFault, Reply
 from tdac_agent.storage.secrets import one_line, without_secrets
 
-MAX_CHARS = 2_000_000
 Stop = Literal["end", "length", "refusal"]
 
 
@@ -76,8 +76,3 @@ class StreamedAnswer:
             model=one_line(self.model) if isinstance(self.model, str) else None,
             request_id=one_line(self.request_id) if self.request_id else None,
         )
-
-
-def count(value: object) -> int:
-    """Returns a reported number of tokens, or 0 if there is none."""
-    return value if isinstance(value, int) and value > 0 else 0

@@ -105,16 +105,7 @@ class VendorModel(ABC, Generic[C]):
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
-        package = self._package()
-        client = self._client(
-            api_key=self._read_key(),
-            base_url=self._base_url,
-            max_retries=0,
-            timeout=package.Timeout(self._stall, connect=CONNECT_SECONDS),
-            # A redirect could send prompt and key elsewhere.
-            http_client=package.DefaultHttpxClient(follow_redirects=False),
-        )
-        with client:
+        with self._new_client() as client:
             return run_with_timeout(
                 request.seconds, lambda: self._ask(client, request), client.close
             )
@@ -126,6 +117,23 @@ class VendorModel(ABC, Generic[C]):
     @abstractmethod
     def _ask(self, client: C, request: Request) -> Reply:
         """Sends the request and assembles the streamed answer."""
+
+    def _new_client(self) -> Any:
+        package = self._package()
+        from tdac_agent.models.transport import client_options
+
+        try:
+            http = package.DefaultHttpxClient(**client_options(self._base_url))
+        # The environment names a proxy that is invalid, or needs another package.
+        except (ImportError, ValueError) as error:
+            raise PermanentFault(one_line(f"the proxy: {error}")) from None
+        return self._client(
+            api_key=self._read_key(),
+            base_url=self._base_url,
+            max_retries=0,
+            timeout=package.Timeout(self._stall, connect=CONNECT_SECONDS),
+            http_client=http,
+        )
 
     def _package(self) -> Any:
         try:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tdac_agent.errors import Fault
+from tdac_agent.models.bounds import check_reply
 from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
 from tdac_agent.models.provider import (
     MAX_OUTPUT_TOKENS,
@@ -142,7 +143,7 @@ class Calls:
                 raise OutOfBudget(error, worst, self._rest(request, worst)) from error
             recorder.asked(request, model.name, key, worst)
         try:
-            reply = model.complete(request)
+            reply = check_reply(model.complete(request))
         except ProviderFault as fault:
             if not fault.billed:
                 self.budget.settle(name, NOTHING)

@@ -86,6 +86,50 @@ def test_a_program_that_fails(program, no_traces, source, reason):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow_after(1)
+@pytest.mark.parametrize(
+    ("source", "reason"),
+    [
+        ("import os\nwhile 1: os.write(1, b'a' * 65536)", "wrote more than 8 MB"),
+        ("print('a' * 3_000_000)", "more than 2000000 characters"),
+        (
+            "import os, sys\nfor _ in range(999): os.write(2, b'b' * 65536)\n"
+            "sys.exit('no quota')",
+            "exit code 1: .*",
+        ),
+    ],
+)
+def test_a_program_that_writes_too_much(program, no_traces, source, reason):
+    """A fault in one line, and not all of it is held; both streams are read."""
+    with pytest.raises(ProviderFault, match=reason) as caught:
+        program(source).complete(QUESTION)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_program_with_an_encoding_of_its_own(program, encoding):
+    """Its byte order mark names it."""
+    source = f"import sys; sys.stdout.buffer.write('é = 1'.encode('{encoding}'))"
+    assert program(source).complete(QUESTION).text == "é = 1"
+
+
+def test_a_program_reads_a_long_prompt_while_it_writes(program):
+    """Neither side waits for the other."""
+    source = "import sys\nfor line in sys.stdin: print(line, end='')"
+    prompt = "x" * 99 + "\n"
+    question = replace(QUESTION, prompt=prompt * 10_000)
+    assert program(source).complete(question).text == question.prompt
+
+
+def test_a_person_answers_at_length(tmp_path):
+    """More than an answer may have is a fault, not a file of the run."""
+    (tmp_path / "001.reply.md").write_text("a" * 2_000_001)
+    with pytest.raises(ProviderFault, match="more than 2000000 characters"):
+        Manual(tmp_path, poll=0.0).complete(QUESTION)
+    (tmp_path / "001.reply.md").write_bytes("é = 1".encode("utf-16"))
+    assert Manual(tmp_path, poll=0.0).complete(QUESTION).text == "é = 1"
+
+
 def test_a_program_that_does_not_read(program):
     """It need not read the prompt to answer."""
     assert program("print('yes')").complete(QUESTION).text == "yes\n"
