@@ -24,7 +24,6 @@ EXTRAS = {
     "human": "pygame",
     "video": "moviepy",
     "sb3": "stable_baselines3",
-    "anthropic": "anthropic",
     "openai": "openai",
     "ray": "ray",
     "inspect": "inspect_ai",

@@ -33,6 +33,7 @@ class AnthropicModel(VendorModel["anthropic.Anthropic"]):
 
     vendor = Vendor(
         package="anthropic",
+        extra=None,
         company="Anthropic",
         key="ANTHROPIC_API_KEY",
         base_url="ANTHROPIC_BASE_URL",

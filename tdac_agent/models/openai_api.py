@@ -33,6 +33,7 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
 
     vendor = Vendor(
         package="openai",
+        extra="openai",
         company="OpenAI",
         key="OPENAI_API_KEY",
         base_url="OPENAI_BASE_URL",

@@ -30,7 +30,8 @@ class Vendor:
     """A vendor of models.
 
     Attributes:
-        package: Its Python package, also the extra and the prefix of model names.
+        package: Its Python package, also the prefix of model names.
+        extra: Extra that installs the package; None if every installation has it.
         company: Its name in messages.
         key: Environment variable of the key.
         base_url: Environment variable of another server's URL.
@@ -38,6 +39,7 @@ class Vendor:
     """
 
     package: str
+    extra: str | None
     company: str
     key: str
     base_url: str
@@ -79,7 +81,7 @@ class VendorModel(ABC, Generic[C]):
         vendor, found = self.vendor, []
         # The import takes a second or two, so it is left to the first question.
         if importlib.util.find_spec(vendor.package) is None:
-            install = install_command(vendor.package)
+            install = install_command(vendor.extra)
             found.append(f"{self.name} needs a package: {install}")
         try:
             self._read_key()

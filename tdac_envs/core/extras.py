@@ -13,16 +13,18 @@ from urllib.parse import unquote, urlsplit
 PACKAGE = "tdac"
 
 
-def install_command(extra: str) -> str:
+def install_command(extra: str | None) -> str:
     """The command that installs an extra from the same source as this installation.
 
     pip records the source of a package unless it came from an index
     (PEP 610).
 
     Args:
-        extra: Name of an extra in `pyproject.toml`, e.g. `sb3`.
+        extra: Name of an extra in `pyproject.toml`, e.g. `sb3`; None for what belongs
+            to every installation.
     """
-    return f"{_pip()} install {' '.join(_requirement(f'[{extra}]'))}"
+    suffix = "" if extra is None else f"[{extra}]"
+    return f"{_pip()} install {' '.join(_requirement(suffix))}"
 
 
 def _pip() -> str:
@@ -34,7 +36,7 @@ def _pip() -> str:
 
 
 def _requirement(extra: str) -> list[str]:
-    """Arguments of `pip install` for this package with an extra, e.g. `[sb3]`."""
+    """Arguments of `pip install` for this package with an extra such as `[sb3]`."""
     try:
         text = metadata.distribution(PACKAGE).read_text("direct_url.json")
     except metadata.PackageNotFoundError:

@@ -1,9 +1,11 @@
 """Providers without a vendor: a program, a person, a recorded run."""
 
 import json
+import re
 import shutil
 import sys
 import threading
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -331,12 +333,27 @@ def test_a_missing_key(options, vendor, monkeypatch):
 @pytest.mark.parametrize("vendor", ["anthropic", "openai"])
 def test_a_missing_package(options, vendor, monkeypatch, canary):
     """The pip command that brings it; to ask without it is a fault that stays."""
+    extra = None if vendor == "anthropic" else vendor
     monkeypatch.setitem(sys.modules, vendor, None)
     model = choose_model(f"{vendor}:x", options)
     (line,) = model.missing
-    assert line.endswith(f": {install_command(vendor)}")
+    assert line.endswith(f": {install_command(extra)}")
     with pytest.raises(PermanentFault, match=vendor):
         model.complete(QUESTION)
+
+
+def test_every_installation_has_these_packages():
+    """The package of Anthropic among them, so it is no extra; that of OpenAI is one."""
+    root = Path(__file__).parents[3]
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    names = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
+    assert names >= {
+        *("gymnasium", "pymunk", "numpy", "opencv-python-headless", "anthropic"),
+        *("pytest", "pandas", "matplotlib"),
+    }
+    assert "openai" not in names
+    assert "anthropic" not in project["optional-dependencies"]
+    assert "openai" in project["optional-dependencies"]
 
 
 @pytest.mark.parametrize("vendor", ["anthropic", "openai"])

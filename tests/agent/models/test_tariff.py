@@ -183,7 +183,7 @@ def test_all_that_is_missing_is_said_at_once(tdac, monkeypatch):
     assert err.count("\n") == 1
     needed = [
         "set the environment variable OPENAI_API_KEY",
-        f"anthropic:x needs a package: {install_command('anthropic')}",
+        f"anthropic:x needs a package: {install_command(None)}",
         "set the environment variable ANTHROPIC_API_KEY",
     ]
     for line in [*needed, "no price is known for openai:unheard-of"]:

@@ -1,6 +1,7 @@
 """What is missing is installed from where the package itself came from."""
 
 import json
+import shlex
 import shutil
 import sys
 
@@ -36,6 +37,9 @@ def test_an_extra_comes_from_the_same_place(tmp_path, monkeypatch, origin, words
         (info / "direct_url.json").write_text(json.dumps(origin))
     monkeypatch.syspath_prepend(tmp_path)
     assert install_command("sb3").endswith(f" install {words}")
+    assert install_command(None).endswith(
+        f" install {shlex.join(shlex.split(words.replace('[sb3]', '')))}"
+    )
 
 
 def test_it_is_put_where_this_python_looks(tmp_path, monkeypatch):
