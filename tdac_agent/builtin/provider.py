@@ -28,6 +28,7 @@ def make_builtin(words: str, options: Options) -> Builtin[Any] | LevelController
         raise ProviderError(f"'builtin' takes no model name; got 'builtin:{words}'")
     if isinstance(options.setting, TaskSet):
         return LevelController(options.setting)
+    assert options.setting is not None
     return Builtin(template_of(options.setting))
 
 

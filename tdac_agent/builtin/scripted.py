@@ -72,11 +72,13 @@ def make(words: str, options: Options) -> Scripted:
         raise ProviderError(
             "scripted: needs a script, as in scripted:weak or scripted:my.yaml"
         )
+    setting = options.setting
+    assert setting is not None
     own = shipped(f"scripts/{words}.yaml")
     file = own if own.is_file() else Path(words)
     script = read_yaml(file, Script, "the script", ProviderError)
     sources = {
-        kind: tuple(_source(choice, file, options.setting) for choice in choices)
+        kind: tuple(_source(choice, file, setting) for choice in choices)
         for kind, choices in zip(_KINDS, (script.generate, script.edit), strict=True)
     }
     return Scripted(words, script, sources)

@@ -31,6 +31,7 @@ from tdac_agent.executors.executor import executor_of
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.provider import Provider
+from tdac_agent.models.ready import check_ready, check_servers
 from tdac_agent.models.tariff import bounds_of, tariffs_of
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
@@ -84,9 +85,14 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
     console = make_console(stderr=as_json)
     shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
     config = with_limits(read_config(file), wanted.limits)
+    folder = wanted.folder(config)
+    # What has finished needs no model, and a server may need a permission.
+    if not folder.exists() and (config.base_url is None or wanted.trust):
+        names = ("base_url", "max_cost", "max_tokens")
+        known = {name: getattr(config, name) for name in names}
+        check_ready(config.models, {**known, "key_over_http": wanted.key_over_http})
     with console.status("reading the tasks …"):
         plan = make_plan(config, file.parent, trust=wanted.trust)
-    folder = wanted.folder(config)
     with campaign_folder(folder, shard, read_file(file, TEXT_BYTES).decode("utf-8")):
         terms = Terms(
             folder=str(folder.resolve()),
@@ -134,6 +140,7 @@ def check_models(
 
     Raises:
         ProviderError: A model cannot be used; the message lists all that is missing.
+        Fault: A server does not answer.
     """
     models: list[Provider] = []
     for cell in dict.fromkeys(planned.cell for planned in remaining):
@@ -145,6 +152,7 @@ def check_models(
             key_over_http=key_over_http,
         )
     bounds_of(models, tariffs_of(models), config.max_cost, config.max_tokens)
+    check_servers(models)
 
 
 def _run_remaining(

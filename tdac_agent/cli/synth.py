@@ -16,6 +16,8 @@ from tdac_agent.cli.progress import Progress
 from tdac_agent.cli.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault, RunError
 from tdac_agent.library.listing import next_folder
+from tdac_agent.models.ready import check_ready
+from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.resume import (
     check_own,
     existing_run,
@@ -30,6 +32,7 @@ from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
 from tdac_agent.verification.verify import read_source
 
+RECORDED = ("learner", "optimizer", "base_url", "max_cost", "max_tokens")
 _EXIT = {"verified": 0, "budget": 4}
 
 
@@ -56,6 +59,7 @@ def run(
         as_json: Whether to print the run record as JSON.
     """
     check_tier(wanted["tier"])
+    check_ready((wanted["learner"], wanted["optimizer"]), wanted)
     console = Console(stderr=as_json)
     source = None if start_from is None else read_text(start_from)
     with console.status("preparing the task …"):
@@ -99,9 +103,27 @@ def resume(
     if before.finished:
         check_own(before)
         return _show(before, console, before=before)
+    check_ready_again(before, {**given, **settings})
     with console.status("preparing the task …"):
         wanted = resume_arguments(folder, {**given, **settings}, trust=trust)
     return synthesise_and_show(wanted, console)
+
+
+def check_ready_again(before: Run, given: dict[str, Any]) -> None:
+    """Checks the models of a run of this installation before its task is loaded.
+
+    Another installation's run may name a server that needs the user's permission.
+
+    Args:
+        before: The run.
+        given: Arguments given again; None keeps the run's limit.
+    """
+    if is_own_folder(before):
+        known = {name: getattr(before, name) for name in RECORDED}
+        new = {name: value for name, value in given.items() if value is not None}
+        wanted = {**known, **new}
+        names = (wanted["learner"], wanted["optimizer"])
+        check_ready(names, wanted)
 
 
 def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
@@ -34,6 +34,9 @@ OFFLINE = frozenset({"builtin", "command", "manual", "replay", "scripted"})
 IN_FILES = frozenset({"replay", "scripted"})
 """Providers whose answers are all stored in files."""
 
+WITHOUT_TASK = frozenset({"anthropic", "openai", "command", "replay"})
+"""Providers that can be made before the task is known, without side effects."""
+
 BLIND = frozenset({"builtin", "scripted"})
 """Providers that ignore pictures; a replay needs them, to find the same questions."""
 
@@ -44,12 +47,13 @@ class Options:
 
     Attributes:
         setting: Setting of the task, for providers that know the environments, or the
-            task set if the controller is for one.
+            task set if the controller is for one. None for the providers in
+            `WITHOUT_TASK` if no task is loaded yet.
         base_url: URL of the models' server; None for the default.
         key_over_http: Whether a key may go to another machine unencrypted.
     """
 
-    setting: Setting | TaskSet
+    setting: Setting | TaskSet | None
     base_url: str | None = None
     key_over_http: bool = False
 
@@ -80,8 +84,7 @@ def choose_models(
         ProviderError: A name is unknown, or cannot be used.
     """
     named = [name for name in (learner, optimizer) if isinstance(name, str)]
-    if base_url is not None and named:  # provider objects have their own
-        _check_url(base_url, named)
+    check_names(named, base_url)
     options = Options(setting, base_url, key_over_http)
     first = choose_model(learner, options) if isinstance(learner, str) else learner
     if optimizer is None or optimizer == learner:
@@ -134,6 +137,18 @@ def answers_sha256(name: str, options: Options) -> str | None:
     return str(model.answers_sha256())
 
 
+def check_names(names: Sequence[str], base_url: str | None) -> None:
+    """Checks that providers with these names exist, and can have this base URL.
+
+    Raises:
+        ProviderError: A name is unknown, or the URL cannot be used.
+    """
+    for name in names:
+        check_name(name)
+    if base_url is not None and names:  # provider objects have their own
+        _check_url(base_url, names)
+
+
 def check_name(name: str) -> None:
     """Checks that a provider with this name exists, without making it or reading a key.
 
@@ -160,7 +175,7 @@ def _load(point: EntryPoint) -> Make:
     return make
 
 
-def _check_url(url: str, named: list[str]) -> None:
+def _check_url(url: str, named: Sequence[str]) -> None:
     """Raises ProviderError unless a URL is valid, secret-free and for one vendor."""
     try:
         parts = urlsplit(url)

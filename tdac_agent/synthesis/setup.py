@@ -15,6 +15,7 @@ from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import BLIND
 from tdac_agent.models.provider import Author, Provider, recorded_seed, served_at
+from tdac_agent.models.ready import check_servers
 from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
 from tdac_agent.runs.journal_state import read_past
@@ -60,6 +61,7 @@ def account_of(
         ProviderError: Nothing bounds what a model costs, or a key or package is
             missing; the message lists everything.
         PriceError: The user's price file is broken.
+        Fault: A server that a new run needs does not answer.
     """
     tariffs = tariffs_of(models)
     if shared is not None:
@@ -71,6 +73,8 @@ def account_of(
         max_cost = before.max_cost if max_cost is None else max_cost
         max_tokens = before.max_tokens if max_tokens is None else max_tokens
     bounds = bounds_of(models, tariffs, max_cost, max_tokens)
+    if before is None:
+        check_servers(models)
     return Account(Budget(bounds.max_cost, bounds.max_tokens), tariffs, bounds.notes)
 
 
