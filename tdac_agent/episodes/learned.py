@@ -8,6 +8,8 @@ network is constructed anew.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -32,16 +34,20 @@ from tdac_envs.core.intake import one_line
 from tdac_envs.drive.env import Observation
 from tdac_envs.learning.wrapping import wrap_for_rl
 
+_SAC, _WITHOUT_SDE = "stable_baselines3.sac.policies", "stable_baselines3.td3.policies"
 _NETWORKS = {
     "stable_baselines3.common.policies": "ActorCriticPolicy",
-    "stable_baselines3.sac.policies": "SACPolicy",
-    "stable_baselines3.td3.policies": "TD3Policy",
+    _SAC: "SACPolicy",
+    _WITHOUT_SDE: "TD3Policy",
     "sb3_contrib.common.recurrent.policies": "RecurrentActorCriticPolicy",
     "tdac_agent.episodes.memory_policy": "MemoryPolicy",
 }
 """Policy class for observations in a Box, by the module of the saved class."""
-_WITHOUT_SDE = "stable_baselines3.td3.policies"
 _ACTIVATIONS = {"ReLU", "Tanh", "ELU", "LeakyReLU", "GELU", "SiLU", "Sigmoid", "SELU"}
+
+
+# The noise of a policy, with which its class calculates, is smaller.
+_SMALL = 10_000
 
 
 class Learned:
@@ -123,7 +129,7 @@ def _load_network(file: Path, fit: _Spaces) -> Any:
     torch.set_num_threads(1)
     network = _build(saved, fit.observation, fit.action)
     try:
-        network.load_state_dict(weights)
+        network.load_state_dict(weights, assign=True)
     except RuntimeError as error:
         raise ControllerFault(
             "the policy was trained on other observations than its wrappers produce on "
@@ -135,28 +141,81 @@ def _load_network(file: Path, fit: _Spaces) -> Any:
 
 
 def check_kind(saved: SavedNetwork) -> None:
-    """Checks that a network can be built from a saved policy.
+    """Checks that a network can be built from a saved policy, and has its weights.
 
     Raises:
         ControllerFileError: The policy is of an unknown kind, its settings do not fit
-            its class, or an extra is not installed.
+            its class or its weights, or an extra is not installed.
     """
     try:
-        _build(saved, spaces.Box(-1.0, 1.0, (4,)), spaces.Box(-1.0, 1.0, (2,)))
+        first, second = _shapes(saved, 4), _shapes(saved, 5)
     except ControllerFault as fault:
         raise ControllerFileError(str(fault)) from fault
+    found = {name: weights.shape for name, weights in saved.weights.items()}
+    odd = sorted(first.keys() ^ found.keys())
+    odd += [name for name in found if not odd and _differs(name, first, second, found)]
+    if odd:
+        raise ControllerFileError(
+            f"the policy's weights do not fit its settings: {one_line(odd[0])[:80]}"
+        )
+
+
+_Shapes = dict[str, tuple[int, ...]]
+
+
+def _shapes(saved: SavedNetwork, size: int) -> _Shapes:
+    """Returns the shapes of a network's weights for observations of some size."""
+    observation = spaces.Box(-1.0, 1.0, (size,))
+    network = _build(saved, observation, spaces.Box(-1.0, 1.0, (2,)))
+    return {name: tuple(held.shape) for name, held in network.state_dict().items()}
+
+
+def _differs(name: str, first: _Shapes, second: _Shapes, found: _Shapes) -> bool:
+    """Whether a size is wrong, apart from those that depend on the observation."""
+    if len(found[name]) != len(first[name]):
+        return True
+    rows = zip(first[name], second[name], found[name], strict=True)
+    return any(one == other != size for one, other, size in rows)
 
 
 def _build(saved: SavedNetwork, observation: Space[Any], action: Space[Any]) -> Any:
-    """Builds a network without its weights."""
+    """Builds a network without its weights, which takes no memory for them."""
     kind = _policy_class(saved.module, isinstance(observation, spaces.Dict))
     try:
         kwargs = {**_policy_kwargs(saved), "optimizer_class": _NoOptimizer}
-        return kind(observation, action, lambda _: 0.0, **kwargs)
+        with _without_memory():
+            return kind(observation, action, lambda _: 0.0, **kwargs)
     # Unsuitable settings can cause various errors.
     except (TypeError, ValueError, KeyError, AssertionError, RuntimeError) as error:
         message = f"the policy's settings do not fit its class: {one_line(error)}"
         raise ControllerFault(message, "import") from error
+
+
+@contextmanager
+def _without_memory() -> Iterator[None]:
+    """Makes layers whose weights have shapes and no numbers."""
+    import torch
+    from torch.overrides import TorchFunctionMode
+
+    class Shapes(TorchFunctionMode):
+        """Makes large tensors on torch's device `meta`; moves none."""
+
+        def __torch_function__(
+            self, function: Any, types: Any, args: Any = (), kwargs: Any = None
+        ) -> Any:
+            del types
+            given = kwargs or {}
+            if function is torch.empty:
+                shape = torch.empty(*args, **given | {"device": "meta"})
+                if shape.numel() > _SMALL:
+                    return shape
+            # stable-baselines3 moves all tensors to where the first one is.
+            elif function is torch.Tensor.to:
+                return args[0]
+            return function(*args, **given)
+
+    with Shapes():
+        yield
 
 
 class _NoOptimizer:
@@ -199,4 +258,7 @@ def _policy_kwargs(saved: SavedNetwork) -> dict[str, Any]:
             raise ControllerFault(f"unknown activation {found[1][:80]}", "import")
     if saved.module == _WITHOUT_SDE:
         kwargs.pop("use_sde")
+    elif saved.module != _SAC:
+        # Without numbers there is nothing to begin well with.
+        kwargs["ortho_init"] = False
     return kwargs

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import pickletools
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from tdac_agent.episodes.torch_file import Weights, read_weights
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.errors import first_problem, one_line_reason
@@ -30,14 +30,8 @@ DATA = "data"
 MOST_BYTES = 128_000_000
 """Largest size of the file, and of its unpacked parts together."""
 
-# All names that a saved network needs; others could fill the memory from a few bytes.
-_NAMES = {
-    "collections OrderedDict",
-    "torch._utils _rebuild_tensor_v2",
-    "torch._utils _rebuild_parameter",
-    *(f"torch {kind}Storage" for kind in ("Float", "Double", "Half", "BFloat16")),
-}
-_NAMING = {"GLOBAL", "STACK_GLOBAL", "INST", "EXT1", "EXT2", "EXT4"}
+# stable-baselines3 does not compress; another program may.
+_MOST_GROWTH, _SLACK_BYTES = 8, 1_000_000
 _FOR_TRAINING = {"optimizer_class", "optimizer_kwargs"}
 ACTIVATION = r"<class 'torch\.nn\.modules\.activation\.(\w+)'>"
 
@@ -94,14 +88,14 @@ class SavedNetwork:
         complete: Whether the metadata is in the file itself.
         module: Module of the network's class.
         settings: Arguments of that class that the file states.
-        weights: Bytes of a torch file.
+        weights: Its tensors by name.
     """
 
     saved: SavedPolicy | None
     complete: bool
     module: str
     settings: Settings
-    weights: bytes
+    weights: dict[str, Weights]
 
 
 def read_policy(file: Path) -> SavedNetwork:
@@ -111,9 +105,7 @@ def read_policy(file: Path) -> SavedNetwork:
         ControllerFileError: It is not a stable-baselines3 policy, or is invalid.
     """
     try:
-        parts = read_zip(
-            read_file(file, MOST_BYTES), MOST_BYTES, {DATA, WEIGHTS, METADATA}
-        )
+        parts = _parts(read_file(file, MOST_BYTES))
         if not {DATA, WEIGHTS} <= parts.keys():
             raise ValueError(f"it has no `{DATA}` or no `{WEIGHTS}`")
     except (OSError, ValueError) as error:
@@ -123,11 +115,21 @@ def read_policy(file: Path) -> SavedNetwork:
     saved = _metadata(file, parts.get(METADATA))
     try:
         module, settings = _network(parts[DATA])
-        _check_weights(parts[WEIGHTS])
+        weights = _weights(parts.pop(WEIGHTS))
     except ValueError as error:
         message = f"the policy {str(file)!r} cannot be used: {one_line_reason(error)}"
         raise ControllerFileError(message) from error
-    return SavedNetwork(saved, METADATA in parts, module, settings, parts[WEIGHTS])
+    return SavedNetwork(saved, METADATA in parts, module, settings, weights)
+
+
+def _parts(content: bytes) -> dict[str, bytes]:
+    """Returns the parts of a policy file that are used, by name.
+
+    Raises:
+        ValueError: It is damaged, or much larger when unpacked.
+    """
+    most = min(MOST_BYTES, _MOST_GROWTH * len(content) + _SLACK_BYTES)
+    return read_zip(content, most, {DATA, WEIGHTS, METADATA})
 
 
 def read_metadata(file: Path) -> SavedPolicy | None:
@@ -150,32 +152,30 @@ def write_metadata(file: Path, saved: SavedPolicy) -> None:
     write_atomic(file, content.getvalue())
 
 
-def load_weights(weights: bytes) -> Any:
-    """Returns the tensors of a saved network by name.
+def load_weights(weights: dict[str, Weights]) -> Any:
+    """Returns the tensors of a saved network by name, as torch's.
 
     Raises:
-        ControllerFileError: They cannot be read, or torch is not installed.
+        ControllerFileError: They are not finite, or torch is not installed.
     """
     try:
         import torch
     except ImportError as error:
         needed = f"SB3 policies need an extra: {install_command('sb3')}"
         raise ControllerFileError(needed) from error
-    try:
-        found = torch.load(io.BytesIO(weights), map_location="cpu", weights_only=True)
-        usable = isinstance(found, dict) and all(
-            isinstance(name, str)
-            and isinstance(tensor, torch.Tensor)
-            and tensor.is_floating_point()
-            and bool(torch.isfinite(tensor).all())
-            for name, tensor in found.items()
-        )
-    # torch raises various errors for invalid files.
-    except Exception as error:
-        message = f"the policy's weights cannot be read: {one_line(error)}"
-        raise ControllerFileError(message) from error
-    if not usable:
-        raise ControllerFileError("the policy's weights are not all finite numbers")
+    kinds = {
+        "Float": torch.float32,
+        "Double": torch.float64,
+        "Half": torch.float16,
+        "BFloat16": torch.bfloat16,
+    }
+    found = {}
+    for name, saved in weights.items():
+        # A copy, since torch writes to what it is given.
+        flat = torch.frombuffer(bytearray(saved.data), dtype=kinds[saved.kind])
+        found[name] = flat.to(torch.float32).reshape(saved.shape)
+        if not bool(torch.isfinite(found[name]).all()):
+            raise ControllerFileError("the policy's weights are not all finite numbers")
     return found
 
 
@@ -216,19 +216,10 @@ def _network(data: bytes) -> tuple[str, Settings]:
         raise ValueError(f"its policy_kwargs: {first_problem(error)}") from None
 
 
-def _check_weights(weights: bytes) -> None:
-    """Checks that the pickle in a torch file, itself a zip file, names only tensors."""
+def _weights(content: bytes) -> dict[str, Weights]:
+    """Returns the tensors in a torch file."""
     try:
-        parts = read_zip(weights, MOST_BYTES)
-        pickled = next(part for name, part in parts.items() if name.endswith(".pkl"))
-        named = {
-            str(argument) if operation.name == "GLOBAL" else operation.name
-            for operation, argument, _ in pickletools.genops(pickled)
-            if operation.name in _NAMING
-        }
+        return read_weights(content)
     # `pickletools` raises various errors for invalid pickles.
     except Exception as error:
         raise ValueError(f"its `{WEIGHTS}` is damaged: {one_line(error)}") from None
-    more = sorted(named - _NAMES)
-    if more:
-        raise ValueError(f"its `{WEIGHTS}` holds more than weights: {more[0]}")

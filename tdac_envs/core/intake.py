@@ -148,8 +148,10 @@ def read_zip(
             ]
             if any(item.compress_type not in _BOUNDED for item in items):
                 raise ValueError("unsupported compression method in the zip file")
+            if len({item.filename for item in items}) < len(items):
+                raise ValueError("two files of one name in the zip file")
             if sum(item.file_size for item in items) > most:
-                raise ValueError(f"more than {most / 1e6:g} MB when unpacked")
+                raise ValueError(f"more than {most / 1e6:.3g} MB when unpacked")
             return {item.filename: archive.read(item) for item in items}
     except ValueError:
         raise

@@ -654,7 +654,7 @@ def test_usage_errors_are_one_line(tdac, words, message, tmp_path):
     with zipfile.ZipFile(here / "plain.zip", "w") as archive:
         weights = io.BytesIO()
         with zipfile.ZipFile(weights, "w") as inner:
-            inner.writestr("archive/data.pkl", pickle.dumps({}))
+            inner.writestr("archive/data.pkl", pickle.dumps({}, protocol=2))
         archive.writestr("data", "{}")
         archive.writestr("policy.pth", weights.getvalue())
     code, text, errors = tdac("evaluate", *words)

@@ -22,7 +22,7 @@ DATA: dict[str, Any] = {
     "use_sde": False,
 }
 SAID = {"schema_version": 1, "algo": "ppo", "wrappers": ["flatten"]}
-_DEFLATED = zipfile.ZIP_DEFLATED
+DEFLATED = zipfile.ZIP_DEFLATED
 
 
 class Call:
@@ -79,18 +79,18 @@ def _offer(
     return Offer("policies", name, WORDS, make, says, endless=endless, needs=needs)
 
 
-def _network(name: str, make: Maker | bytes, says: str) -> Offer:
+def network(name: str, make: Maker | bytes, says: str) -> Offer:
     """Where the network is made, or its weights are read."""
     return _offer(name, make, says, needs="stable_baselines3")
 
 
 def _bomb(here: Path) -> None:
     """A few hundred kilobytes that are 150 MB."""
-    (here / NAME).write_bytes(policy(bytes(150_000_000), method=_DEFLATED))
+    (here / NAME).write_bytes(policy(bytes(150_000_000), method=DEFLATED))
 
 
 def _inner_bomb(here: Path) -> None:
-    inner = zipped({"archive/data.pkl": bytes(150_000_000)}, _DEFLATED)
+    inner = zipped({"archive/data.pkl": bytes(150_000_000)}, DEFLATED)
     (here / NAME).write_bytes(policy(pth=inner))
 
 
@@ -101,7 +101,7 @@ def _bzip2(here: Path) -> None:
 def _lying(here: Path) -> None:
     """Its directory says 5 bytes of what are 150 MB."""
     size = (150_000_000).to_bytes(4, "little")
-    raw = policy(bytes(150_000_000), method=_DEFLATED)
+    raw = policy(bytes(150_000_000), method=DEFLATED)
     (here / NAME).write_bytes(raw.replace(size, (5).to_bytes(4, "little")))
 
 
@@ -148,8 +148,8 @@ OFFERS = [
     _offer("empty", zipped({}), "has no `data`"),
     _offer("no_weights", zipped({"data": b"{}"}), "no `policy.pth`"),
     _offer("crowded", _crowded, "more than 10000 files"),
-    _offer("bomb", _bomb, "more than 128 MB when unpacked"),
-    _offer("inner_bomb", _inner_bomb, "more than 128 MB when unpacked"),
+    _offer("bomb", _bomb, "more than 2.17 MB when unpacked"),
+    _offer("inner_bomb", _inner_bomb, "more than 0.146 MB when unpacked"),
     _offer("other_method", _bzip2, "unsupported compression method"),
     _offer("lying", _lying, "damaged zip file"),
     _offer("data_torn", policy(b"{"), "its `data` is damaged"),
@@ -170,20 +170,18 @@ OFFERS = [
     _offer("no_layer", kwargs(net_arch=[-1]), "net_arch"),
     _offer("nan_setting", kwargs(log_std_init=float("nan")), "log_std_init"),
     _offer("activation", kwargs(activation_fn="<class 'os.system'>"), "activation_fn"),
-    _network(
+    network(
         "no_activation",
         kwargs(activation_fn="<class 'torch.nn.modules.activation.Nope'>"),
         "Nope",
     ),
-    _network("of_another_class", kwargs(n_critics=2), "do not fit its class"),
+    network("of_another_class", kwargs(n_critics=2), "do not fit its class"),
     _offer("weights_torn", policy(pth=b"\x80\x02"), "`policy.pth` is damaged"),
     _offer("weights_code", policy(pth=weights(Call(os.system, "true"))), "holds more"),
     _offer("weights_large", policy(pth=weights(Call(bytearray, 10**11))), "holds more"),
-    _network("weights_list", policy(pth=weights([1, 2])), "weights"),
-    _network(
-        "weights_nan", _tensors("{'a': torch.full((2,), float('nan'))}"), "finite"
-    ),
-    _network("weights_whole", _tensors("{'a': torch.zeros(2).to(int)}"), "holds more"),
+    network("weights_list", policy(pth=weights([1, 2])), "weights"),
+    network("weights_nan", _tensors("{'a': torch.full((2,), float('nan'))}"), "finite"),
+    network("weights_whole", _tensors("{'a': torch.zeros(2).to(int)}"), "holds more"),
     _offer("said_torn", policy(said=b"{"), "tdac.json"),
     _offer("said_deep", policy(said=b"[" * 9999), "nested deeper"),
     _offer("said_wrapper", policy(said=SAID | {"wrappers": ["os"]}), "unknown wrapper"),

@@ -44,6 +44,7 @@ class Offer:
         code: Exit code.
         endless: Whether who reads it carelessly has to be stopped from outside.
         needs: Module without which nobody gets so far.
+        memory: Bytes that the command may take.
     """
 
     surface: str
@@ -54,6 +55,7 @@ class Offer:
     code: int = 2
     endless: bool = False
     needs: str = ""
+    memory: int = MEMORY
 
     def __str__(self) -> str:
         return f"{self.surface}/{self.name}"
@@ -101,18 +103,19 @@ def take(offer: Offer) -> Outcome:
 
 def differences(offer: Offer, outcome: Outcome) -> list[str]:
     """How an outcome differs from what the offer must come to."""
-    found = line_problems(offer, outcome.code, outcome.errors) + excesses(outcome)
+    found = line_problems(offer, outcome.code, outcome.errors)
+    found += excesses(outcome, offer.memory)
     if outcome.made:
         found.append(f"made {', '.join(outcome.made)}")
     return found
 
 
-def excesses(outcome: Outcome) -> list[str]:
+def excesses(outcome: Outcome, memory: int = MEMORY) -> list[str]:
     """What a command took or left that none may."""
     found = []
     if outcome.seconds >= SECONDS:
         found.append(f"took {outcome.seconds:.0f} s")
-    if outcome.memory > MEMORY:
+    if outcome.memory > memory:
         found.append(f"took {outcome.memory / 1e6:.0f} MB")
     if outcome.left:
         found.append(f"left {', '.join(outcome.left)}")
@@ -138,6 +141,7 @@ def all_offers() -> list[Offer]:
     import offered_policies
     import offered_records
     import offered_tasks
+    import offered_weights
     import offered_worlds
 
     modules = (
@@ -146,6 +150,7 @@ def all_offers() -> list[Offer]:
         offered_tasks,
         offered_records,
         offered_policies,
+        offered_weights,
     )
     return [offer for module in modules for offer in module.OFFERS]
 
