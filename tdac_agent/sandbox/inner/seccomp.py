@@ -16,6 +16,13 @@ _IOCTLS = (0x5401, 0x5413, 0x541B, 0x5421, 0x5450, 0x5451)
 _FCNTLS = (0, 1, 2, 3, 1030)
 # Wait, wake and requeue, with their bitset and wall-clock variants, all private.
 _FUTEXES = (128, 129, 131, 132, 137, 138, 384, 393)
+# Normal, random, sequential, not needed, free, huge pages or not: what malloc and numpy
+# say of their own memory. Other advice moves pages of files that all children share.
+_ADVICE = (0, 1, 2, 4, 8, 14, 15)
+# The kernel's own clocks. Other numbers mean the CPU time of another process.
+_CLOCKS = tuple(range(12))
+# At most one of each of these can be pending. Those that queue count for the user.
+_SIGNALS = tuple(range(32))
 
 Instruction = tuple[int, int, int, int]
 
@@ -72,14 +79,28 @@ def _guards(lifeline: int) -> dict[str, list[Instruction]]:
     keeps_lifeline = [*_is_not(0, lifeline), (_RETURN, 0, 0, _ALLOW)]
     onto_lifeline = [*_is_not(1, lifeline), (_RETURN, 0, 0, _ALLOW)]
     to_itself = _one_of(0, (own,))
+    of_itself = [*_one_of(0, (0, own)), (_RETURN, 0, 0, _ALLOW)]
+    own_clock = [*_one_of(0, _CLOCKS), (_RETURN, 0, 0, _ALLOW)]
     return {
         "close": keeps_lifeline,
         "dup2": onto_lifeline,
         "dup3": onto_lifeline,
         "fcntl": [*_one_of(1, _FCNTLS), (_RETURN, 0, 0, _ALLOW)],
         "ioctl": [*_one_of(1, _IOCTLS), (_RETURN, 0, 0, _ALLOW)],
-        "kill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
-        "tgkill": [*to_itself, (_RETURN, 0, 0, _ALLOW)],
+        "kill": [*to_itself, *_one_of(1, _SIGNALS), (_RETURN, 0, 0, _ALLOW)],
+        "tgkill": [*to_itself, *_one_of(2, _SIGNALS), (_RETURN, 0, 0, _ALLOW)],
+        "madvise": [*_one_of(2, _ADVICE), (_RETURN, 0, 0, _ALLOW)],
+        "clock_gettime": own_clock,
+        "clock_getres": own_clock,
+        "clock_nanosleep": own_clock,
+        "getpgid": of_itself,
+        "getsid": of_itself,
+        "sched_getaffinity": of_itself,
+        "getpriority": [
+            *_one_of(0, (0,)),
+            *_one_of(1, (0, own)),
+            (_RETURN, 0, 0, _ALLOW),
+        ],
         # Only private futexes: shared ones could reach children that map the same file.
         "futex": [*_one_of(1, _FUTEXES), (_RETURN, 0, 0, _ALLOW)],
         # It may read its own limits, but set none.

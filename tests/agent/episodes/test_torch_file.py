@@ -90,7 +90,7 @@ def test_what_torch_saves_is_read():
         (Tensor((-2,), (1,)), "or of none"),
         (Tensor((1,) * 9, (1,) * 9), "9 dimensions"),
         (Tensor((2, 2), (2,)), "zip"),
-        (Tensor((1.5,), (1,)), "integers"),
+        (Tensor((1.5,), (1,)), "BINFLOAT"),
         (Tensor((4,), (1,), count=5), "claims 20 bytes, and has 16"),
         (Tensor((4,), (1,), count=-4), "claims -16 bytes"),
         (Tensor((4,), (1,), key="1"), "data/1"),

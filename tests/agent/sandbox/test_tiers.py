@@ -112,6 +112,43 @@ def test_no_process_socket_or_rights_call_is_in_the_table(machine):
     assert len(numbers) == len(set(numbers))
 
 
+@pytest.mark.parametrize("machine", syscalls.MACHINES)
+def test_no_call_leaves_a_note_for_the_next_child(machine):
+    """None moves pages of shared files, tells what is free, or counts inodes up."""
+    names = {row.split()[0] for row in syscalls.ALLOWED.replace("\n", " ").split(",")}
+    notes = (
+        "fadvise64 readahead mincore cachestat madvise process_madvise preadv2 "
+        "pwritev2 mlock mlock2 sync sync_file_range syncfs statfs fstatfs sysinfo pipe "
+        "pipe2 eventfd2 timerfd_create epoll_create1 inotify_init1 mq_open semget "
+        "msgget add_key keyctl sched_getscheduler clock_gettime getpgid getpriority"
+    )
+    assert not names & set(notes.split())
+    guarded = {"madvise", "clock_gettime", "getpgid", "getpriority"}
+    assert guarded <= syscalls.guarded(machine).keys()
+
+
+def test_what_numpy_and_malloc_ask_for_is_allowed(launch, tier):
+    """Advice on its own memory, its own clocks, and its own processors."""
+    source = """
+        import mmap, os, time
+        import numpy as np
+        def policy(obs):
+            large = np.ones((1500, 1500))
+            room = mmap.mmap(-1, 1 << 22)
+            room.madvise(mmap.MADV_DONTNEED)
+            room.madvise(mmap.MADV_HUGEPAGE)
+            time.sleep(0)
+            return (
+                float((large @ large)[0, 0]), time.process_time() > 0,
+                time.thread_time() > 0, os.getpgid(0) == os.getpgrp(),
+                bool(os.sched_getaffinity(0)), os.getpriority(os.PRIO_PROCESS, 0),
+            )
+    """
+    with launch(textwrap.dedent(source), tier) as child:
+        child.load()
+        assert child.policy({}) == (1500.0, True, True, True, True, 0)
+
+
 JUDGE = """
     import sys
     from tdac_agent.sandbox import start
