@@ -31,6 +31,7 @@ from tdac_agent.sandbox.launch import (
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
 from tdac_agent.sandbox.process import Child, EpisodeEnv
 from tdac_agent.sandbox.tiers import CONFINING, TIERS, Tier, TierStatus
+from tdac_agent.sandbox.waiting import machine_is_to_blame
 from tdac_agent.sandbox.zygote import NoRoomError, Zygote
 
 __all__ = [
@@ -61,6 +62,7 @@ __all__ = [
     "find_tier",
     "fork_child",
     "installed_packages",
+    "machine_is_to_blame",
     "no_confining_tier_error",
     "start",
     "start_zygote",

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 
 from tdac_agent.sandbox.inner.wire import HEADER
-from tdac_agent.sandbox.waiting import RunQueue
+from tdac_agent.sandbox.waiting import RunQueue, standing
 
 CHUNK = 1 << 16
 # Most answers are short, and a large buffer costs more than the whole round trip.
@@ -18,7 +18,6 @@ SHORT = 1 << 12
 KEPT_OUTPUT = 4000
 # Most answers come sooner; run-queue wait time is measured only for later ones.
 SOON_SECONDS = 0.25
-MOST_WAITED_SECONDS = 300.0
 # A child is busy if it was on a CPU for this share of its time outside the run queue.
 # Below it the machine may be to blame, e.g. the host of a virtual machine.
 BUSY_SHARE = 0.9
@@ -38,12 +37,15 @@ class DeadlineError(Exception):
 
     Args:
         busy: Whether the child was on a CPU for nearly all of its time.
-        machine: Whether it only waited for a CPU, so that the machine is to blame.
     """
 
-    def __init__(self, *, busy: bool, machine: bool = False) -> None:
+    def __init__(self, *, busy: bool) -> None:
         super().__init__()
-        self.busy, self.machine = busy, machine
+        self.busy = busy
+
+
+class StarvedError(Exception):
+    """The child is still in time, but the machine gave it too little of a CPU."""
 
 
 class FrameError(Exception):
@@ -75,9 +77,11 @@ class Channel:
         output_bytes: int,
         line: RunQueue,
     ) -> None:
-        self._line = line
+        # The judge, too, waits for a CPU after an answer.
+        self._line, self._own = line, RunQueue("thread-self")
         # Last reading of the run-queue statistics: when, values, for which deadline.
         self._seen_at, self._seen_times, self._seen_deadline = 0.0, (0.0, 0.0), 0.0
+        self._seen_own, self._late_deadline = 0.0, 0.0
         self._requests, self._answers, self._output = requests, answers, output
         self._frame_bytes, self._output_bytes = frame_bytes, output_bytes
         self._buffer = b""
@@ -160,11 +164,25 @@ class Channel:
             if events:
                 return events
             self._seen_at, self._seen_times = time.monotonic(), self._line.times()
-            self._seen_deadline = deadline
+            self._seen_deadline, self._seen_own = deadline, self._own.waited()
         while (left := self._seconds_left(deadline)) > 0:
             events = self._poll.poll(math.ceil(left * 1000))
             if events:
                 return events
+        return self._late_answer(deadline)
+
+    def _late_answer(self, deadline: float) -> list[tuple[int, int]]:
+        """Return an answer that is there, but that the judge had no CPU to read.
+
+        Once for each deadline, so that nothing can trickle in afterwards.
+
+        Raises:
+            DeadlineError: There is none.
+        """
+        events = [event for event in self._poll.poll(0) if event[0] == self._answers]
+        if events and self._late_deadline != deadline:
+            self._late_deadline = deadline
+            return events
         raise DeadlineError(busy=self._was_busy(deadline))
 
     def _was_busy(self, deadline: float) -> bool:
@@ -177,13 +195,24 @@ class Channel:
         return ran >= BUSY_SHARE * (time.monotonic() - self._seen_at - waited) > 0
 
     def _seconds_left(self, deadline: float) -> float:
-        """Return the seconds until a deadline, extended by the run-queue wait time."""
+        """Return the seconds until a deadline, extended by the run-queue wait time.
+
+        Raises:
+            StarvedError: It has been extended for too long.
+        """
         left = deadline - time.monotonic()
-        if left > 0 or left < -MOST_WAITED_SECONDS or self._seen_deadline != deadline:
+        if left > 0 or self._seen_deadline != deadline:
             return left
-        if self._line.stands():
-            return SOON_SECONDS
-        return left + self._line.waited() - self._seen_times[1]
+        ready = self._line.stands()
+        waited = self._line.waited() - self._seen_times[1]
+        waited += self._own.waited() - self._seen_own
+        # What is still in the queue adds its wait time only when it gets a CPU.
+        limit = deadline - self._seen_at
+        elapsed = limit - left
+        waited = max(waited, elapsed - limit + SOON_SECONDS) if ready else waited
+        if standing(limit, elapsed, waited) == "starved":
+            raise StarvedError
+        return left + waited
 
     def _drain(self) -> bool:
         """Read printed output; return whether more can follow."""

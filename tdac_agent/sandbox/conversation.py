@@ -14,6 +14,7 @@ from tdac_agent.sandbox.channel import (
     DeadlineError,
     FrameError,
     OutputFloodError,
+    StarvedError,
 )
 from tdac_agent.sandbox.ending import ChildUsage, has_ended
 from tdac_agent.sandbox.errors import (
@@ -32,6 +33,13 @@ from tdac_agent.sandbox.inner.wire import Kind, RemoteError, WireError
 from tdac_agent.sandbox.limits import Limits
 
 EXIT_SECONDS = 1.0
+_FAILURES = (
+    ChannelClosedError,
+    DeadlineError,
+    FrameError,
+    OutputFloodError,
+    StarvedError,
+)
 
 
 class Conversation:
@@ -81,7 +89,7 @@ class Conversation:
         payload = self._payload(kind, value)
         try:
             self._channel.send(kind, self._sequence, payload, deadline)
-        except (ChannelClosedError, DeadlineError, FrameError, OutputFloodError) as e:
+        except _FAILURES as e:
             self._fail(e, phase, seconds)
 
     def _payload(self, kind: Kind, value: Any) -> bytes:
@@ -101,7 +109,7 @@ class Conversation:
         try:
             kind, sequence, payload = self._channel.receive(deadline)
             value = decode(payload)
-        except (ChannelClosedError, DeadlineError, FrameError, OutputFloodError) as e:
+        except _FAILURES as e:
             self._fail(e, phase, seconds)
         except WireError as error:
             self.breach(str(error), phase)
@@ -130,10 +138,10 @@ class Conversation:
         raise fault
 
     def _fail(self, error: Exception, phase: str, seconds: float) -> NoReturn:
-        if isinstance(error, DeadlineError) and error.machine:
-            self.give_up(MachineBusyError(phase, seconds))
         if isinstance(error, DeadlineError):
             self.give_up(ControllerTimeout(phase, seconds, busy=error.busy))
+        if isinstance(error, StarvedError):
+            self.give_up(MachineBusyError(phase, seconds))
         if isinstance(error, FrameError):
             self.breach(str(error), phase)
         if isinstance(error, OutputFloodError):

@@ -26,6 +26,7 @@ class ChildUsage:
         output_head: Beginning of the printed text.
         output_tail: End of the printed text, if it does not fit into the head.
         status: Exit code, or minus the number of the signal that ended it.
+        waited_seconds: Run-queue wait time, s.
     """
 
     cpu_seconds: float
@@ -34,6 +35,7 @@ class ChildUsage:
     output_head: str
     output_tail: str
     status: int
+    waited_seconds: float = 0.0
 
     @property
     def printed(self) -> str:
@@ -67,6 +69,7 @@ def _end(forked: Forked) -> ChildUsage:
     channel = forked.channel
     try:
         cpu, rss = usage_of_tree(forked.pid)
+        waited = forked.line.waited()
         # The leader is not reaped yet, so no other process can have its ID.
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(forked.pid, signal.SIGKILL)
@@ -85,6 +88,7 @@ def _end(forked: Forked) -> ChildUsage:
         output_head=channel.output_head.decode("utf-8", "replace"),
         output_tail=channel.output_tail.decode("utf-8", "replace"),
         status=status,
+        waited_seconds=waited,
     )
 
 

@@ -11,8 +11,9 @@ MAX_SOURCE_BYTES = 200_000
 class Limits:
     """Resource limits of one child.
 
-    On Linux each wall time of the controller excludes up to five minutes of run-queue
-    wait time, so that a busy machine does not decide a verdict.
+    On Linux each wall time of the controller excludes its run-queue wait time, so that
+    a busy machine does not decide a verdict. After five minutes of waiting the sandbox
+    has failed, and there is no verdict.
 
     Attributes:
         start_seconds: Wall time until the child is ready; no controller code runs yet.

@@ -13,7 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from tdac_agent.sandbox.channel import MOST_WAITED_SECONDS, SOON_SECONDS, DeadlineError
+from tdac_agent.sandbox.channel import SOON_SECONDS, DeadlineError, StarvedError
+from tdac_agent.sandbox.waiting import MOST_WAITED_SECONDS
 
 Blame = Literal["computed", "slept", "machine"]
 
@@ -95,6 +96,7 @@ class OwnTime:
 
         Raises:
             DeadlineError: The time is used up.
+            StarvedError: The machine gave the program too little of a CPU.
         """
         now = time.monotonic()
         wall = self._wall + now - self._began
@@ -106,6 +108,8 @@ class OwnTime:
         ran, waited, ready = self._look()
         spent = Spent(wall, ran - self._ran, waited - self._waited, ready)
         cause = blame(spent, self._seconds)
+        if cause == "machine":
+            raise StarvedError
         if cause is not None:
-            raise DeadlineError(busy=cause == "computed", machine=cause == "machine")
+            raise DeadlineError(busy=cause == "computed")
         return seconds_to_next_look(spent, self._seconds)

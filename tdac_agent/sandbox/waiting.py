@@ -9,9 +9,47 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 # The kernel updates the time on a CPU at each tick, at least every 10 ms.
 TICKS_SECONDS = 0.025
+MOST_WAITED_SECONDS = 300.0
+# Part of its length that a verification's processes must have waited for a CPU that
+# others used, if the machine is to blame.
+STARVED_SHARE = 0.1
+
+Standing = Literal["in time", "too late", "starved"]
+
+
+def standing(limit: float, elapsed: float, waited: float) -> Standing:
+    """Returns how a controller stands that has not answered yet.
+
+    Time on a CPU and time asleep count against its limit, time in a run queue does not.
+
+    Args:
+        limit: Time that it may take, s.
+        elapsed: Time since it was asked, s.
+        waited: Time that it, or the judge, was ready to run but had no CPU, s.
+
+    Returns:
+        `starved` if the machine is to blame: it is still in time, but has waited longer
+        than anybody should wait for it.
+    """
+    if elapsed - waited >= limit:
+        return "too late"
+    return "starved" if waited > MOST_WAITED_SECONDS else "in time"
+
+
+def machine_is_to_blame(elapsed: float, waited: float, siblings: float) -> bool:
+    """Returns whether work that took too long did so because of other work.
+
+    Args:
+        elapsed: Time that it took, s.
+        waited: Time that its processes waited for a CPU, s, all together.
+        siblings: The most that they can have waited for each other, s, so that no
+            controller makes the machine look busy.
+    """
+    return waited - siblings >= STARVED_SHARE * elapsed
 
 
 @dataclass(slots=True)

@@ -15,8 +15,10 @@ from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.errors import Fault
 from tdac_agent.sandbox import (
     Child,
+    ChildUsage,
     ControllerFault,
     Limits,
+    machine_is_to_blame,
 )
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.blame import faults_of_judge
@@ -94,6 +96,10 @@ class Judge:
         self.fault: str | None = None
         self.seed = seed
         self._limits = limits or Limits()
+        self._wall_seconds, self._at_a_time = wall_seconds, at_a_time
+        # Of the episodes: time in a run queue, CPU time of children and of the judge.
+        self._waited = self._driving_cpu = self._judge_cpu = 0.0
+        self._cpu_before = time.process_time()
         self._deadline = time.monotonic() + wall_seconds
         self._too_long = f"the verification took longer than {wall_seconds:g} s"
         self._settings = VerificationSettings(
@@ -211,6 +217,22 @@ class Judge:
         """Waits for the running episodes; after this the CPU time is final."""
         self._pool.shutdown(cancel_futures=True)
         self._end_unit()
+        late = time.monotonic() - self._deadline
+        if late > 0.0 and self._machine_was_busy(self._wall_seconds + late):
+            reason = f"its processes waited {self._waited:.0f} s for a CPU"
+            fault = f"{self._too_long}, and {reason}: try again when less else runs"
+            self.fault = self.fault or fault
+
+    def _machine_was_busy(self, elapsed: float) -> bool:
+        """Whether other work, and not the controller, used up the time.
+
+        An episode's child may have waited for those of the other episodes, and for all
+        other processes of the verification.
+        """
+        judge = self._judge_cpu + time.process_time() - self._cpu_before
+        other = self.cpu_seconds - self._driving_cpu + judge
+        siblings = (self._at_a_time - 1) * self._driving_cpu + self._at_a_time * other
+        return machine_is_to_blame(elapsed, self._waited, siblings)
 
     def close(self) -> None:
         """Settles, and closes the pools that it made itself."""
@@ -219,12 +241,12 @@ class Judge:
 
     def _end_unit(self) -> None:
         if self._unit is not None:
-            self._account(self._unit.close().cpu_seconds)
+            self._account(self._unit.close())
             self._unit = None
 
-    def _account(self, cpu_seconds: float) -> None:
+    def _account(self, usage: ChildUsage) -> None:
         with self._lock:
-            self.cpu_seconds += cpu_seconds
+            self.cpu_seconds += usage.cpu_seconds
 
     def _submit(self, key: Key) -> Future[Rollout]:
         """Queues an episode if it is new, and returns its future.
@@ -283,7 +305,11 @@ class Judge:
         except ControllerFault as fault:
             return not_driven(self.task, request, fault)
         self.tier = driven.tier
-        self._account(driven.cpu_seconds)
+        self._account(driven.usage)
+        with self._lock:
+            self._waited += driven.usage.waited_seconds
+            self._driving_cpu += driven.usage.cpu_seconds
+            self._judge_cpu += driven.judge_cpu
         if driven.import_fault is not None:
             self._remember(driven.import_fault, final=final)
         # Concurrent children may together use more than the limit of each.
@@ -322,7 +348,7 @@ class Judge:
         try:
             load_controller(child, self._settings)
         except ControllerFault as fault:
-            self._account(child.close().cpu_seconds)
+            self._account(child.close())
             self._remember(fault, final=final)
             raise
         return child

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import time
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from tdac_agent.episodes.episode import Record, run_own_loop, run_policy
 from tdac_agent.episodes.trajectory import Outcome, Rollout
 from tdac_agent.sandbox import (
     Child,
+    ChildUsage,
     ControllerFault,
     ControllerTimeout,
     Limits,
@@ -72,13 +74,15 @@ class SuiteResult:
 
     Attributes:
         rollout: The judged episode.
-        cpu_seconds: CPU time of its child.
+        usage: Resource usage of its child.
+        judge_cpu: CPU time of the judge's process that drove it, s.
         tier: Sandbox tier of its child.
         import_fault: Why the controller could not be imported; None if it could.
     """
 
     rollout: Rollout
-    cpu_seconds: float
+    usage: ChildUsage
+    judge_cpu: float
     tier: str
     import_fault: ControllerFault | None = None
 
@@ -110,6 +114,7 @@ def drive(
     Raises:
         Fault: The sandbox or the judge failed.
     """
+    began = time.process_time()
     limit = request.steps if request.steps is not None else task.nominal.horizon
     record = Record(task.make_env(), request.start, limit, seed=request.seed)
     record.seen = task.setting.seen
@@ -121,7 +126,9 @@ def drive(
     except ControllerFault as fault:
         usage = child.close()
         rollout = replace(not_driven(task, request, fault), printed=usage.printed)
-        return SuiteResult(rollout, usage.cpu_seconds, child.tier, fault)
+        return SuiteResult(
+            rollout, usage, time.process_time() - began, child.tier, fault
+        )
     try:
         if request.drive != "policy":
             seconds = child.limits.reset_seconds + 2 * limit * task.nominal.dt
@@ -139,7 +146,7 @@ def drive(
     finally:
         usage = child.close()
     rollout = replace(rollout, printed=usage.printed)
-    return SuiteResult(rollout, usage.cpu_seconds, child.tier)
+    return SuiteResult(rollout, usage, time.process_time() - began, child.tier)
 
 
 def load_controller(child: Child, settings: VerificationSettings) -> None:

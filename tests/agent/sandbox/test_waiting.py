@@ -9,7 +9,8 @@ from small import SHORT, write_small_task
 
 from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.sandbox import ControllerTimeout, Limits
-from tdac_agent.tasks.task import load_task
+from tdac_agent.tasks.task import load_task, write_workdir
+from tdac_agent.verification.judge.judge import Judge
 
 pytestmark = pytest.mark.skipif(
     not Path("/proc/self/schedstat").exists(), reason="the kernel does not tell"
@@ -130,3 +131,68 @@ def test_on_a_busy_machine_a_slow_policy_is_slow(judged_in_the_crowd):
     assert rollout.outcome == "error"
     assert "ms a call, 20 ms are allowed" in rollout.error
     assert rollout.timed_out
+
+
+LOOP = """
+import time
+
+def run_episode(env, max_steps):
+    for _ in range(max_steps):
+        end = time.process_time() + 0.03
+        while time.process_time() < end:
+            pass
+        env.step((0.0, 0.0))
+"""
+
+
+@pytest.mark.slow
+def test_a_verification_that_is_starved_has_no_verdict(crowd, tmp_path):
+    """Its time is up because of other work: a fault, where a sleeper's is a failure."""
+    task = load_task(write_small_task(tmp_path / "task", **SHORT, horizon=400))
+    faults = []
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {crowd})
+    try:
+        for wait in ("end = time.process_time() + 0.03", "time.sleep(0.03); end = 0"):
+            source = (
+                "import time\ndef policy(obs):\n"
+                f"    {wait}\n"
+                "    while time.process_time() < end: pass\n"
+                "    return 0.0, 0.0\n"
+            )
+            work = tmp_path / f"work-{len(faults)}"
+            write_workdir(work, task)
+            judge = Judge(task, source.encode(), work, at_a_time=1, wall_seconds=5.0)
+            rollout = judge.rollout()
+            judge.close()
+            assert rollout.outcome == "error"
+            faults.append(judge.fault)
+    finally:
+        os.sched_setaffinity(0, before)
+    assert faults[1] is None
+    assert "waited" in faults[0]
+
+
+class Steps:
+    """An environment that answers at once."""
+
+    def step(self, action):
+        return None
+
+
+@pytest.mark.slow
+def test_in_its_own_loop_too_only_its_own_time_counts(crowded):
+    """60 % of a second in short calls are within a second, however long it waits."""
+    child = crowded(LOOP)
+    before = child.waited()
+    began = time.monotonic()
+    assert child.run_episode(Steps(), 20, timeout=1.0) is None
+    assert child.waited() - before > 0.05
+    assert time.monotonic() - began > 0.6
+
+
+@pytest.mark.slow
+def test_in_its_own_loop_too_much_work_is_too_much(crowded):
+    """Two seconds of work in short calls are more than one."""
+    with pytest.raises(ControllerTimeout, match="run_episode"):
+        crowded(LOOP).run_episode(Steps(), 70, timeout=1.0)

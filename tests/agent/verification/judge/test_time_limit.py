@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import select
 import signal
 import time
 
@@ -13,7 +14,7 @@ from tdac_agent.storage.plain import MAX_VALUE, shown
 from tdac_agent.tasks.task import write_workdir
 from tdac_agent.verification.judge.judge import Judge
 from tdac_agent.verification.judge.plugin import MOST_CALLS, JudgePlugin, run_tests
-from tdac_agent.verification.judge.time_limit import time_limit
+from tdac_agent.verification.judge.time_limit import CPU, WALL, time_limit
 
 SUITE = """
 import pytest
@@ -67,17 +68,26 @@ def caught_twice():
 
 
 @pytest.mark.slow_after(1)
+@pytest.mark.parametrize("clock", [WALL, CPU])
 @pytest.mark.parametrize("action", [endless, caught_twice])
-def test_the_main_thread_is_stopped_in_the_middle(action):
+def test_the_main_thread_is_stopped_in_the_middle(action, clock):
     """At the deadline, and again where the error is caught; nothing of it stays."""
-    before = signal.getsignal(signal.SIGALRM)
+    before = signal.getsignal(clock.signal)
     with (
         pytest.raises(ControllerFault, match="too long"),
-        time_limit(time.monotonic() + 0.1, "too long"),
+        time_limit(clock.time() + 0.1, "too long", clock),
     ):
         action()
-    assert signal.getsignal(signal.SIGALRM) == before
-    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+    assert signal.getsignal(clock.signal) == before
+    assert signal.getitimer(clock.timer) == (0.0, 0.0)
+
+
+def test_waiting_uses_none_of_the_time_of_the_processor():
+    """Static tests, which only compute, cannot fail because of other processes."""
+    with time_limit(CPU.time() + 0.2, "too long", CPU):
+        began = time.monotonic()
+        select.select([], [], [], 0.3)
+    assert time.monotonic() - began >= 0.3
 
 
 def test_nothing_begins_after_the_deadline():
