@@ -143,7 +143,7 @@ def drive_disturbed(
         try:
             return drive_seed(setup, seed)
         except SandboxError as error:
-            raise Fault(f"the sandbox failed: {error}") from error
+            raise Fault(error.fault) from error
         finally:
             child_pool.close()
 

@@ -62,7 +62,7 @@ def play_world(
         try:
             return drive_once(run, index)[0], task
         except SandboxError as error:
-            raise Fault(f"the sandbox failed: {error}") from error
+            raise Fault(error.fault) from error
         finally:
             child_pool.close()
 

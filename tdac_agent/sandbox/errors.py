@@ -8,13 +8,18 @@ from typing import Any
 class SandboxError(Exception):
     """The sandbox itself failed; this says nothing about the controller."""
 
+    @property
+    def fault(self) -> str:
+        """The message for a user."""
+        return f"the sandbox failed: {self}"
+
 
 class MachineBusyError(SandboxError):
-    """A controller waited for a CPU until the time for its whole run was up.
+    """A controller waited for a CPU for longer than anybody should wait for it.
 
     Args:
         phase: What the controller was doing.
-        seconds: CPU time that it may use, s.
+        seconds: Time that it may compute, and sleep, s.
     """
 
     def __init__(self, phase: str, seconds: float) -> None:
@@ -22,6 +27,11 @@ class MachineBusyError(SandboxError):
             f"the machine is too busy: {phase} did not get the {seconds:g} s of CPU "
             "time that it may use; try again when a core is free"
         )
+
+    @property
+    def fault(self) -> str:
+        """The message for a user; the sandbox itself is sound."""
+        return str(self)
 
 
 class ControllerFault(Exception):

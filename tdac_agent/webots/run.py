@@ -137,7 +137,7 @@ def run_controller(
         except ControllerError as error:
             raise ControllerFileError(f"{controller}: {error}") from error
         except SandboxError as error:
-            raise Fault(f"the sandbox failed: {error}") from error
+            raise Fault(error.fault) from error
         try:
             shutil.copytree(
                 PACKAGE,
@@ -150,7 +150,7 @@ def run_controller(
             steps = f"{server.log.steps} of {env.nominal.horizon} steps"
             raise Fault(f"{error}; it had done {steps}") from error
         except SandboxError as error:
-            raise Fault(f"the sandbox failed: {error}") from error
+            raise Fault(error.fault) from error
         finally:
             usage = child.close()
     if not server.log.poses:

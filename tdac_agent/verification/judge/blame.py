@@ -27,7 +27,7 @@ def faults_of_judge() -> Generator[None]:
     except (ControllerFault, WireError, Fault):
         raise
     except SandboxError as error:
-        raise Fault(f"the sandbox failed: {error}") from error
+        raise Fault(error.fault) from error
     except Exception as error:
         raise Fault(f"the judge failed: {_in_one_line(error)}") from error
 

@@ -181,7 +181,7 @@ def judge_seeds(job: SeededJob, child_pool: ChildPool) -> None:
                     if job.test and job.test.decide(*counts) != "undecided":
                         break
         except SandboxError as error:
-            fault = f"the sandbox failed: {error}"
+            fault = error.fault
     ending = JobEnding(tier=tier, fault=fault)
     write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
 

@@ -218,7 +218,7 @@ def judge_set(job: SetJob, child_pool: ChildPool) -> None:
                 if job.test and job.test.decide(*counts) != "undecided":
                     break
         except SandboxError as error:
-            fault = f"the sandbox failed: {error}"
+            fault = error.fault
         except TaskError as error:  # there is no feasible world
             problem = str(error)
     ending = JobEnding(tier=tier, fault=fault, problem=problem)

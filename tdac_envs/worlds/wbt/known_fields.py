@@ -40,7 +40,7 @@ _PLAIN = {
     "Background": "skyColor luminosity cubemap "
     + " ".join(f"{side}Url {side}IrradianceUrl" for side in _SIDES),
     "BallJoint": "jointParameters jointParameters2 jointParameters3 device device2 "
-    "device3 endPoint",
+    "device3 endPoint position position2 position3",
     "BallJointParameters": _JOINT,
     "Billboard": "children",
     "Box": "size",
@@ -52,27 +52,28 @@ _PLAIN = {
     "Coordinate": "point",
     "Cylinder": _ROUND,
     "Damping": "linear angular",
-    "DirectionalLight": f"{_LIGHT} direction",
+    "DirectionalLight": f"{_LIGHT} direction castLensFlares",
     "ElevationGrid": "height thickness color colorPerVertex xDimension xSpacing "
     "yDimension ySpacing zDimension zSpacing",
     "Fog": "color fogType visibilityRange",
     "Group": "children",
-    "Hinge2Joint": "jointParameters jointParameters2 device device2 endPoint",
-    "HingeJoint": "jointParameters device endPoint",
+    "Hinge2Joint": "jointParameters jointParameters2 device device2 endPoint position "
+    "position2",
+    "HingeJoint": "jointParameters device endPoint position",
     "HingeJointParameters": f"{_JOINT} suspensionSpringConstant "
     "suspensionDampingConstant suspensionAxis stopERP stopCFM",
     "ImageTexture": "url repeatS repeatT filtering",
-    "IndexedFaceSet": "coord normal texCoord color colorPerVertex ccw convex solid "
-    "normalPerVertex coordIndex normalIndex texCoordIndex creaseAngle",
+    "IndexedFaceSet": "coord normal texCoord ccw convex solid normalPerVertex "
+    "coordIndex normalIndex texCoordIndex creaseAngle",
     "JointParameters": _JOINT,
     "LinearMotor": f"{_MOTOR} maxForce",
     "Material": "ambientIntensity diffuseColor emissiveColor shininess specularColor "
     "transparency",
     "Mesh": "url ccw name materialIndex",
     "PBRAppearance": "baseColor baseColorMap transparency roughness roughnessMap "
-    "metalness metalnessMap IBLStrength normalMap normalMapFactor occlusionMap "
-    "occlusionMapStrength emissiveColor emissiveColorMap emissiveIntensity "
-    "textureTransform name",
+    "metalness metalnessMap environmentMap IBLStrength normalMap normalMapFactor "
+    "occlusionMap occlusionMapStrength emissiveColor emissiveColorMap "
+    "emissiveIntensity textureTransform name",
     "Physics": "density mass centerOfMass inertiaMatrix damping orientation",
     "Plane": "size",
     "PointLight": _LAMP,
@@ -80,26 +81,26 @@ _PLAIN = {
     "PositionSensor": "name noise resolution",
     "RotationalMotor": f"{_MOTOR} maxTorque",
     "Shape": "appearance geometry castShadows isPickable",
-    "SliderJoint": "jointParameters device endPoint",
+    "SliderJoint": "jointParameters device endPoint position",
     "Slot": "type endPoint",
     "Sphere": "radius subdivision ico",
     "SpotLight": f"{_LAMP} beamWidth cutOffAngle direction",
     "TextureCoordinate": "point",
     "TextureTransform": "center rotation scale translation",
-    "Transform": f"{_POSE} scale scaleOrientation center",
+    "Transform": f"{_POSE} scale",
     "Viewpoint": "fieldOfView orientation position description near far exposure "
     "follow followType followOrientation followSmoothness lensFlare "
-    "ambientOcclusionRadius bloomThreshold volume",
+    "ambientOcclusionRadius bloomThreshold",
     "WorldInfo": "info title window gravity CFM ERP physics basicTimeStep FPS "
     "optimalThreadCount physicsDisableTime physicsDisableLinearThreshold "
     "physicsDisableAngularThreshold defaultDamping inkEvaporation magneticField "
     "coordinateSystem gpsCoordinateSystem gpsReference lineScale randomSeed "
-    "contactProperties northDirection fast2d fast displayRefresh dragForceScale "
+    "contactProperties northDirection fast2d displayRefresh dragForceScale "
     "dragTorqueScale",
 }
 _SOLIDS = {
     "Accelerometer": _AXES,
-    "Altimeter": "lookupTable resolution",
+    "Altimeter": "accuracy resolution",
     "Camera": f"{_LENS} {_SCREEN} exposure antiAliasing ambientOcclusionRadius "
     "bloomThreshold noiseMaskUrl focus zoom recognition lensFlare type colorNoise "
     "rangeNoise rangeResolution maxRange",
@@ -132,21 +133,21 @@ _PROTOS = {
     "contactMaterial",
     "BeerBottle": "mass",
     "Can": "color textureUrl mass",
-    "CardboardBox": "size mass locked",
-    "Cat": "scale mass enablePhysics",
+    "CardboardBox": "size mass locked lidAngle",
+    "Cat": "scale color mass enablePhysics",
     "CerealBox": "size mass textureUrl physics",
     "CircleArena": f"{_ARENA} radius subdivision",
-    "Dog": "scale mass enablePhysics",
+    "Dog": "scale color mass enablePhysics",
     "E-puck": "controller controllerArgs customData supervisor synchronization version "
     "camera_fieldOfView camera_width camera_height camera_antiAliasing camera_rotation "
     "camera_noise camera_motionBlur distance_sensor_numberOfRays emitter_channel "
     "receiver_channel battery window turretSlot groundSensorsSlot kinematic "
     "selfCollision",
     "Floor": "contactMaterial size tileSize appearance texture",
-    "HoneyJar": "mass textureUrl",
-    "JamJar": "mass textureUrl",
-    "MazeBlock": "length color",
-    "Obstacle": "color contactMaterial",
+    "HoneyJar": "mass textureLidUrl color",
+    "JamJar": "mass textureLidUrl",
+    "MazeBlock": "length",
+    "Obstacle": "color",
     "OilBarrel": "height radius physics immersionProperties",
     "PingPongBall": "immersionProperties textureUrl",
     "PlasticCrate": "size color mass",
@@ -162,7 +163,7 @@ _PROTOS = {
     "WaterBottle": "textureUrl mass",
     "WoodenBox": "size mass locked immersionProperties",
     "WoodenPallet": "size lathNumber lathWidth mass boundingObject locked",
-    "YoubotFlag": "color textureUrl",
+    "YoubotFlag": "textureURL",
 }
 _EVERY_PROTO = "translation rotation name recognitionColors locked"
 
