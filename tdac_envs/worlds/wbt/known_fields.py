@@ -1,7 +1,9 @@
 """The fields of Webots' nodes and of the PROTOs that the reader models.
 
-Sources: `resources/nodes/*.wrl` and the PROTOs of R2019a to R2025a, with fields that
-later versions removed. Nodes that are not listed are not checked.
+Sources: Webots' `resources/nodes/*.wrl` and PROTO files in several versions between
+R2019a and R2025a. A list has the fields, also hidden and deprecated ones, of all of
+them, and some of older and unreleased versions. Nodes that are not listed are not
+checked.
 """
 
 from __future__ import annotations
@@ -158,6 +160,7 @@ _PROTOS = {
     "enableBoundingObject",
     "SolidPipe": "height radius thickness subdivision accuracy contactMaterial "
     "appearance physics enableBoundingObject",
+    # Since R2023b, TrafficCone has a `scale`, too, which the reader does not use.
     "TrafficCone": "physics",
     "Wall": "size appearance",
     "WaterBottle": "textureUrl mass",

@@ -2,8 +2,8 @@
 
 import pytest
 
-from tdac_agent.sandbox.channel import MOST_WAITED_SECONDS
 from tdac_agent.sandbox.own_time import Spent, blame, seconds_to_next_look
+from tdac_agent.sandbox.waiting import MOST_WAITED_SECONDS
 
 LAST = 2 * 8 + MOST_WAITED_SECONDS
 
