@@ -98,7 +98,7 @@ def _flag(node: Node, frame: Frame) -> Body:
 
 
 def _cat(node: Node, frame: Frame) -> Body:
-    own, scale = placed(node, frame), _scale(node)
+    own, scale = placed(node, frame), scale_of(node)
     local = own.flu().inside(scale=(scale, scale, scale))
     parts: tuple[Part, ...] = ()
     for side in (0.037, -0.037):
@@ -110,7 +110,7 @@ def _cat(node: Node, frame: Frame) -> Body:
 
 
 def _dog(node: Node, frame: Frame) -> Body:
-    own, scale = placed(node, frame), _scale(node)
+    own, scale = placed(node, frame), scale_of(node)
     local = own.flu().inside(scale=(scale, scale, scale))
     parts: tuple[Part, ...] = ()
     for x in (-0.23, 0.23):
@@ -121,7 +121,8 @@ def _dog(node: Node, frame: Frame) -> Body:
     return Body(own, parts, parts)
 
 
-def _scale(node: Node) -> float:
+def scale_of(node: Node) -> float:
+    """The field `scale` of a PROTO, if it is above 0; else 1."""
     scale = number(node, "scale", 1.0)
     return scale if scale > 0.0 else 1.0
 

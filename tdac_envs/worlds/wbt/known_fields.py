@@ -160,8 +160,7 @@ _PROTOS = {
     "enableBoundingObject",
     "SolidPipe": "height radius thickness subdivision accuracy contactMaterial "
     "appearance physics enableBoundingObject",
-    # Since R2023b, TrafficCone has a `scale`, too, which the reader does not use.
-    "TrafficCone": "physics",
+    "TrafficCone": "scale physics",
     "Wall": "size appearance",
     "WaterBottle": "textureUrl mass",
     "WoodenBox": "size mass locked immersionProperties",
@@ -181,3 +180,5 @@ KNOWN: dict[str, frozenset[str]] = {
 """Names of the fields of each type."""
 LOST_SCALE = frozenset({"Pose", *_SOLIDS})
 """Types without a field `scale` since R2023b; before, all but Pose had it."""
+GAINED_SCALE = frozenset({"TrafficCone"})
+"""Types with a field `scale` since R2023b."""

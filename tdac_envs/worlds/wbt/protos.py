@@ -16,7 +16,7 @@ from tdac_envs.worlds.wbt.appearance import reflectance
 from tdac_envs.worlds.wbt.body import Body
 from tdac_envs.worlds.wbt.fields import flag, number, numbers, text
 from tdac_envs.worlds.wbt.frames import Frame, flu_size, own_axes
-from tdac_envs.worlds.wbt.household import HOUSEHOLD
+from tdac_envs.worlds.wbt.household import HOUSEHOLD, scale_of
 from tdac_envs.worlds.wbt.physics import mass_of
 from tdac_envs.worlds.wbt.placing import Point, placed
 from tdac_envs.worlds.wbt.prisms import Vectors, box, capsule, cone, cylinder, hull
@@ -124,8 +124,8 @@ def _oil_barrel(node: Node, frame: Frame) -> Body:
 
 
 def _traffic_cone(node: Node, frame: Frame) -> Body:
-    own = placed(node, frame)
-    local = own.flu()
+    own, scale = placed(node, frame), scale_of(node)
+    local = own.flu().inside(scale=(scale, scale, scale))
     base = box(local.inside((0.0, 0.0, 0.01125)), (0.5, 0.5, 0.0225))
     solid = base
     for z, height, radius in (
@@ -135,7 +135,7 @@ def _traffic_cone(node: Node, frame: Frame) -> Body:
     ):
         solid += capsule(local.inside((-0.01, -0.005, z)), radius, height)
     visible = base + cone(local.inside((0.0, 0.0, 0.27)), 0.222, 0.49)
-    return Body(own, solid, visible, mass_of(node, 0.03))
+    return Body(own, solid, visible, mass_of(node, 0.03 * scale**3))
 
 
 def _solid_pipe(node: Node, frame: Frame) -> Body:

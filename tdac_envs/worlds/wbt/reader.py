@@ -15,7 +15,7 @@ from tdac_envs.worlds.wbt.found import WorldContent
 from tdac_envs.worlds.wbt.frames import Frame, world_frame
 from tdac_envs.worlds.wbt.protofiles import ProtoFolder
 from tdac_envs.worlds.wbt.tree import Document, Node, parse
-from tdac_envs.worlds.wbt.unknown import unknown_fields, without_lost_scales
+from tdac_envs.worlds.wbt.unknown import unknown_fields, without_odd_scales
 from tdac_envs.worlds.wbt.walk import walk
 from tdac_envs.worlds.world import INFINITE_FRICTION, EPuck, World
 
@@ -100,7 +100,7 @@ def read_world(
 def _read(content: str, name: str, folder: Path | None) -> tuple[Document, list[str]]:
     """The nodes of a file, and notes on fields that they do not have."""
     document = parse(content, name)
-    made, own = without_lost_scales(document), dict[str, Iterable[str]]()
+    made, own = without_odd_scales(document), dict[str, Iterable[str]]()
     if folder is not None:
         protos = ProtoFolder(folder, document.version)
         made, own = protos.expanded(made), protos.fields()

@@ -7,31 +7,36 @@ from dataclasses import replace
 
 from tdac_envs.core.errors import hint
 from tdac_envs.core.intake import printable
-from tdac_envs.worlds.wbt.known_fields import KNOWN, LOST_SCALE
+from tdac_envs.worlds.wbt.known_fields import GAINED_SCALE, KNOWN, LOST_SCALE
 from tdac_envs.worlds.wbt.tokens import Source
 from tdac_envs.worlds.wbt.tree import Document, Field, Node
 
 MOST_NOTES = 20
-_LOST_SCALE_IN = (2023, 2)
+_SCALES_CHANGED_IN = (2023, 2)
 _OWN = "Webots'"
 Own = Mapping[str, Iterable[str]]
 Place = tuple[int, Source]
 
 
-def without_lost_scales(document: Document) -> Document:
-    """The document without the field `scale` of nodes that no longer have it.
+def without_odd_scales(document: Document) -> Document:
+    """The document without the field `scale` of nodes that do not have it.
 
-    Webots skips it since R2023b; only Transform has kept it.
+    R2023b took it from all nodes but Transform, and gave it to some PROTOs.
     """
-    if document.release < _LOST_SCALE_IN:
-        return document
-    return replace(document, nodes=tuple(map(_without, document.nodes)))
+    kinds = _without_scale(document)
+    return replace(document, nodes=tuple(_without(n, kinds) for n in document.nodes))
 
 
-def _without(node: Node) -> Node:
-    lost = node.kind in LOST_SCALE
+def _without_scale(document: Document) -> frozenset[str]:
+    """Types without a field `scale` in the release of a file, unlike in others."""
+    is_new = document.release >= _SCALES_CHANGED_IN
+    return LOST_SCALE if is_new else GAINED_SCALE
+
+
+def _without(node: Node, kinds: frozenset[str]) -> Node:
+    lost = node.kind in kinds
     fields = {
-        name: _field_without(own)
+        name: _field_without(own, kinds)
         for name, own in node.fields.items()
         if not (lost and name == "scale")
     }
@@ -39,8 +44,8 @@ def _without(node: Node) -> Node:
     return node if same else replace(node, fields=fields)
 
 
-def _field_without(own: Field) -> Field:
-    items = tuple(_without(i) if isinstance(i, Node) else i for i in own.items)
+def _field_without(own: Field, kinds: frozenset[str]) -> Field:
+    items = tuple(_without(i, kinds) if isinstance(i, Node) else i for i in own.items)
     same = all(new is old for new, old in zip(items, own.items, strict=True))
     return own if same else Field(items, own.offset)
 
@@ -53,9 +58,11 @@ def unknown_fields(document: Document, own: Own) -> list[str]:
         own: Fields of the project's own PROTOs, by name.
     """
     known = {kind: set(names) for kind, names in KNOWN.items()}
-    if document.release < _LOST_SCALE_IN:
+    if document.release < _SCALES_CHANGED_IN:
         for kind in LOST_SCALE - {"Pose"}:
             known[kind].add("scale")
+        for kind in GAINED_SCALE:
+            known[kind].remove("scale")
     known |= {kind: set(names) for kind, names in own.items()}
     found: dict[tuple[str, str], list[Place]] = {}
     for node in _nodes(document.nodes):

@@ -22,8 +22,8 @@ def odd(world):
 
 
 def test_a_field_that_a_proto_does_not_have_is_named_with_its_line():
-    """The size remains Webots' own, so somebody who scales it has to know."""
-    cone = 'TrafficCone {\n  translation 1 0 0\n  scale 0.12 naem "x" }'
+    """The size remains Webots' own, so somebody who changes it has to know."""
+    cone = 'TrafficCone {\n  translation 1 0 0\n  sise 0.12 naem "x" }'
     world = read_world(text(cone))
     (thing,) = world.obstacles
     assert max(part.top for part in thing.solid) == pytest.approx(0.51)
@@ -31,6 +31,18 @@ def test_a_field_that_a_proto_does_not_have_is_named_with_its_line():
     assert [note.split(":")[0] for note in odd(world)] == [f"line {first + 2}"] * 2
     assert "Webots' TrafficCone has no such field" in odd(world)[0]
     assert "(did you mean 'name'?)" in odd(world)[1]
+
+
+@pytest.mark.parametrize(
+    ("release", "top", "notes"), [("R2025a", 0.051, 0), ("R2022b", 0.51, 1)]
+)
+def test_traffic_cones_have_a_scale_since_r2023b(release, top, notes):
+    """Before, Webots skipped it: the cone has its full size, and that is said."""
+    content = text("TrafficCone { translation 1 0 0 scale 0.1 }")
+    world = read_world(re.sub("R20[0-9]+[ab]", release, content, count=1))
+    (thing,) = world.obstacles
+    assert max(part.top for part in thing.solid) == pytest.approx(top)
+    assert len(odd(world)) == notes
 
 
 @pytest.mark.parametrize(
