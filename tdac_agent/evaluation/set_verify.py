@@ -276,9 +276,11 @@ def written_by(controller: str | bytes | Path) -> str | None:
 
 def compile_for_set(tasks: TaskSet) -> None:
     """Compiles what worlds and robot of a set need, unless compiled code is cached."""
-    compile_first(environment(Map2DTask.env_id))  # measures generated worlds, too
-    if tasks.file.unit == "m":
-        compile_first(environment(EPuckTask.env_id))
+    movers = bool(tasks.file.movers)
+    parts = environment(Map2DTask.env_id).code_parts(movers=movers, worlds=True)
+    if tasks.file.unit == "m":  # its generated worlds are measured as maps
+        parts += environment(EPuckTask.env_id).code_parts(movers=movers)
+    compile_first(parts)
 
 
 def most_worlds(tasks: TaskSet, split: str) -> int:

@@ -12,6 +12,7 @@ from tdac_agent.tasks.units import Point, Units
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template
+    from tdac_agent.tasks.first_run import CodePart
     from tdac_agent.tasks.parts import Pictures, Surroundings
     from tdac_agent.tasks.task import Task
     from tdac_agent.tasks.task_file import TaskFile
@@ -77,6 +78,15 @@ class Environment(ABC):
     @abstractmethod
     def small_env(self) -> JudgedEnv:
         """Returns an environment for warm-ups that is quick to construct."""
+
+    @abstractmethod
+    def code_parts(self, *, movers: bool, worlds: bool = False) -> list[CodePart]:
+        """Returns the parts of the compiled code that tasks need.
+
+        Args:
+            movers: Whether there are moving obstacles.
+            worlds: Whether the tasks are those of a task set, whose worlds are made.
+        """
 
     @abstractmethod
     def use_kernels(self) -> None:

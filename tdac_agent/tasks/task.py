@@ -202,7 +202,7 @@ def _resolve(name: str | None, spec: TaskFile, base: Path) -> Task:
 
 def _open(spec: TaskFile, base: Path) -> tuple[str, Setting]:
     entry = environment(spec.env)
-    compile_first(entry)
+    compile_first(entry.code_parts(movers=bool(spec.movers)))
     return entry.open(spec, base)
 
 

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 from numba import carray, config, types
+from numba.core.imputils import impl_ret_borrowed
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from tdac_envs.core.compiled import subkernel
+from tdac_envs.core.compiled import read_only, subkernel
 
 Words = NDArray[np.int64]
 _WORDS = 4
@@ -72,7 +73,26 @@ def _compiled_pointer(_: Any, address: Any) -> Any:
     return types.voidptr(address), generate
 
 
+@intrinsic  # type: ignore[untyped-decorator]
+def _compiled_frozen(_: Any, array: Any) -> Any:
+    """Changes the type of an array to that of a read-only one, in compiled code."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return impl_ret_borrowed(context, builder, signature.return_type, args[0])
+
+    return array.copy(readonly=True)(array), generate
+
+
+def _plain_frozen(array: NDArray[Any]) -> NDArray[Any]:
+    return read_only(array)
+
+
 _pointer = ctypes.c_void_p if config.DISABLE_JIT else _compiled_pointer
+frozen = _plain_frozen if config.DISABLE_JIT else _compiled_frozen
+"""Compiled code: the same array, of the type that `read_only` arrays have.
+
+A subkernel that only reads it is then compiled once for addresses and for arguments.
+"""
 
 
 @subkernel

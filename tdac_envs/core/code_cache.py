@@ -19,18 +19,24 @@ from tdac_envs.core.trusted_folders import copy, is_private, is_usable, user_cac
 PACKAGE = Path(__file__).parents[1]
 
 
-def has_code(package: str) -> bool:
-    """Whether compiled code for an environment's steps, of any version, is on disk.
+def has_code(
+    package: str, kernel: str = "kernels.drive", folder: Path | None = None
+) -> bool:
+    """Whether the compiled code of a kernel is on disk.
 
     Does not import numba, which is slow.
 
     Args:
-        package: Package whose module `kernels` defines the steps.
+        package: Package of the kernel.
+        kernel: Its module and name; by default, that which steps one robot.
+        folder: Cache folder. By default, code of any version in any of them counts.
     """
+    kept = f"{package.rpartition('.')[2]}_*/{kernel}-*.nbi"
+    if folder is not None:
+        return any(folder.glob(kept))
     caches = user_cache()
     parents = [PACKAGE / "__pycache__", *([caches / "tdac"] if caches else [])]
-    kept = f"tdac-*/{package.rpartition('.')[2]}_*/kernels.drive-*.nbi"
-    return any(any(parent.glob(kept)) for parent in parents)
+    return any(any(parent.glob(f"tdac-*/{kept}")) for parent in parents)
 
 
 @functools.cache

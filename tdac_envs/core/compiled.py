@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
@@ -21,6 +22,8 @@ from tdac_envs.core.code_cache import cache_folder
 F = TypeVar("F", bound=Callable[..., Any])
 
 REPORT_SECONDS = 5.0
+USUAL = 0.005
+"""Time of `_work` on the machine that the estimates of `expect` are for, s."""
 KERNELS: list[Any] = []
 """All kernels of the modules imported so far."""
 
@@ -67,14 +70,15 @@ class _Progress(event.Listener):  # type: ignore[misc]
 
     def __init__(self) -> None:
         self._reported = -REPORT_SECONDS
+        self.expected = ""
         self.message = ""
 
     def on_start(self, event: Any) -> None:
         if event.data["dispatcher"] not in KERNELS:
             return
         done = sum(bool(each.signatures) for each in KERNELS)
-        count = f"kernel {done + 1} of at most {len(KERNELS)}"
-        self.message = f"compiling for this machine, cached for later runs: {count}"
+        what = f"compiling for this machine{self.expected}, cached for later runs"
+        self.message = f"{what}: kernel {done + 1}"
         now = time.monotonic()
         if now - self._reported >= REPORT_SECONDS:
             self._reported = now
@@ -92,6 +96,28 @@ event.register("numba:compile", _progress)
 def compiling() -> str:
     """What is being compiled now, in a line; empty if nothing is."""
     return _progress.message
+
+
+@contextmanager
+def expect(seconds: float) -> Iterator[None]:
+    """Context manager: reports say that compiling takes about so long on this machine.
+
+    Args:
+        seconds: About how long it takes on a machine that takes `USUAL` for `_work`.
+    """
+    begin = time.perf_counter()
+    _work()
+    here = seconds * (time.perf_counter() - begin) / USUAL
+    _progress.expected = f", about {max(round(here / 5.0) * 5, 5)} s"
+    try:
+        yield
+    finally:
+        _progress.expected = ""
+
+
+def _work() -> None:
+    """Some work of an interpreter, as most of that of a compiler in Python is."""
+    sum(number % 7 for number in range(200_000))
 
 
 if config.DISABLE_JIT:

@@ -21,7 +21,7 @@ from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.among import begin_among, drive_among
-from tdac_envs.map2d.kernels import begin, drive
+from tdac_envs.map2d.kernels import begin, drive, drive_or_slide
 from tdac_envs.map2d.metric_input import in_pixels, options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.observed import info_of, noisy, observation_space
@@ -388,7 +388,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         among = self.setup.has_movers
         self.addresses = Addresses([(*arrays, *self.movers) if among else arrays])
         (words,) = self.addresses.words
-        kernels = (begin_among, drive_among) if among else (begin, drive)
+        stops = self.on_collision == "terminate"
+        alone = (begin, drive if stops else drive_or_slide)
+        kernels = (begin_among, drive_among) if among else alone
         calls: list[Callable[[], None]] = [partial(call, words) for call in kernels]
         if self.setup.sonar is not None:
             calls = [partial(self._then_listen, call) for call in calls]

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.addresses import Words, block, line, plane
+from tdac_envs.core.addresses import Words, block, frozen, line, plane
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.sliding import sliding
 from tdac_envs.drive.stepping import (
@@ -217,56 +217,97 @@ def ground_speeds(
 
 
 @subkernel
-def drive_step(
-    leaps: LeapGrid,
-    clear: FloatGrid,
-    field: FloatGrid,
-    directions: Array,
-    constants: Array,
-    state: Array,
-    queue: Array,
-    pose: NDArray[np.float32],
-    wheel_speeds: NDArray[np.float32],
-    ranges: NDArray[np.float32],
-    outcome: Array,
-) -> None:
-    """Runs one step of the environment; `state` already contains the wheel slip.
+def stop_at_contact(
+    clear: FloatGrid, constants: Array, state: Array, left: float, right: float
+) -> tuple[bool, float, float]:
+    """Moves the robot for one step, up to a contact.
 
-    `field`, shape (height, width), is the path length to the goal from each pixel, px;
-    `directions` are from `rays.fan`. `constants` and the arrays after it are those of
-    `Robot`. All of them are overwritten except `constants` and, in `state`, the
-    commands and the slip.
+    Args:
+        clear: Padded clearance, px.
+        constants: See `Robot`.
+        state: See `Robot`; its pose is overwritten.
+        left: Speed of the left wheel, px/s.
+        right: Speed of the right wheel, px/s.
+
+    Returns:
+        Whether the body touched an obstacle; length (px) and turn (rad) of the arc that
+        its wheels drove.
     """
-    before = outcome[REMAINING]
-    apply_command(constants, state, queue, wheel_speeds, outcome)
-    left, right = ground_speeds(constants, state, wheel_speeds)
     axle, dt, radius = constants[AXLE], constants[DT], constants[RADIUS]
     forward, turn = arc_of(left, right, axle, dt)
+    touched, part = advance(clear, state, left, right, axle, dt, radius)
+    return touched, part * forward, part * turn
+
+
+@subkernel
+def stop_or_slide(
+    clear: FloatGrid, constants: Array, state: Array, left: float, right: float
+) -> tuple[bool, float, float]:
+    """As `stop_at_contact`, or along obstacles if contacts do not end the episode."""
     if constants[STOPS] == 1.0:
-        touched, part = advance(clear, state, left, right, axle, dt, radius)
-        outcome[TOUCHED] = touched
-        forward, turn = part * forward, part * turn
-    else:
-        outcome[TOUCHED] = _slide(
-            clear, state, forward, turn, radius, constants[FRICTION],
-            CONTACT_GAP,
-        )  # fmt: skip
-    outcome[CONTACT] = outcome[TOUCHED]
-    state[FORWARD], state[TURN] = forward, turn
-    observe(
-        leaps, clear, field, directions, constants, state, pose, ranges, outcome
+        return stop_at_contact(clear, constants, state, left, right)
+    forward, turn = arc_of(left, right, constants[AXLE], constants[DT])
+    touched: bool = _slide(
+        clear, state, forward, turn, constants[RADIUS], constants[FRICTION],
+        CONTACT_GAP,
     )  # fmt: skip
-    finish_step(constants, state, outcome, before)
+    return touched, forward, turn
+
+
+def driving(move_body: Any) -> Any:
+    """Returns the subkernel `drive_step` for one kind of motion.
+
+    Args:
+        move_body: Subkernel with the arguments and results of `stop_at_contact`.
+    """
+
+    @subkernel
+    def drive_step(
+        leaps: LeapGrid,
+        clear: FloatGrid,
+        field: FloatGrid,
+        directions: Array,
+        constants: Array,
+        state: Array,
+        queue: Array,
+        pose: NDArray[np.float32],
+        wheel_speeds: NDArray[np.float32],
+        ranges: NDArray[np.float32],
+        outcome: Array,
+    ) -> None:
+        """Runs one step of the environment; `state` already contains the wheel slip.
+
+        `field`, shape (height, width), is the path length to the goal from each pixel,
+        px; `directions` are from `rays.fan`. `constants` and the arrays after it are
+        those of `Robot`. All of them are overwritten except `constants` and, in
+        `state`, the commands and the slip.
+        """
+        before = outcome[REMAINING]
+        apply_command(constants, state, queue, wheel_speeds, outcome)
+        left, right = ground_speeds(constants, state, wheel_speeds)
+        touched, forward, turn = move_body(clear, constants, state, left, right)
+        outcome[TOUCHED] = outcome[CONTACT] = touched
+        state[FORWARD], state[TURN] = forward, turn
+        observe(
+            leaps, clear, field, directions, constants, state, pose, ranges, outcome
+        )  # fmt: skip
+        finish_step(constants, state, outcome, before)
+
+    return drive_step
+
+
+_drive_to_contact = driving(stop_at_contact)
+drive_step = driving(stop_or_slide)
 
 
 @subkernel
 def arrays_at(words: Words) -> Any:
     """The arrays of a robot and its world, in the order of `drive_step`'s arguments."""
     return (
-        block(words[0], np.uint8),
-        plane(words[1], np.float32),
-        plane(words[2], np.float32),
-        plane(words[3], np.float64),
+        frozen(block(words[0], np.uint8)),
+        frozen(plane(words[1], np.float32)),
+        frozen(plane(words[2], np.float32)),
+        frozen(plane(words[3], np.float64)),
         line(words[4], np.float64),
         line(words[STATE], np.float64),
         plane(words[6], np.float64),
@@ -290,7 +331,16 @@ def begin(words: Words) -> None:
 
 @kernel
 def drive(words: Words) -> None:
-    """Runs one step of a robot; `words` as for `begin`."""
+    """Runs one step of a robot that a contact stops; `words` as for `begin`.
+
+    It is a kernel of its own because sliding takes as long to compile as the rest.
+    """
+    _drive_to_contact(*arrays_at(words))
+
+
+@kernel
+def drive_or_slide(words: Words) -> None:
+    """Runs one step of any robot; `words` as for `begin`."""
     drive_step(*arrays_at(words))
 
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from tdac_agent.environments.epuck.pictures import WorldPictures
     from tdac_agent.environments.epuck.surroundings import WorldSurroundings
     from tdac_agent.environments.epuck.world_copies import WorldOracle
+    from tdac_agent.tasks.first_run import CodePart
     from tdac_agent.tasks.task import Task
     from tdac_agent.tasks.task_file import TaskFile
     from tdac_envs.epuck.env import EPuckEnv
@@ -57,6 +58,17 @@ class EPuck(Environment):
         from tdac_envs.epuck.env import EPuckEnv
 
         return EPuckEnv()
+
+    def code_parts(
+        self,
+        *,
+        movers: bool,  # noqa: ARG002 - e-pucks have none
+        worlds: bool = False,  # noqa: ARG002 - their worlds need no code of their own
+    ) -> list[CodePart]:
+        """See `Environment`."""
+        from tdac_agent.environments.epuck.kernels_used import ROBOT
+
+        return [ROBOT]
 
     def use_kernels(self) -> None:
         """Drives in a bundled world."""

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template
     from tdac_agent.environments.map2d.pictures import MapPictures
     from tdac_agent.environments.map2d.surroundings import MapSurroundings
+    from tdac_agent.tasks.first_run import CodePart
     from tdac_agent.tasks.task import Task
     from tdac_agent.tasks.task_file import TaskFile
     from tdac_agent.verification.suite.oracle import Oracle
@@ -58,6 +59,17 @@ class Map2D(Environment):
 
         cells = np.zeros((40, 60), np.bool_)
         return Map2DEnv(map=cells, start=(10, 10), goal=(50, 30), robot_radius=3)
+
+    def code_parts(self, *, movers: bool, worlds: bool = False) -> list[CodePart]:
+        """See `Environment`."""
+        from tdac_agent.environments.map2d import kernels_used as used
+
+        parts = [used.ROBOT]
+        if movers:
+            parts.append(used.MOVERS)
+        if worlds:
+            parts.append(used.WORLDS)
+        return [*parts, used.PLANNERS] if movers and worlds else parts
 
     def use_kernels(self) -> None:
         """Reads a small map and drives on it."""

@@ -1,45 +1,93 @@
-"""Calls of all kernels for maps, so that they get compiled."""
+"""Calls of all kernels for maps, so that they get compiled: in parts, as they are used.
+
+Modules that only one part needs are imported in it.
+"""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-import tdac_envs
-from tdac_agent.environments.kernels_used import use_robot
-from tdac_envs.drive.disturbances import Disturbances
-from tdac_envs.ladder.dead_ends import Sensor, dead_ends
-from tdac_envs.ladder.generators.clutter import Clutter, draw
-from tdac_envs.ladder.orca_driver import drive_by_orca
-from tdac_envs.ladder.space_time import earliest_arrival
-from tdac_envs.ladder.words import Words
-from tdac_envs.ladder.worlds import WorldSpec, make_world
-from tdac_envs.map2d import rays
-from tdac_envs.movers.orca import velocity_among
+from tdac_agent.environments.kernels_used import use_batch, use_robot
+from tdac_agent.tasks.first_run import CodePart
+from tdac_envs.grid.grid import BoolGrid
+
+ENV_ID = "TDAC-Map2D-v0"
+ENDS: dict[str, Any] = {"start": (12.0, 12.0), "goal": (80.0, 50.0), "robot_radius": 5}
+
+
+def _map() -> BoolGrid:
+    cells = np.zeros((60, 90), np.bool_)
+    cells[25:35, 30:] = True
+    return cells
+
+
+def _drive() -> None:
+    """Plans on a map without movers, and drives up to a contact."""
+    from tdac_envs.grid.plan import plan_path
+    from tdac_envs.map2d import rays
+
+    cells = _map()
+    plan_path(~cells, (12, 12), (80, 50))
+    env = use_robot(ENV_ID, map=cells, **ENDS)
+    rays.sees(env.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
+
+
+def _movers() -> list[dict[str, Any]]:
+    post = {"kind": "route", "points": [(45.0, 10.0)], "radius": 3.0}
+    return [post, {"kind": "crowd", "count": 2, "radius": 2.0, "speed": 5.0}]
+
+
+def _drive_among_movers() -> None:
+    use_robot(ENV_ID, map=_map(), movers=_movers(), **ENDS)
+
+
+def _make_worlds() -> None:
+    """Makes a small world, and a draft of another kind."""
+    from tdac_envs.ladder.dead_ends import Sensor, dead_ends
+    from tdac_envs.ladder.generators.clutter import Clutter, draw
+    from tdac_envs.ladder.words import Words
+    from tdac_envs.ladder.worlds import WorldSpec, make_world
+
+    clutter = Clutter.model_validate({"name": "clutter", "width": 60, "height": 60})
+    draw(Words(bytes(32)), clutter, 8.0)
+    maze = {"name": "mazes", "width": 60, "height": 60, "loops": 0.0}
+    spec = WorldSpec.model_validate({"generator": maze, "radius": 4, "min_steps": 10})
+    dead_ends(make_world(spec, bytes(32)), spec.radius, Sensor(18, 2.0, 40.0))
+
+
+def _plan_among_movers() -> None:
+    """Drives as the planners do that admit a world with movers."""
+    from tdac_envs.drive.disturbances import Disturbances
+    from tdac_envs.ladder.orca_driver import drive_by_orca
+    from tdac_envs.ladder.space_time import earliest_arrival
+    from tdac_envs.map2d.env import Map2DEnv
+    from tdac_envs.movers.orca import velocity_among
+
+    velocity_among(np.zeros((1, 5)), np.zeros(2), 1.0, 1.0, 0.1, np.empty(2))
+    env = Map2DEnv(map=_map(), movers=_movers(), **ENDS)
+    env.reset(seed=0)
+    earliest_arrival(env.task)
+    drive_by_orca(env.task, Disturbances(), np.random.default_rng(0))
+
+
+ROBOT = CodePart(_drive, "tdac_envs.map2d", "kernels.drive", 7.0)
+MOVERS = CodePart(_drive_among_movers, "tdac_envs.map2d", "among.drive_among", 17.0)
+WORLDS = CodePart(_make_worlds, "tdac_envs.ladder", "dead_ends._mark", 7.0)
+PLANNERS = CodePart(_plan_among_movers, "tdac_envs.ladder", "orca_driver._choose", 7.0)
 
 
 def use_kernels() -> None:
     """Calls each kernel through its usual caller, on a small map."""
-    image = np.full((60, 90), 255, np.uint8)
-    image[25:35, 30:] = 0
-    start, goal, radius = (12.0, 12.0), (80.0, 50.0), 5.0
-    grid, _ = tdac_envs.preprocess(image, start, goal, radius, preset="paper")
-    ends = {"start": start, "goal": goal, "robot_radius": radius}
-    disc = use_robot("TDAC-Map2D-v0", map=grid.cells, **ends)
-    post = {"kind": "route", "points": [(45.0, 10.0)], "radius": 3.0}
-    people = {"kind": "crowd", "count": 2, "radius": 2.0, "speed": 5.0}
-    disc = use_robot("TDAC-Map2D-v0", map=grid.cells, movers=[post, people], **ends)
-    earliest_arrival(disc.task)
-    drive_by_orca(disc.task, Disturbances(), np.random.default_rng(0))
-    velocity_among(np.zeros((1, 5)), np.zeros(2), 1.0, 1.0, 0.1, np.empty(2))
-    use_robot("TDAC-Map2D-v0", map=grid.cells, sensor="sonar", **ends)
-    rays.sees(disc.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
-    _use_ladder()
+    import tdac_envs
 
-
-def _use_ladder() -> None:
-    """Makes a small world, and a draft of another kind."""
-    maze = {"name": "mazes", "width": 60, "height": 60, "loops": 0.0}
-    spec = WorldSpec.model_validate({"generator": maze, "radius": 4, "min_steps": 10})
-    dead_ends(make_world(spec, bytes(32)), spec.radius, Sensor(18, 2.0, 40.0))
-    clutter = Clutter.model_validate({"name": "clutter", "width": 60, "height": 60})
-    draw(Words(bytes(32)), clutter, 2.0 * spec.radius)
+    image = np.where(_map(), 0, 255).astype(np.uint8)
+    start, goal, radius = ENDS.values()
+    tdac_envs.preprocess(image, start, goal, radius, preset="paper")
+    for part in (ROBOT, MOVERS, WORLDS, PLANNERS):
+        part.use()
+    use_robot(ENV_ID, map=_map(), on_collision="block", **ENDS)
+    use_robot(ENV_ID, map=_map(), sensor="sonar", **ENDS)
+    use_batch(ENV_ID, map=_map(), **ENDS)
+    use_batch(ENV_ID, map=_map(), movers=_movers(), **ENDS)
