@@ -1,10 +1,11 @@
-"""Times the start-up: the command line's help, imports, a first environment.
+"""Times the start-up: the command line's help, imports, first steps, a first run.
 
     python -m benchmarks start_up
 
 Each case is a separate process. The floor is the bare interpreter, the reference one
 that imports numpy, as every tool of this kind must. Compiled code is already cached on
-disk, as after the first use on a machine.
+disk, as after the first use on a machine; `benchmarks.first_run` measures that first
+use.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import subprocess
 import sys
 from functools import partial
 
+from benchmarks.first_run import first_runs
 from benchmarks.timing import Bench, Effort, compared, in_turn
 
 FLOOR, REFERENCE = "python -c pass", "import numpy"
@@ -32,7 +34,7 @@ LIMITS = {"tdac --help": 0.3}
 
 
 def benches(effort: Effort) -> list[Bench]:
-    """One bench."""
+    """Two benches."""
     calls = {
         name: partial(
             subprocess.run, [sys.executable, *words], check=True, capture_output=True
@@ -40,4 +42,5 @@ def benches(effort: Effort) -> list[Bench]:
         for name, words in CASES.items()
     }
     times = in_turn(calls, effort.rounds_of(7))
-    return [compared("Start-up, a process each", times, FLOOR, REFERENCE, LIMITS)]
+    bench = compared("Start-up, a process each", times, FLOOR, REFERENCE, LIMITS)
+    return [bench, *first_runs(effort)]

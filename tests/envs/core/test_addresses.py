@@ -5,9 +5,10 @@ import sys
 
 import numpy as np
 import pytest
+from numba.core.errors import TypingError
 
-from tdac_envs.core.addresses import Addresses, block, line, plane
-from tdac_envs.core.compiled import kernel
+from tdac_envs.core.addresses import Addresses, block, frozen, line, plane
+from tdac_envs.core.compiled import kernel, read_only
 
 
 @kernel
@@ -28,6 +29,31 @@ def test_arrays_are_found_with_their_shapes():
     assert arrays[0].tolist() == [0.0, 2.0, 4.0]
     assert (arrays[1] == 2.0).all()
     assert (arrays[2] == 12).all()
+
+
+@kernel
+def _sum(array):
+    return array.sum()
+
+
+@kernel
+def _frozen_sum(words):
+    return _sum(frozen(plane(words[0], np.float64)))
+
+
+@kernel
+def _overwritten(words):
+    frozen(plane(words[0], np.float64))[0, 0] = 1.0
+
+
+def test_frozen_arrays_have_the_type_of_read_only_ones():
+    """So that what reads them is compiled once for both, and nothing can write them."""
+    array = np.arange(6.0).reshape(2, 3)
+    words = Addresses([(array,)]).words[0]
+    assert _frozen_sum(words) == _sum(read_only(array)) == 15.0
+    assert len(getattr(_sum, "signatures", [()])) == 1
+    with pytest.raises((TypingError, ValueError), match=r"read-?only"):
+        _overwritten(words)
 
 
 def test_one_row_is_replaced():

@@ -9,10 +9,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_envs.core.compiled import read_only
+from tdac_envs.drive import stepping
 from tdac_envs.drive.stepping import move, wrap_angle
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.grid.plan import distance_field
+from tdac_envs.map2d import kernels
 from tdac_envs.map2d.contact import first_contact
+from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.kernels import advance, path_distance
 from tdac_envs.map2d.rays import cast_ray, cast_rays, fan, leaps_of, sees
 from tdac_envs.map2d.terrain import Terrain
@@ -426,3 +429,20 @@ class TestPathDistance:
         free[:, :10] = False
         field = read_only(distance_field(free, (20, 20)), np.float32)
         assert path_distance(world.leaps, field, 8.9, 15.0, 77.0) == 77.0
+
+
+def test_a_robot_that_contacts_stop_steps_alike_in_both_kernels():
+    """Bit for bit, so that a batch may use the larger one for all robots."""
+    one, other = (Map2DEnv(variation="random") for _ in range(2))
+    random = np.random.default_rng(3)
+    for episode in range(20):
+        for env in (one, other):
+            env.reset(seed=episode)
+        wheels = random.uniform(-0.5, 1.0, 2)
+        for _ in range(40):
+            for env, call in ((one, kernels.drive), (other, kernels.drive_or_slide)):
+                env.robot.state[[stepping.LEFT, stepping.RIGHT]] = wheels
+                call(env.addresses.words[0])
+            for ours, theirs in zip(one.robot, other.robot, strict=True):
+                np.testing.assert_array_equal(ours, theirs)
+    assert one.setup.on_collision == "terminate"
