@@ -278,10 +278,10 @@ _slide = sliding(arc_touch, near_normals)
 
 
 @subkernel
-def move_body(
+def stop_at_contact(
     near: Near, state: Array, forward: float, turn: float, constants: Array
 ) -> tuple[bool, float]:
-    """Moves the robot along an arc; a contact stops it, or it slides.
+    """Moves the robot along an arc, up to a contact.
 
     Args:
         near: The arguments `points`, `first`, `extent`, `listed`, `begin` and `end`.
@@ -291,17 +291,26 @@ def move_body(
         constants: See `tdac_envs.epuck.robot.Robot`.
 
     Returns:
-        Whether it touched a part, and the fraction of the arc that its wheels drove: 1
-        if it slides.
+        Whether it touched a part, and the fraction of the arc that its wheels drove.
     """
-    radius = constants[RADIUS]
-    if constants[STOPS] == 0.0:
-        friction = constants[FRICTION]
-        touched: bool = _slide(
-            near, state, forward, turn, radius, friction, CONTACT_GAP
-        )
-        return touched, 1.0
     points, first, extent, listed, begin, end = near
     return advance(
-        points, first, extent, listed, begin, end, state, forward, turn, radius
+        points, first, extent, listed, begin, end,
+        state, forward, turn, constants[RADIUS],
+    )  # fmt: skip
+
+
+@subkernel
+def stop_or_slide(
+    near: Near, state: Array, forward: float, turn: float, constants: Array
+) -> tuple[bool, float]:
+    """As `stop_at_contact`, or along obstacles if contacts do not end the episode.
+
+    The wheels of a robot that slides drive the whole arc.
+    """
+    if constants[STOPS] == 1.0:
+        return stop_at_contact(near, state, forward, turn, constants)
+    touched: bool = _slide(
+        near, state, forward, turn, constants[RADIUS], constants[FRICTION], CONTACT_GAP
     )
+    return touched, 1.0

@@ -324,7 +324,9 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self.addresses = Addresses([(*world, *self.robot)])
         (words,) = self.addresses.words
         self._call_begin: Callable[[], None] = partial(kernels.begin, words)
-        self._call_drive = partial(kernels.drive, words)
+        stops = self.on_collision == "terminate"
+        drive = kernels.drive if stops else kernels.drive_or_slide
+        self._call_drive = partial(drive, words)
         if self.setup.pushes:
             self._call_drive = partial(things.step, words, self.robot, self._call_drive)
 

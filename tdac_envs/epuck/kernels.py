@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.addresses import Words, line, plane
+from tdac_envs.core.addresses import Words, frozen, line, plane
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive import stepping
 from tdac_envs.drive.stepping import (
@@ -47,7 +47,7 @@ from tdac_envs.drive.stepping import (
     turned_wheels,
     wrap_angle,
 )
-from tdac_envs.epuck.contact import move_body
+from tdac_envs.epuck.contact import stop_at_contact, stop_or_slide
 from tdac_envs.epuck.gaps import listed_at, nearest_of, remaining_path
 from tdac_envs.epuck.infrared import in_sight, sense
 from tdac_envs.epuck.prisms import Array, Index
@@ -205,74 +205,88 @@ def _finish(
     finish_step(constants, state, outcome, before)
 
 
-@subkernel
-def _drive(
-    points: Array,
-    first: Index,
-    extent: Array,
-    cells: Index,
-    listed: Index,
-    seen_points: Array,
-    seen_first: Index,
-    seen_extent: Array,
-    seen_cells: Index,
-    seen_listed: Index,
-    field: NDArray[np.float32],
-    constants: Array,
-    state: Array,
-    queue: Array,
-    pose: NDArray[np.float32],
-    wheel_speeds: NDArray[np.float32],
-    turned: NDArray[np.float32],
-    readings: NDArray[np.float32],
-    hits: Array,
-    outcome: Array,
-) -> None:
-    """Runs one step without pushing; `state` already contains the wheel slip.
+def driving(move_body: Any) -> Any:
+    """Returns the subkernel `drive_step` for one kind of motion.
 
-    `points` to `listed` describe the solid parts and `seen_points` to `seen_listed` the
-    visible ones; see `tdac_envs.epuck.gaps` and `tdac_envs.epuck.nearby.Nearby`.
-    `field`, shape (height, width), is the path length to the goal from each grid point,
-    m. The others are the arrays of `Robot`. All of them are overwritten except
-    `constants` and, in `state`, the commands and the slip.
+    Args:
+        move_body: Subkernel with the arguments and results of
+            `contact.stop_at_contact`.
     """
-    _turn_wheels(constants, state, queue, wheel_speeds, outcome)
-    forward, turn, x, y = state[FORWARD], state[TURN], state[X], state[Y]
-    if outcome[CLEARANCE] - constants[RADIUS] > abs(forward):
-        # No contact is possible.
-        x, y, heading = move(x, y, state[HEADING], forward, turn)
-        state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
-        outcome[TOUCHED] = 0.0
-    else:
-        left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
-        begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
-        touched, share = move_body(
-            (points, first, extent, listed, begin, end), state, forward, turn, constants
-        )
-        outcome[TOUCHED] = touched
-        state[FORWARD], state[TURN] = share * forward, share * turn
-    _finish(
-        points, first, extent, cells, listed,
-        seen_points, seen_first, seen_extent, seen_cells, seen_listed, field,
-        constants, state, queue, pose, wheel_speeds, turned, readings, hits, outcome,
-    )  # fmt: skip
+
+    @subkernel
+    def drive_step(
+        points: Array,
+        first: Index,
+        extent: Array,
+        cells: Index,
+        listed: Index,
+        seen_points: Array,
+        seen_first: Index,
+        seen_extent: Array,
+        seen_cells: Index,
+        seen_listed: Index,
+        field: NDArray[np.float32],
+        constants: Array,
+        state: Array,
+        queue: Array,
+        pose: NDArray[np.float32],
+        wheel_speeds: NDArray[np.float32],
+        turned: NDArray[np.float32],
+        readings: NDArray[np.float32],
+        hits: Array,
+        outcome: Array,
+    ) -> None:
+        """Runs one step without pushing; `state` already contains the wheel slip.
+
+        `points` to `listed` describe the solid parts and `seen_points` to `seen_listed`
+        the visible ones; see `tdac_envs.epuck.gaps` and `nearby.Nearby` beside it.
+        `field`, shape (height, width), is the path length to the goal from each grid
+        point, m. The others are the arrays of `Robot`. All of them are overwritten
+        except `constants` and, in `state`, the commands and the slip.
+        """
+        _turn_wheels(constants, state, queue, wheel_speeds, outcome)
+        forward, turn, x, y = state[FORWARD], state[TURN], state[X], state[Y]
+        if outcome[CLEARANCE] - constants[RADIUS] > abs(forward):
+            # No contact is possible.
+            x, y, heading = move(x, y, state[HEADING], forward, turn)
+            state[X], state[Y], state[HEADING] = x, y, wrap_angle(heading)
+            outcome[TOUCHED] = 0.0
+        else:
+            left, low, width = constants[LEFT_END], constants[LOW_END], constants[CELL]
+            begin, end = listed_at(cells, extent.shape[0], left, low, width, x, y)
+            near = points, first, extent, listed, begin, end
+            touched, share = move_body(near, state, forward, turn, constants)
+            outcome[TOUCHED] = touched
+            state[FORWARD], state[TURN] = share * forward, share * turn
+        _finish(
+            points, first, extent, cells, listed,
+            seen_points, seen_first, seen_extent, seen_cells, seen_listed,
+            field, constants, state, queue, pose, wheel_speeds, turned, readings, hits,
+            outcome,
+        )  # fmt: skip
+
+    return drive_step
+
+
+_drive_to_contact = driving(stop_at_contact)
+_drive = driving(stop_or_slide)
 
 
 @subkernel
 def _arrays_at(words: Words) -> Any:
     """The arrays of a robot and its world, in the order of `_drive`'s arguments."""
     return (
-        plane(words[0], np.float64),
-        line(words[1], np.int64),
-        plane(words[2], np.float64),
-        plane(words[3], np.int64),
-        line(words[4], np.int64),
-        plane(words[5], np.float64),
-        line(words[6], np.int64),
-        plane(words[7], np.float64),
-        plane(words[8], np.int64),
-        line(words[9], np.int64),
-        plane(words[10], np.float32),
+        frozen(plane(words[0], np.float64)),
+        frozen(line(words[1], np.int64)),
+        frozen(plane(words[2], np.float64)),
+        frozen(plane(words[3], np.int64)),
+        frozen(line(words[4], np.int64)),
+        frozen(plane(words[5], np.float64)),
+        frozen(line(words[6], np.int64)),
+        frozen(plane(words[7], np.float64)),
+        frozen(plane(words[8], np.int64)),
+        frozen(line(words[9], np.int64)),
+        frozen(plane(words[10], np.float32)),
         line(words[CONSTANTS], np.float64),
         line(words[STATE], np.float64),
         plane(words[QUEUE], np.float64),
@@ -298,7 +312,17 @@ def begin(words: Words) -> None:
 
 @kernel
 def drive(words: Words) -> None:
-    """Runs one step without pushing; `words` as for `begin`."""
+    """Runs one step, without pushing, of a robot that a contact stops.
+
+    Args:
+        words: As for `begin`.
+    """
+    _drive_to_contact(*_arrays_at(words))
+
+
+@kernel
+def drive_or_slide(words: Words) -> None:
+    """Runs one step of any robot without pushing; `words` as for `begin`."""
     _drive(*_arrays_at(words))
 
 

@@ -37,6 +37,7 @@ def use_kernels() -> None:
     from tdac_envs.worlds.wbt.colours import BLACK_SKY
 
     epuck = _drive()
+    use_robot(ENV_ID, world="arena", on_collision="block")
     use_batch(ENV_ID, world="arena", ground_sensors=True)
     points, first, extent = epuck.nominal.ground.solid.arrays()
     nearest_hit(points, first, extent, 0.0, 0.0, 0.1, 1.0, 0.0, 0.0, 1.0)
