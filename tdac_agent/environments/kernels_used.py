@@ -5,14 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import gymnasium as gym
+import numpy as np
 
 import tdac_envs  # noqa: F401 - registers the environments
 from tdac_agent.tasks.registry import environment
 from tdac_agent.verification.suite.reference import steer
+from tdac_envs.grid.plan import plan_path
 
 
 def use_robot(env_id: str, **options: Any) -> Any:
     """Plans and drives as a judge does, for one step; returns the environment."""
+    plan_path(np.ones((3, 3), np.bool_), (0, 0), (2, 2))  # as the oracle does
     env: Any = gym.make(env_id, variation="jitter", **options).unwrapped
     task = env.nominal
     start, goal = task.start, task.goal

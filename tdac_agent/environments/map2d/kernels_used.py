@@ -25,12 +25,9 @@ def _map() -> BoolGrid:
 
 def _drive() -> None:
     """Plans on a map without movers, and drives up to a contact."""
-    from tdac_envs.grid.plan import plan_path
     from tdac_envs.map2d import rays
 
-    cells = _map()
-    plan_path(~cells, (12, 12), (80, 50))
-    env = use_robot(ENV_ID, map=cells, **ENDS)
+    env = use_robot(ENV_ID, map=_map(), **ENDS)
     rays.sees(env.nominal.terrain.leaps, 12.0, 12.0, 80.0, 50.0)
 
 
