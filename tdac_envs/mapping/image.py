@@ -48,6 +48,7 @@ class MapImage:
         origin: Pose (x, y, yaw) of the lower-left pixel, m and rad.
         unknown: Shape (height, width), bool: occupied pixels of which the file says
             that they are unknown; None if it does not say so.
+        notes: What a user should know about the file.
     """
 
     colour: ColourImage
@@ -58,6 +59,7 @@ class MapImage:
     resolution: float | None = None
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     unknown: BoolGrid | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def height(self) -> int:
@@ -137,7 +139,7 @@ def from_array(array: NDArray[np.generic]) -> MapImage:
         )
     pixels = np.asarray(array, np.uint8).reshape(*array.shape[:2], depth)
     if depth == 4:
-        return MapImage(_composite(pixels), "array", digest)
+        return MapImage(composite(pixels), "array", digest)
     return MapImage(pixels if depth == 3 else _stack(pixels[..., 0]), "array", digest)
 
 
@@ -171,6 +173,28 @@ def decode(data: bytes, name: str) -> ColourImage:
 
     with _opened(data, name) as picture:
         return _to_rgb(ImageOps.exif_transpose(picture))
+
+
+def decode_stored(data: bytes, name: str) -> NDArray[np.uint8]:
+    """The stored values of a picture's pixels, for files that define their meaning.
+
+    Colours are kept where alpha hides them; 16-bit grey is divided by 257, however dark
+    the picture is.
+
+    Returns:
+        Shape (height, width, 4), uint8, RGBA.
+    """
+    from PIL import ImageOps
+
+    with _opened(data, name) as picture:
+        picture = ImageOps.exif_transpose(picture)
+        if not picture.mode.startswith(("I", "F")):
+            return np.asarray(picture.convert("RGBA"), np.uint8)
+        values = np.asarray(picture, np.float64)
+        is_deep = picture.mode[0] == "I" and 0 <= values.min() <= values.max() <= 65535
+        grey = np.rint(values / 257.0) if is_deep else _to_eight_bits(values)
+        alpha = np.where(values == picture.info.get("transparency"), 0, 255)
+        return np.dstack([grey, grey, grey, alpha]).astype(np.uint8)
 
 
 def picture_size(data: bytes, name: str) -> tuple[int, int]:
@@ -215,7 +239,7 @@ def _to_rgb(picture: Image.Image) -> ColourImage:
     if picture.mode in {"LA", "PA", "La", "RGBA", "RGBa"} or (
         "transparency" in picture.info
     ):
-        return _composite(np.asarray(picture.convert("RGBA"), np.uint8))
+        return composite(np.asarray(picture.convert("RGBA"), np.uint8))
     return np.array(picture.convert("RGB"), np.uint8)
 
 
@@ -230,8 +254,8 @@ def _to_eight_bits(values: NDArray[np.float64]) -> GreyImage:
     return np.asarray(np.rint(values if high <= 255 else values / 257.0), np.uint8)
 
 
-def _composite(rgba: NDArray[np.uint8]) -> ColourImage:
-    """Composites over white, or over black for light ink on a transparent page."""
+def composite(rgba: NDArray[np.uint8]) -> ColourImage:
+    """Composites RGBA over white, or over black for light ink on a transparent page."""
     alpha = rgba[..., 3:].astype(np.float32) / 255.0
     inked = rgba[..., :3] * alpha
     over_white = np.rint(inked + 255.0 * (1.0 - alpha)).astype(np.uint8)

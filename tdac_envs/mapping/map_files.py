@@ -5,63 +5,52 @@ from __future__ import annotations
 import hashlib
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ValidationError
 
 from tdac_envs.core.errors import MapError, first_problem
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, printable, read_array
-from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.mapping.image import (
-    ColourImage,
     MapImage,
     check_size,
-    decode,
+    composite,
+    decode_stored,
     from_array,
+    luminance,
     read_bytes,
 )
-from tdac_envs.mapping.params import Length, Place
-
-
-class RosMap(BaseModel):
-    """Contents of a ROS `map.yaml` (wiki.ros.org/map_server)."""
-
-    # Tools add other fields (e.g. `lethal_cost`), which do not matter for the grid.
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
-
-    image: str = Field(description="Picture, relative to the yaml file.")
-    resolution: Length = Field(description="Metres per pixel.")
-    origin: tuple[Place, Place, Place] = Field(
-        (0.0, 0.0, 0.0), description="Pose of the lower-left pixel, m and rad."
-    )
-    negate: bool = Field(False, description="Whether light pixels are the obstacles.")
-    occupied_thresh: float = Field(0.65, ge=0, le=1)
-    free_thresh: float = Field(0.196, ge=0, le=1)
-    mode: Literal["trinary", "scale", "raw"] = "trinary"
+from tdac_envs.mapping.ros_rule import RosMap, ros_cells, ros_notes
 
 
 def read_ros_yaml(path: Path) -> MapImage:
     """Reads a ROS map; pixels that are not known to be free are occupied.
 
     Raises:
-        MapError: The yaml or its picture cannot be used.
+        MapError: The yaml or its picture cannot be used, or no pixel is free.
     """
     text = read_bytes(path, TEXT_BYTES)
     ros = _parse_ros(text, path)
     picture = path.parent / ros.image
     data = read_bytes(picture)
-    colour = decode(data, picture.name)
-    free, unknown = _free_and_unknown(colour, ros)
+    pixels = decode_stored(data, picture.name)
+    grey, alpha = luminance(pixels[..., :3]), pixels[..., 3]
+    cells = ros_cells(grey, alpha, ros)
+    if not cells.free.any():
+        raise MapError(
+            f"{path}: no pixel counts as free by free_thresh {ros.free_thresh:g}, mode "
+            f"{ros.mode} and negate {ros.negate:d}; correct these fields or the picture"
+        )
     return MapImage(
-        colour,
+        composite(pixels),
         printable(path.name),
         hashlib.sha256(text + data).hexdigest(),
-        ~free,
+        ~cells.free,
         f"ros {ros.mode}",
         ros.resolution,
         ros.origin,
-        unknown,
+        cells.unknown,
+        ros_notes(grey, cells.free, ros),
     )
 
 
@@ -76,24 +65,6 @@ def _parse_ros(text: bytes, path: Path) -> RosMap:
         return RosMap.model_validate(fields)
     except ValidationError as error:
         raise MapError(f"{path}: {first_problem(error)}") from None
-
-
-def _free_and_unknown(colour: ColourImage, ros: RosMap) -> tuple[BoolGrid, BoolGrid]:
-    """Free pixels and unknown ones, by the map server's rules.
-
-    Pixels with an occupancy below `free_thresh` are free, above `occupied_thresh`
-    occupied, and unknown in between.
-    """
-    shade = colour.mean(axis=2)
-    if ros.negate:
-        shade = 255.0 - shade
-    if ros.mode == "raw":
-        # Values are occupancy in percent; above 100 means unknown.
-        occupancy = shade / 100.0
-        return occupancy < ros.free_thresh, occupancy > 1.0
-    occupancy = (255.0 - shade) / 255.0
-    free = occupancy < ros.free_thresh
-    return free, ~free & (occupancy <= ros.occupied_thresh)
 
 
 def read_grid(path: Path) -> MapImage:
@@ -122,21 +93,7 @@ def read_movingai(path: Path) -> MapImage:
             (movingai.com/benchmarks/formats.html).
     """
     data = read_bytes(path)
-    lines = data.splitlines()
-    size = {}
-    for line in lines[1:3]:
-        key, _, value = line.strip().partition(b" ")
-        number = value.strip()
-        size[key] = int(number) if number.isdigit() and len(number) < 10 else 0
-    width, height = size.get(b"width", 0), size.get(b"height", 0)
-    header = lines[:1] and lines[0].startswith(b"type") and lines[3:4]
-    if not header or lines[3].strip() != b"map" or 0 in (width, height):
-        raise MapError(
-            f"{path}: not a MovingAI map: expected the lines `type octile`, "
-            "`height H`, `width W` and `map`"
-        )
-    check_size(path.name, width, height)
-    rows = lines[4 : 4 + height]
+    width, height, rows = _movingai_rows(data, path)
     if len(rows) < height or any(len(row) != width for row in rows):
         raise MapError(f"{path}: expected {height} rows of {width} cells")
     cells = np.frombuffer(b"".join(rows), np.uint8).reshape(height, width)
@@ -145,3 +102,29 @@ def read_movingai(path: Path) -> MapImage:
     digest = hashlib.sha256(data).hexdigest()
     colour = np.repeat(shade[..., None], 3, axis=2)
     return MapImage(colour, printable(path.name), digest, occupied, "movingai")
+
+
+def _movingai_rows(data: bytes, path: Path) -> tuple[int, int, list[bytes]]:
+    """Width, height and rows of a MovingAI file.
+
+    Blank lines, spaces, tabs and capitals in the header do not matter.
+    """
+    lines = [line.rstrip() for line in data.splitlines() if line.strip()]
+    names = [line.strip().lower() for line in lines]
+    end = names.index(b"map") if b"map" in names else 0
+    header = dict(
+        (words[0], words[1]) for line in names[:end] if len(words := line.split()) == 2
+    )
+    width, height = (_size(header.get(key, b"")) for key in (b"width", b"height"))
+    if not names[0:1] or not names[0].startswith(b"type") or 0 in (width, height):
+        raise MapError(
+            f"{path}: not a MovingAI map: expected the lines `type octile`, "
+            "`height H`, `width W` and `map`"
+        )
+    check_size(path.name, width, height)
+    return width, height, lines[end + 1 : end + 1 + height]
+
+
+def _size(text: bytes) -> int:
+    """The number of rows or columns; 0 if it is none."""
+    return int(text) if text.isdigit() and len(text) < 10 else 0

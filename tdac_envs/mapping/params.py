@@ -127,7 +127,9 @@ class MapParams(_Record):
     score_terms: ScoreTerms | None = None
     resolution: Length | None = Field(None, description="Metres per pixel.")
     origin: tuple[Place, Place, Place] = (0.0, 0.0, 0.0)
-    notes: tuple[str, ...] = Field((), description="Changes made, e.g. by snap.")
+    notes: tuple[str, ...] = Field(
+        (), description="Changes made, and what the file hides."
+    )
     frame: FrameName = Field(
         "pixels",
         description="Units of the file's places and lengths, and of what a controller "

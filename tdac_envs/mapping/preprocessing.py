@@ -345,5 +345,5 @@ def _params(
         score_terms=best.terms,
         resolution=image.resolution,
         origin=image.origin,
-        notes=tuple(notes),
+        notes=(*image.notes, *notes),
     )

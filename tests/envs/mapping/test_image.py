@@ -109,7 +109,7 @@ SHADES = np.array([[0, 100, 205, 206, 254, 255]] * 2, np.uint8)
     ],
 )
 def test_ros_rules(fields: dict[str, object], occupied: list, tmp_path: Path) -> None:
-    """Unknown is not free; free means occupancy below `free_thresh`."""
+    """Unknown is not free; free means an occupancy of at most `free_thresh`."""
     image = load_image(_ros(tmp_path, SHADES, **fields))
     np.testing.assert_array_equal(image.occupied, [occupied] * 2)
     assert image.resolution == 0.05
@@ -140,9 +140,29 @@ def test_movingai(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "header",
+    [
+        "type\toctile\nheight\t2\nwidth\t5\nmap\n",
+        "Type Octile\nHEIGHT 2\nWidth 5\nMAP\n",
+        "\ntype octile\n\nheight 2\nwidth 5\n\nmap\n\n",
+        "type octile  \nheight  2 \nwidth 5\t\nmap \n",
+        "type octile\r\nwidth 5\r\nheight 2\r\nmap\r\n",
+    ],
+)
+def test_movingai_headers(header: str, tmp_path: Path) -> None:
+    """Tabs, capitals, blank lines, spaces at the end and the order do not matter."""
+    path = tmp_path / "a.map"
+    path.write_bytes(f"{header}.GS@T\nWO...\n".encode())
+    image = load_image(path)
+    np.testing.assert_array_equal(image.occupied, [[0, 0, 0, 1, 1], [1, 1, 0, 0, 0]])
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("nothing", "not a MovingAI map"),
+        ("type octile\nheight 2\nwidth x\nmap\n...\n", "not a MovingAI map"),
+        ("type octile\nheight 2\nwidth 3\n...\n...\n", "not a MovingAI map"),
         ("type octile\nheight 2\nwidth 3\nmap\n...\n", "expected 2 rows of 3 cells"),
         ("type octile\nheight 9000\nwidth 9000\nmap\n", "81 megapixels"),
     ],
