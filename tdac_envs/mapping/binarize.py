@@ -16,9 +16,16 @@ MARK_CHROMA = 80
 def otsu(luminance: GreyImage) -> float:
     """Otsu's threshold: pixels above it are light.
 
-    In an empty stretch of the histogram it is the middle of the stretch, so that a
-    picture and its negative are cut at the same level.
+    In an empty stretch of the histogram it is the middle of the stretch, and of two
+    equally good thresholds the one farther from middle grey, so that a picture and its
+    negative are cut at the same level.
     """
+    cuts = _first_cut(luminance), 254 - _first_cut(255 - luminance)
+    return max(cuts, key=lambda cut: abs(cut - 127))
+
+
+def _first_cut(luminance: GreyImage) -> float:
+    """The lowest of the best thresholds, in the middle of its stretch."""
     low = int(cv2.threshold(luminance, 0, 255, cv2.THRESH_OTSU)[0])
     counts = np.bincount(luminance.ravel(), minlength=256)
     high = low
@@ -55,12 +62,21 @@ def unknown_level(luminance: GreyImage) -> int | None:
     if min(share[:20].sum(), share[-20:].sum()) < 0.001:
         return None
     # Walls are often of a grey near 128, so this level must cover a larger area.
-    for usual, least in ((205, 0.01), (50, 0.01), (128, 0.12), (127, 0.12)):
-        level = usual - 2 + int(np.argmax(share[usual - 2 : usual + 3]))
-        around = share[level - 6 : level + 7].sum()
-        if share[level] >= least and share[level] > 0.8 * around:
-            return level
+    for pair, least in (((205, 50), 0.01), ((128, 127), 0.12)):
+        levels = [_commonest_near(share, usual) for usual in pair]
+        found = [
+            level
+            for level in levels
+            if share[level] >= max(least, 0.8 * share[level - 6 : level + 7].sum())
+        ]
+        if found:
+            return max(found, key=lambda level: float(share[level]))
     return None
+
+
+def _commonest_near(share: NDArray[np.float64], usual: int) -> int:
+    """The commonest level within 2 of a usual one."""
+    return usual - 2 + int(np.argmax(share[usual - 2 : usual + 3]))
 
 
 def outside(luminance: GreyImage, light_free: bool, ignored: BoolGrid) -> BoolGrid:

@@ -187,14 +187,7 @@ def decode_stored(data: bytes, name: str) -> NDArray[np.uint8]:
     from PIL import ImageOps
 
     with _opened(data, name) as picture:
-        picture = ImageOps.exif_transpose(picture)
-        if not picture.mode.startswith(("I", "F")):
-            return np.asarray(picture.convert("RGBA"), np.uint8)
-        values = np.asarray(picture, np.float64)
-        is_deep = picture.mode[0] == "I" and 0 <= values.min() <= values.max() <= 65535
-        grey = np.rint(values / 257.0) if is_deep else _to_eight_bits(values)
-        alpha = np.where(values == picture.info.get("transparency"), 0, 255)
-        return np.dstack([grey, grey, grey, alpha]).astype(np.uint8)
+        return _stored(ImageOps.exif_transpose(picture))
 
 
 def picture_size(data: bytes, name: str) -> tuple[int, int]:
@@ -241,6 +234,16 @@ def _to_rgb(picture: Image.Image) -> ColourImage:
     ):
         return composite(np.asarray(picture.convert("RGBA"), np.uint8))
     return np.array(picture.convert("RGB"), np.uint8)
+
+
+def _stored(picture: Image.Image) -> NDArray[np.uint8]:
+    if not picture.mode.startswith(("I", "F")):
+        return np.asarray(picture.convert("RGBA"), np.uint8)
+    values = np.asarray(picture, np.float64)
+    is_deep = picture.mode[0] == "I" and 0 <= values.min() <= values.max() <= 65535
+    grey = np.rint(values / 257.0) if is_deep else _to_eight_bits(values)
+    alpha = np.where(values == picture.info.get("transparency"), 0, 255)
+    return np.dstack([grey, grey, grey, alpha]).astype(np.uint8)
 
 
 def _to_eight_bits(values: NDArray[np.float64]) -> GreyImage:

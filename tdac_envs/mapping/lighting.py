@@ -20,6 +20,8 @@ LEVEL = 127.5
 """Luminance threshold of an evened picture."""
 _FEW_LEVELS, _DRAWN = 8, 0.7
 """A drawing, unlike a photograph, has 0.7 of its pixels in its 8 commonest levels."""
+_SPIKES = 0.62
+"""Share of a drawn page's pixels in levels that stand out from their neighbours."""
 _CELL = 8
 """Side of the squares in which edges are summed up, px."""
 _WINDOW = np.ones((7, 7), np.uint8)
@@ -47,16 +49,29 @@ def photographed(grey: GreyImage) -> bool:
     """Whether the picture, or its light part, has many levels, as in a photograph.
 
     A drawing has most of its pixels in a few levels, even if it is anti-aliased. The
-    dark part of a photograph may have few levels, too.
+    dark part of a photograph may have few levels, too, since it has little light; they
+    are neighbours. The light part of a drawing may have many levels, if it is thin
+    lines on a dark page; those of the page are apart.
     """
     counts = np.bincount(grey.ravel(), minlength=256)
-    lighter = counts[int(otsu(grey)) + 1 :]
-    return _in_few(counts) < _DRAWN or _in_few(lighter) < _DRAWN
+    darker, lighter = np.split(counts, [int(otsu(grey)) + 1])
+    if _in_few(counts) < _DRAWN:
+        return True
+    is_page = darker.sum() > lighter.sum()
+    if is_page and _spikes(darker) >= _SPIKES:
+        return False
+    return _in_few(lighter) < _DRAWN
 
 
 def _in_few(counts: NDArray[np.intp]) -> float:
     """Share of the pixels in the commonest levels."""
     return float(np.sort(counts)[-_FEW_LEVELS:].sum() / max(counts.sum(), 1))
+
+
+def _spikes(counts: NDArray[np.intp]) -> float:
+    """How steep a histogram is: 1 if no two levels in use are neighbours."""
+    steps = np.abs(np.diff(np.pad(counts, 1)))
+    return float(steps.sum() / 2 / max(counts.sum(), 1))
 
 
 def evened(colour: ColourImage, grey: GreyImage) -> Evened | None:

@@ -112,11 +112,10 @@ def _movingai_rows(data: bytes, path: Path) -> tuple[int, int, list[bytes]]:
     lines = [line.rstrip() for line in data.splitlines() if line.strip()]
     names = [line.strip().lower() for line in lines]
     end = names.index(b"map") if b"map" in names else 0
-    header = dict(
-        (words[0], words[1]) for line in names[:end] if len(words := line.split()) == 2
-    )
+    words = [line.split() for line in names[:end]]
+    header = {each[0]: each[-1] for each in words}
     width, height = (_size(header.get(key, b"")) for key in (b"width", b"height"))
-    if not names[0:1] or not names[0].startswith(b"type") or 0 in (width, height):
+    if not names or not names[0].startswith(b"type") or 0 in (width, height):
         raise MapError(
             f"{path}: not a MovingAI map: expected the lines `type octile`, "
             "`height H`, `width W` and `map`"
