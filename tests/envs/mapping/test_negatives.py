@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_envs.mapping.binarize import otsu, unknown_level
-from tdac_envs.mapping.image import ColourImage, GreyImage, load_image
+from tdac_envs.mapping.image import ColourImage, GreyImage, load_image, luminance
 from tdac_envs.mapping.lighting import photographed
 from tdac_envs.mapping.preprocessing import preprocess, rank_candidates
 from tdac_envs.mapping.scene import MapReading
@@ -25,7 +25,7 @@ Point = tuple[int, int]
 
 
 def plan(
-    seed: int, wall: int, floors: int, lines: bool, jpeg: int | None
+    seed: int, wall: int, floors: int, blur: float, jpeg: int | None
 ) -> ColourImage:
     """Rooms with doors: floors of several colours, smoothed lines, words, marks."""
     rng = np.random.default_rng(seed)
@@ -33,12 +33,13 @@ def plan(
     page = np.repeat(tones, -(-300 // floors), axis=0)[:300].astype(np.uint8)
     image = np.repeat(page[None], 200, axis=0)
     ink = tuple(rng.integers(0, 90, 3).tolist())
-    kind = cv2.LINE_AA if lines else cv2.LINE_8
-    cv2.rectangle(image, (8, 8), (291, 191), ink, wall, kind)
+    cv2.rectangle(image, (8, 8), (291, 191), ink, wall)
     for x, y in ((100, 8), (200, 191)):
-        cv2.line(image, (x, y), (x + 9 * lines, 100), ink, wall, kind)
-    cv2.putText(image, "room 12", (120, 60), 0, 0.5, ink, 1, kind)
-    cv2.circle(image, START, 5, (220, 20, 20), -1, kind)
+        cv2.line(image, (x, y), (x + 9, 100), ink, wall, cv2.LINE_AA)
+    cv2.putText(image, "room 12", (120, 60), 0, 0.5, ink, 1, cv2.LINE_AA)
+    cv2.circle(image, START, 5, (220, 20, 20), -1, cv2.LINE_AA)
+    if blur:
+        image = np.asarray(cv2.GaussianBlur(image, (0, 0), blur), np.uint8)
     if jpeg is None:
         return image
     data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, jpeg])[1]
@@ -74,15 +75,15 @@ def check_mirrored(
     seed=st.integers(0, 10_000),
     wall=st.sampled_from([1, 2, 3, 5, 9]),
     floors=st.sampled_from([1, 1, 3, 6]),
-    lines=st.booleans(),
+    blur=st.sampled_from([0.0, 0.6, 1.0]),
     jpeg=st.sampled_from([None, None, 95]),
 )
 @settings(derandomize=True, deadline=None, max_examples=20)
 def test_drawings(
-    seed: int, wall: int, floors: int, lines: bool, jpeg: int | None
+    seed: int, wall: int, floors: int, blur: float, jpeg: int | None
 ) -> None:
     """Thin or thick, sharp or smoothed, on floors of one colour or of many."""
-    check_mirrored(plan(seed, wall, floors, lines, jpeg), START, GOAL, RADIUS)
+    check_mirrored(plan(seed, wall, floors, blur, jpeg), START, GOAL, RADIUS)
 
 
 def tasks() -> list:
@@ -146,6 +147,6 @@ def test_unknown_grey() -> None:
 
 def test_a_negative_drawing_is_no_photograph() -> None:
     """Smoothed light lines have many levels, and a dark page few: so has a drawing."""
-    page = plan(0, 1, 6, True, None)[..., 0]
+    page = luminance(plan(0, 2, 6, 1.0, None))
     assert not photographed(page)
     assert not photographed(255 - page)
