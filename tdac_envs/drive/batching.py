@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -11,6 +12,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive import stepping
 
@@ -66,6 +68,17 @@ def autoreset_mode_of(given: str | AutoresetMode) -> AutoresetMode:
         raise TaskError(
             f"expected autoreset_mode to be one of {names}, got {given!r}"
         ) from None
+
+
+def time_limit_of(max_episode_steps: int | None) -> float:
+    """The steps after which episodes are truncated; inf for None.
+
+    Raises:
+        TaskError: It is not a whole number of at least 1.
+    """
+    if max_episode_steps is None:
+        return math.inf
+    return whole_number("max_episode_steps", max_episode_steps, 1)
 
 
 def make_envs(

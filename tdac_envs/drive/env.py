@@ -55,6 +55,8 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     _steps: int
     _trail: list[tuple[float, float]]
     _status: str
+    _is_over = False
+    _has_warned = False
 
     def __init__(self, setup: DriveSetup, render_mode: str | None) -> None:
         one_of("render_mode", render_mode, (None, *self.metadata["render_modes"]))
@@ -77,9 +79,13 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Runs one time step with the wheel speeds of an action.
 
+        After the end of an episode it warns, once: `reset` must be called first.
+
         Raises:
             ValueError: The action is not two finite numbers.
         """
+        if self._is_over:
+            self._warn_of_the_end()
         state = self.robot.state
         state[LEFT], state[RIGHT] = wheel_speeds(action)
         if self.wheel_slip:
@@ -87,6 +93,8 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._call_drive()
         outcome = self.robot.outcome.tolist()
         reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
+        if terminated or truncated:
+            self._is_over = True
         info = self.info_of(outcome)
         if self.render_mode is not None:
             self._note(info["is_success"], info["collision"], truncated)
@@ -126,7 +134,18 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         """Draws the task of an episode, and returns it."""
         drawn = self.setup.draw(options, self.np_random)
         self.task, self._random = drawn
+        self._is_over = self._has_warned = False
         return self.task
+
+    def _warn_of_the_end(self) -> None:
+        """Warns once in an episode that it has ended."""
+        if not self._has_warned:
+            self._has_warned = True
+            gym.logger.warn(
+                "You are calling step() although the episode has ended (terminated or "
+                "truncated). Call reset() first: the results of further steps are "
+                "undefined."
+            )
 
     def _hide(self) -> None:
         """Draws the hidden errors of an episode, after its task."""

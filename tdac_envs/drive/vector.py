@@ -28,6 +28,7 @@ from tdac_envs.drive.batching import (
     mask_of,
     seeds_of,
     store_actions,
+    time_limit_of,
 )
 from tdac_envs.drive.disturbances import BatchDisturbances
 from tdac_envs.drive.frames import frames_of
@@ -50,6 +51,8 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         autoreset_mode: When the next episode begins after one has ended.
         threads: Number of threads; by default the number of cores.
         render_mode: `"rgb_array"`, for up to 64 robots, or None.
+        max_episode_steps: Steps after which an episode is truncated, in addition to
+            its horizon, as by Gymnasium's `TimeLimit`; None for no further limit.
 
     Attributes:
         step_rows: The compiled loop over robots; see
@@ -72,7 +75,9 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         autoreset_mode: str | AutoresetMode,
         threads: int | None,
         render_mode: str | None,
+        max_episode_steps: int | None,
     ) -> None:
+        self._most_steps = time_limit_of(max_episode_steps)
         self.num_envs = num_envs
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
         self.threads = None if threads is None else whole_number("threads", threads, 1)
@@ -173,6 +178,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             self._frames.begin(np.flatnonzero(self._over).tolist(), self.tasks)
             self._frames.note(np.flatnonzero(~self._over).tolist())
         rewards, terminated, truncated = ends_of(outcome)
+        truncated |= self.robots.state[:, stepping.STEPS] >= self._most_steps
         infos = self.infos_of(outcome, self._everyone)
         np.logical_or(terminated, truncated, out=self._over)
         self._complete(observations, range(self.num_envs))

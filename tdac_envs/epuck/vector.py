@@ -41,6 +41,8 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             {"world": "yard"}]`; robot i takes entry `i % len(each)`. All robots need
             the same `delay` and the same sensors.
         render_mode: `"rgb_array"`, for up to 64 robots, or None.
+        max_episode_steps: Steps after which an episode is truncated, if its horizon is
+            longer.
         **options: Arguments of `EPuckEnv` for all robots.
 
     Raises:
@@ -59,6 +61,7 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         threads: int | None = None,
         each: Sequence[dict[str, Any]] = ({},),
         render_mode: str | None = None,
+        max_episode_steps: int | None = None,
         **options: Any,
     ) -> None:
         num_envs = whole_number("num_envs", num_envs, 1)
@@ -74,6 +77,7 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             autoreset_mode=autoreset_mode,
             threads=threads,
             render_mode=render_mode,
+            max_episode_steps=max_episode_steps,
         )
         self._envs = [envs[i % len(envs)] for i in range(num_envs)]
         self._factors = np.array([env.sensor_noise for env in self._envs])

@@ -226,6 +226,10 @@ def make(level: str | Path = "unknown", **options: Any) -> LadderEnv | EPuckLadd
     return env_class(level)(level, **options)
 
 
+# `gym.make` reads the render modes here, and so adds `"rgb_array_list"`.
+make.metadata = LadderEnv.metadata  # type: ignore[attr-defined]
+
+
 def env_class(level: str | Path) -> type[LadderEnv | EPuckLadderEnv]:
     """The class of the environments of a task set, which depends on its robot.
 

@@ -20,6 +20,8 @@ Seen = dict[str, NDArray[np.float32]]
 
 LENGTHS = ("distance_to_goal", "path_distance", "clearance")
 """Entries of `info` that are lengths."""
+_SLACK = np.float32(1e-6)
+"""Least distance of the bounds of a rotated map from its corners, m."""
 
 
 class MetricView:
@@ -72,9 +74,10 @@ class MetricView:
         low, high = boxes["goal"].low, boxes["goal"].high
         corners = [[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]
         places = np.array([self._poses(np.array(corner)) for corner in corners])
-        # Of a rotated map, the last bit of a place at the rim may differ.
-        least = np.nextafter(places.min(axis=0), np.float32(-np.inf))
-        most = np.nextafter(places.max(axis=0), np.float32(np.inf))
+        least, most = places.min(axis=0), places.max(axis=0)
+        if self._yaw:  # the last bit of a place at the rim may differ
+            least -= np.maximum(np.spacing(np.abs(least)), _SLACK)
+            most += np.maximum(np.spacing(np.abs(most)), _SLACK)
         pi = np.float32(math.pi)
         boxes["pose"] = spaces.Box(np.append(least, -pi), np.append(most, pi))
         boxes["goal"] = spaces.Box(least, most)

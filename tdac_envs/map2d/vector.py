@@ -40,6 +40,8 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             {"map": "office"}]`; robot i takes entry `i % len(each)`. All robots need
             the same `n_rays`, `delay`, `odometry` and `frame`; their movers may differ.
         render_mode: `"rgb_array"`, for up to 64 robots, or None.
+        max_episode_steps: Steps after which an episode is truncated, if its horizon is
+            longer.
         **options: Arguments of `Map2DEnv` for all robots.
     """
 
@@ -55,6 +57,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         threads: int | None = None,
         each: Sequence[dict[str, Any]] = ({},),
         render_mode: str | None = None,
+        max_episode_steps: int | None = None,
         **options: Any,
     ) -> None:
         num_envs = whole_number("num_envs", num_envs, 1)
@@ -67,6 +70,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             autoreset_mode=autoreset_mode,
             threads=threads,
             render_mode=render_mode,
+            max_episode_steps=max_episode_steps,
         )
         self._units = MapUnits(self.setups[0].metric)
         self._view = _view_of([setup.metric for setup in self.setups])

@@ -12,6 +12,7 @@ from gymnasium.error import DependencyNotInstalled
 from gymnasium.utils.env_checker import check_env
 
 import tdac_envs  # noqa: F401 - registers the envs
+from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
 
 IDS = sorted(name for name in gym.registry if name.startswith("TDAC-"))
@@ -234,6 +235,62 @@ def test_with_a_time_limit_observations_may_have_the_time(name):
         ends.append((terminated, truncated))
     np.testing.assert_allclose(times, np.arange(6) / 5)
     assert ends == [(False, False)] * 4 + [(False, True)]
+
+
+@every_env
+def test_frames_can_be_collected(name):
+    """`rgb_array_list` gives the frames since the last call, as in Gymnasium."""
+    env = gym.make(name, render_mode="rgb_array_list")
+    env.reset(seed=0)
+    for _ in range(2):
+        env.step(np.zeros(2, np.float32))
+    assert [frame.shape[2] for frame in env.render()] == [3, 3, 3]
+    assert env.render() == []
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@every_env
+def test_a_batch_has_a_time_limit(name, mode):
+    """`max_episode_steps` truncates each robot as `TimeLimit` truncates one env."""
+    modes = gym.vector.AutoresetMode(mode)
+    options = {"num_envs": 3, "max_episode_steps": 15}
+    batch = gym.make_vec(name, autoreset_mode=modes, **options)
+    alone = gym.make_vec(
+        name,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": modes},
+        **options,
+    )
+    assert same(batch.reset(seed=3)[0], alone.reset(seed=3)[0])
+    random, ends = np.random.default_rng(0), 0
+    for _ in range(40):
+        actions = random.uniform(-0.3, 0.3, (3, 2)).astype(np.float32)
+        one, other = batch.step(actions), alone.step(actions)
+        assert all(map(same, one[:4], other[:4]))
+        ends += int(one[3].sum())
+    assert ends >= 6
+
+
+@every_env
+def test_a_time_limit_is_a_number_of_steps(name):
+    with pytest.raises(TaskError, match="max_episode_steps to be a whole number"):
+        gym.make_vec(name, num_envs=1, max_episode_steps=0)
+
+
+@every_env
+def test_a_step_after_the_end_warns_once(name):
+    """Also after a truncation; a reset begins anew."""
+    env = gym.make(name, disable_env_checker=True).unwrapped
+    action = np.array([1.0, 0.9], np.float32)
+    for _ in range(2):
+        env.reset(seed=0)
+        while not any(env.step(action)[2:4]):
+            pass
+        with pytest.warns(
+            UserWarning, match=r"step\(\) although the episode has ended"
+        ):
+            env.step(action)
+        env.step(action)
 
 
 @pytest.mark.slow

@@ -12,6 +12,8 @@ from gymnasium.utils.env_checker import check_env
 import tdac_envs
 from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.env import Map2DEnv
+from tdac_envs.map2d.metric_view import MetricView
+from tdac_envs.map2d.observed import observation_space
 from tdac_envs.map2d.vector import Map2DVectorEnv
 
 
@@ -198,3 +200,23 @@ def test_a_learner_sees_the_same(plan, many):
         second = wrapped.step(SPEEDS[:2] if many else SPEEDS[0])[0]
         seen.append(np.stack([first, second]))
     assert seen[0] == pytest.approx(seen[1], abs=1e-5)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7, math.pi / 2, math.pi])
+@pytest.mark.parametrize("corner", [0.0, -3.0])
+def test_bounds_are_sensible_numbers(yaw, corner):
+    """No bound is a denormal number next to 0, and every place of the rim is within."""
+    height, width = small_cells().shape
+    view = MetricView(MapFrame(height, 0.1, (corner, corner, yaw)))
+    space = view.space(observation_space(Map2DEnv(small_cells(), **TASK).task))
+    for box in space.values():
+        bounds = np.abs(np.concatenate([box.low.ravel(), box.high.ravel()]))
+        assert (bounds[bounds > 0] >= 1e-7).all()
+    random = np.random.default_rng(0)
+    for x, y in random.uniform(-0.5, (width - 0.5, height - 0.5), (50, 2)):
+        for place in ((x, -0.5), (x, height - 0.5), (-0.5, y), (width - 0.5, y)):
+            seen = view.seen(
+                {key: np.zeros(box.shape, np.float32) for key, box in space.items()}
+                | {"goal": np.float32(place)}
+            )
+            assert space["goal"].contains(seen["goal"])
