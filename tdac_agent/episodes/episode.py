@@ -23,6 +23,7 @@ from tdac_agent.storage.plain import shown
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose
+from tdac_envs.ladder.observed import AT_START
 
 # An episode is stopped if the mean policy call takes longer than this many steps.
 SLOW_FACTOR = 2.0
@@ -90,7 +91,8 @@ class Record:
             options = {"start": self.start}
         observation, info = self.env.reset(seed=self.seed, options=options)
         info = self._note(observation, info)
-        return self._shown(observation), info
+        seen = {key: info[key] for key in info if key not in AT_START}
+        return self._shown(observation), seen
 
     def step(
         self, action: Any

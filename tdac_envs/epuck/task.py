@@ -60,6 +60,7 @@ class EPuckTask:
             the goal, m; see `paths.route`.
         shortest: d0, the length of the shortest grid path from the nominal start, m;
             see `path_from`.
+        about: What `info` says about the world of a task set; None elsewhere.
     """
 
     env_id: ClassVar = "TDAC-EPuck-v0"
@@ -73,10 +74,11 @@ class EPuckTask:
     horizon: int
     field: NDArray[np.float32]
     shortest: float
+    about: dict[str, Any] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         rest = (self.max_wheel_speed, self.goal_tolerance, self.dt, self.horizon)
-        return _restored, (self.ground, self.start, self.goal, *rest)
+        return _restored, (self.ground, self.start, self.goal, *rest, self.about)
 
     @property
     def body_radius(self) -> float:
@@ -266,9 +268,9 @@ def _may_start(task: EPuckTask, pose: Pose) -> bool:
 
 def _restored(ground: Ground, start: Pose, goal: Point, *rest: Any) -> EPuckTask:
     """Restores a pickled task and recomputes what the pickle leaves out."""
-    limit, tolerance, dt, horizon = rest
+    limit, tolerance, dt, horizon, about = rest
     field = route(ground, start[:2], goal)
     shortest = path_length_from(ground, field, start[:2])
     return EPuckTask(
-        ground, start, goal, limit, tolerance, dt, horizon, field, shortest
+        ground, start, goal, limit, tolerance, dt, horizon, field, shortest, about
     )

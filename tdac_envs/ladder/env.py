@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -56,8 +57,9 @@ class OnSet(DrivenEnv):
         Raises:
             TaskError: An option is unknown, or there is no feasible world.
         """
-        seen, info = super().reset(seed=seed, options=options)
-        return seen, self.view.info(info, self.pose(), ended=False)
+        seen, whole = super().reset(seed=seed, options=options)
+        info = self.view.info(whole, self.pose(), ended=False)
+        return seen, {**info, **deepcopy(self.task.about or {})}
 
     def step(
         self, action: NDArray[np.float32]
@@ -135,6 +137,10 @@ class LadderEnv(OnSet, Map2DEnv):
     `collisions` and `clipped`; at the end of an episode also `is_success` and
     `collision`. With `privileged=True`, all entries of TDAC-Map2D-v0 and `pose`, the
     true pose on the map.
+
+    In the splits `train` and `dev`, `reset` also returns `world_index`, the number of
+    the world; `generator`, its generator or kind of map; and `difficulty`, a dict of
+    figures (`docs/generated-worlds.md`). Judged controllers never see them.
 
     ## Episode End
     As in TDAC-Map2D-v0: a contact ends the episode.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ Seen = dict[str, NDArray[np.float32]]
 
 ALWAYS, AT_END = ("collisions", "clipped"), ("is_success", "collision")
 """Entries of `info`: in every step, and in the last one of an episode."""
+AT_START = ("world_index", "generator", "difficulty")
+"""Entries of the `info` of `reset` in the splits `train` and `dev`, for the user alone:
+no controller sees them."""
 ANCHOR = 7
 """Numbers of an anchor; see `View.anchor`."""
 
@@ -130,6 +134,29 @@ class View:
             for key in AT_END:
                 own[key], own[f"_{key}"] = whole[key] & ended, ended.copy()
         return own
+
+
+def joined(each: Mapping[int, Mapping[str, Any]], count: int) -> dict[str, Any]:
+    """The infos of some robots as those of a batch, in Gymnasium's format.
+
+    Args:
+        each: The infos by the number of the robot; all have the same keys.
+        count: Number of robots.
+    """
+    infos: dict[str, Any] = {}
+    mask = np.zeros(count, np.bool_)
+    mask[list(each)] = True
+    for key, first in next(iter(each.values()), {}).items():
+        values = {i: info[key] for i, info in each.items()}
+        if isinstance(first, Mapping):
+            infos[key] = joined(values, count)
+        else:
+            infos[key] = np.full(count, None, object)
+            if isinstance(first, int | float):
+                infos[key] = np.zeros(count, type(first))
+            infos[key][list(values)] = list(values.values())
+        infos[f"_{key}"] = mask.copy()
+    return infos
 
 
 def _moved(points: Array, anchors: Array) -> Array:

@@ -31,7 +31,9 @@ class PlatePool:
         """
         task = self._tasks.get(index)
         if task is None:
-            task = self._tasks[index] = self._set.task("train", index)
+            world, made = self._set.world_and_task("train", index)
+            task = self._set.told(made, "train", index, world.difficulty)
+            self._tasks[index] = task
         self._tasks.move_to_end(index)
         if len(self._tasks) > MOST:
             self._tasks.popitem(last=False)

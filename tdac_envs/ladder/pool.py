@@ -19,6 +19,7 @@ import shutil
 import tempfile
 import zlib
 from collections import OrderedDict
+from dataclasses import astuple
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.trusted_folders import is_usable, user_cache
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
+from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import Terrain
@@ -81,13 +83,14 @@ class TrainingPool:
     def _found(self, index: int) -> Map2DTask:
         """The task from its file, or made and written to it if possible."""
         path = None if self._folder is None else self._folder / f"{index}.bin"
-        task = None if path is None else _mapped_task(path, self._set)
+        task = None if path is None else _mapped_task(path, self._set, index)
         if task is None:
-            made = self._set.task("train", index)
+            world, made = self._set.world_and_task("train", index)
             assert isinstance(made, Map2DTask)
+            made = self._set.told(made, "train", index, world.difficulty)
             if path is not None:
-                _write(path, made)
-                task = _mapped_task(path, self._set)
+                _write(path, made, world.difficulty)
+                task = _mapped_task(path, self._set, index)
             if task is None:
                 return _keep(self._made, index, made, _IN_MEMORY)
         return _keep(self._mapped, index, task, _MAPPED)
@@ -135,7 +138,7 @@ def _sources() -> str:
     return hashlib.sha256(joined).hexdigest()[:16]
 
 
-def _write(path: Path, task: Map2DTask) -> None:
+def _write(path: Path, task: Map2DTask, difficulty: Difficulty) -> None:
     """Writes a task completely or not at all.
 
     Without room on the disk, it is made anew next time.
@@ -143,6 +146,7 @@ def _write(path: Path, task: Map2DTask) -> None:
     terrain, movers = task.terrain, task.movers
     arrays: dict[str, NDArray[Any]] = {
         "ends": np.array([*task.start, *task.goal, task.horizon], np.float64),
+        "difficulty": np.array(astuple(difficulty), np.float64),
         "field": task.field,
         "clear": terrain.padded_clear,
         "leaps": terrain.leaps,
@@ -168,7 +172,7 @@ def _write(path: Path, task: Map2DTask) -> None:
             raise
 
 
-def _mapped_task(path: Path, task_set: TaskSet) -> Map2DTask | None:
+def _mapped_task(path: Path, task_set: TaskSet, index: int) -> Map2DTask | None:
     """The task in a file; None if there is no such file, or if it is damaged."""
     try:
         with path.open("rb") as file:
@@ -178,7 +182,8 @@ def _mapped_task(path: Path, task_set: TaskSet) -> Map2DTask | None:
     check, body = data[:8], data[8:]
     if len(body) == 0 or zlib.crc32(body) != int.from_bytes(check, "little"):
         return None
-    return _task(body, task_set)
+    task, difficulty = _task(body, task_set)
+    return task_set.told(task, "train", index, difficulty)
 
 
 def _arrays(body: memoryview) -> dict[str, NDArray[Any]]:
@@ -192,14 +197,14 @@ def _arrays(body: memoryview) -> dict[str, NDArray[Any]]:
     return arrays
 
 
-def _task(body: memoryview, task_set: TaskSet) -> Map2DTask:
+def _task(body: memoryview, task_set: TaskSet) -> tuple[Map2DTask, Difficulty]:
     arrays = _arrays(body)
     clear, field = arrays["clear"], arrays["field"]
     x, y, heading, goal_x, goal_y, horizon = arrays["ends"].tolist()
     grid = OccupancyGrid(arrays["cells"])
     file, robot = task_set.file, task_set.file.robot
     assert isinstance(robot, RobotParams)
-    return Map2DTask(
+    task = Map2DTask(
         terrain=Terrain(grid, clear[1:-1, 1:-1], clear, arrays["leaps"]),
         start=Pose(x, y, heading),
         goal=(goal_x, goal_y),
@@ -211,6 +216,7 @@ def _task(body: memoryview, task_set: TaskSet) -> Map2DTask:
         shortest=float(field[round(y), round(x)]),
         movers=_movers(arrays, file.dt) if "traits" in arrays else None,
     )
+    return task, Difficulty(*arrays["difficulty"].tolist())
 
 
 def _movers(arrays: dict[str, NDArray[Any]], dt: float) -> Movers:

@@ -17,6 +17,8 @@ from tdac_envs.ladder.task_sets import MOST_SALT, AnyTask, AnyWorld, TaskSet
 
 MOST_WORLDS = 2**31
 """Exclusive upper bound of the world numbers that are drawn at random."""
+TOLD = ("train", "dev")
+"""Splits of which `info` says which world an episode has."""
 
 
 class SetSource:
@@ -87,8 +89,10 @@ class SetSource:
 
     def _made(self, index: int) -> tuple[int, AnyWorld, AnyTask]:
         if self._last is None or self._last[0] != index:
-            made = self._set.world_and_task(self._split, index, self._salt)
-            self._last = index, *made
+            world, task = self._set.world_and_task(self._split, index, self._salt)
+            if self._split in TOLD:
+                task = self._set.told(task, self._split, index, world.difficulty)
+            self._last = index, world, task
         return self._last
 
     def draw(

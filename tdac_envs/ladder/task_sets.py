@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar, get_args
@@ -14,10 +14,12 @@ from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import printable
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.task import EPuckTask, make_task
+from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.files.found import FoundWorld
 from tdac_envs.ladder.files.opened import FileWorlds, opened
 from tdac_envs.ladder.files.placed import placed_world
 from tdac_envs.ladder.moving import draw_movers
+from tdac_envs.ladder.observed import AT_START
 from tdac_envs.ladder.orca_driver import drive_by_orca
 from tdac_envs.ladder.plate_worlds import PlatesWorld, make_plates
 from tdac_envs.ladder.robots import EPuckParams
@@ -185,6 +187,16 @@ class TaskSet:
         """
         world = self.world(split, index, salt)
         return world, self._with_movers(self.task_of(world), split, index, salt)
+
+    def told(
+        self, task: TaskType, split: str, index: int, difficulty: Difficulty
+    ) -> TaskType:
+        """The task of a world with what `info` says about it; see `observed.AT_START`.
+
+        For the splits `train` and `dev` alone: the others are to be unknown.
+        """
+        values = index, self.kind(split, index), asdict(difficulty)
+        return replace(task, about=dict(zip(AT_START, values, strict=True)))
 
     def _with_movers(
         self, task: TaskType, split: str, index: int, salt: bytes | None = None

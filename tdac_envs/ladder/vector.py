@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
 
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
 from tdac_envs.epuck.vector import EPuckVectorEnv
 from tdac_envs.ladder.env import EPuckLadderEnv, LadderEnv, env_class
-from tdac_envs.ladder.observed import View
+from tdac_envs.ladder.observed import ALWAYS, View, joined
 from tdac_envs.map2d.vector import Map2DVectorEnv
 
 
@@ -40,17 +41,18 @@ class OnSetVector(DrivenVectorEnv):
         whole, infos = super().reset(seed=seed, options=options)
         poses, none = self.pose(), np.zeros(self.num_envs, np.bool_)
         seen = self.view.seen(whole, poses, self._anchors)
-        return seen, self.view.infos(infos, poses, none)
+        begun = infos[f"_{ALWAYS[0]}"]
+        return seen, self.view.infos(infos, poses, none) | self._about(begun)
 
     def step(self, actions: Actions) -> Result:
         """Runs one time step, as `DrivenVectorEnv.step` does."""
-        before = self._anchors.copy()
+        before, begun = self._anchors.copy(), self._over.copy()
         whole, rewards, terminated, truncated, infos = super().step(actions)
         ended, view, poses = terminated | truncated, self.view, self.pose()
         seen = view.seen(whole, poses, self._anchors)
         if "final_obs" not in infos:
             told = view.infos(infos, poses, ended)
-            return seen, rewards, terminated, truncated, told
+            return seen, rewards, terminated, truncated, told | self._about(begun)
         final = infos.pop("final_obs")
         placed = view.placed(self.last_poses, before)
         for i in np.flatnonzero(ended).tolist():
@@ -59,6 +61,7 @@ class OnSetVector(DrivenVectorEnv):
         last = view.infos(infos.pop("final_info"), self.last_poses, ended)
         # The new episodes have not ended.
         told = view.infos(infos, poses, np.zeros_like(ended))
+        told |= self._about(ended)
         told |= {
             "final_obs": final,
             "_final_obs": ended,
@@ -66,6 +69,12 @@ class OnSetVector(DrivenVectorEnv):
             "_final_info": ended.copy(),
         }
         return seen, rewards, terminated, truncated, told
+
+    def _about(self, begun: NDArray[np.bool_]) -> dict[str, Any]:
+        """The infos about the worlds of the robots whose episodes have begun."""
+        tasks = {i: self.tasks[i] for i in np.flatnonzero(begun).tolist()}
+        told = {i: task.about for i, task in tasks.items() if task.about}
+        return joined(told, self.num_envs)
 
     def _assign(self, i: int, task: Any) -> None:
         super()._assign(i, task)

@@ -151,7 +151,7 @@ class SB3VecEnv(VecEnv):
 def _row(infos: dict[str, Any], i: int) -> dict[str, Any]:
     """The info of one robot, as plain Python values."""
     return {
-        key: value[i : i + 1].tolist()[0]
+        key: _row(value, i) if isinstance(value, dict) else value[i : i + 1].tolist()[0]
         for key, value in infos.items()
         if not key.startswith("_") and infos[f"_{key}"][i]
     }

@@ -77,6 +77,7 @@ class Map2DTask:
         shortest: d0, the length of the shortest grid path from the nominal start, px;
             see `path_from`.
         movers: The movers at the start of the episode; None without movers.
+        about: What `info` says about the world of a task set; None elsewhere.
     """
 
     env_id: ClassVar = "TDAC-Map2D-v0"
@@ -91,10 +92,12 @@ class Map2DTask:
     field: NDArray[np.float32]
     shortest: float
     movers: Movers | None = None
+    about: dict[str, Any] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        rest = self.robot, self.goal_tolerance, self.dt, self.horizon, self.movers
-        return _restored, (self.terrain, self.start, self.goal, *rest)
+        rest = self.robot, self.goal_tolerance, self.dt, self.horizon
+        ends = self.terrain, self.start, self.goal
+        return _restored, (*ends, *rest, self.movers, self.about)
 
     @property
     def body_radius(self) -> float:
@@ -282,9 +285,9 @@ def _restored(
     terrain: Terrain, start: Pose, goal: tuple[float, float], *rest: Any
 ) -> Map2DTask:
     """Restores a pickled task and recomputes what the pickle leaves out."""
-    robot, tolerance, dt, horizon, movers = rest
+    robot, tolerance, dt, horizon, *further = rest
     field = route(terrain, start[:2], goal, robot.radius)
     shortest = path_length_from(terrain, field, start.x, start.y)
     return Map2DTask(
-        terrain, start, goal, robot, tolerance, dt, horizon, field, shortest, movers
+        terrain, start, goal, robot, tolerance, dt, horizon, field, shortest, *further
     )

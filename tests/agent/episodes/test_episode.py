@@ -11,6 +11,8 @@ from hypothesis.extra.numpy import arrays
 
 from tdac_agent.episodes.episode import Record, late, run_policy
 from tdac_agent.sandbox import ControllerFault
+from tdac_envs.ladder.env import make
+from tdac_envs.ladder.observed import AT_START
 from tdac_envs.map2d.env import Map2DEnv
 
 TIMES = st.floats(0.0, 1e4)
@@ -48,3 +50,13 @@ def test_an_error_after_a_long_call_is_no_time_out():
     assert rollout.error == "MemoryError at policy (line 3)"
     assert not rollout.timed_out
     assert not rollout.is_retryable
+
+
+def test_a_controller_is_not_told_its_world():
+    """What a reset says about a public world stays with the judge."""
+    env = make("unknown", split="dev", privileged=True)
+    assert set(AT_START) < set(env.reset(options={"index": 2})[1])
+    record = Record(env, None, 100, options={"index": 2})
+    info = record.reset()[1]
+    assert not set(AT_START) & set(info)
+    assert not set(AT_START) & set(record.step((0.0, 0.0))[4])

@@ -199,7 +199,8 @@ class TestPicture:
         env = EPuckEnv(world, start, render_mode="rgb_array", **options)
         env.reset(seed=0)
         for _ in range(steps):
-            env.step(FULL)
+            if any(env.step(FULL)[2:4]):
+                break
         return env.render().astype(int)
 
     def places(self, image, colour, near=6):

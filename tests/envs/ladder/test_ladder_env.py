@@ -1,9 +1,11 @@
 """TDAC-Ladder-v0: new worlds, nothing that leaks, equal alone and in a batch."""
 
 import itertools
+import json
 import pickle
 import shutil
 import warnings
+from dataclasses import asdict
 
 import gymnasium as gym
 import numpy as np
@@ -77,7 +79,7 @@ def test_spaces_are_those_of_the_level(level):
 @pytest.mark.parametrize("level", LEVELS)
 def test_nothing_leaks(level):
     """Every entry of every info and observation is on the list."""
-    env = make(level)
+    env = make(level, "test")
     for index in range(3):
         seen, info = env.reset(seed=index, options={"index": index})
         assert set(info) == {"collisions", "clipped"}
@@ -87,6 +89,45 @@ def test_nothing_leaks(level):
             ended = {"is_success", "collision"} if terminated or truncated else set()
             assert set(info) == {"collisions", "clipped"} | ended
         assert terminated or truncated
+
+
+@pytest.mark.parametrize("split", ["train", "dev", "test", "hidden"])
+@pytest.mark.parametrize("level", ["unknown", "epuck"])
+def test_a_reset_names_the_world(level, split, tmp_path):
+    """By index, generator and difficulty, and only where worlds are no secret."""
+    (tmp_path / "salt").write_bytes(b"0123456789abcdef")
+    salt = {"salt_file": tmp_path / "salt"} if split == "hidden" else {}
+    env, tasks = make(level, split, **salt), load_set(level)
+    for _ in range(2):  # a training world is then read from its file
+        info = env.reset(seed=1, options={"index": 3})[1]
+        if split in ("test", "hidden"):
+            assert set(info) == {"collisions", "clipped"}
+            continue
+        about = {
+            "world_index": 3,
+            "generator": tasks.kind(split, 3),
+            "difficulty": asdict(tasks.world(split, 3).difficulty),
+        }
+        assert info == {"collisions": 0, "clipped": 0, **about}
+        assert json.loads(json.dumps(info)) == info
+        assert set(env.step(np.zeros(2, np.float32))[4]) == {"collisions", "clipped"}
+        env = pickle.loads(pickle.dumps(env))
+
+
+def test_a_batch_names_the_worlds_that_begin():
+    """Those of the reset mask alone, or of the episodes that begin in a step."""
+    batch = gym.make_vec(
+        "TDAC-Ladder-v0", 2, level="unknown", split="dev", max_episode_steps=1
+    )
+    first = batch.reset(seed=1)[1]
+    assert first["_world_index"].all()
+    mask = np.array([False, True])
+    again = batch.reset(seed=1, options={"reset_mask": mask, "index": 4})[1]
+    assert again["world_index"][1] == 4
+    assert np.array_equal(again["_world_index"], mask)
+    still = np.zeros((2, 2), np.float32)
+    assert "world_index" not in batch.step(still)[4]
+    assert batch.step(still)[4]["_generator"].all()
 
 
 def test_privileged_infos():

@@ -140,3 +140,17 @@ def test_its_videos_show_all_robots(tmp_path):
         envs.step(np.ones((4, 2), np.float32))
     envs.close()
     assert len(list(tmp_path.glob("*.mp4"))) == 1
+
+
+def test_what_a_reset_says_of_a_world_is_plain():
+    """Nested infos become nested dicts of plain numbers."""
+    options = {"level": "unknown", "split": "dev"}
+    one = DummyVecEnv([lambda: gym.make("TDAC-Ladder-v0", **options).unwrapped] * 2)
+    two = SB3VecEnv(
+        gym.make_vec("TDAC-Ladder-v0", 2, autoreset_mode="SameStep", **options)
+    )
+    for envs in (one, two):
+        envs.seed(1)
+        envs.reset()
+    assert one.reset_infos == two.reset_infos
+    assert two.reset_infos[0]["difficulty"]["gap"] > 1
