@@ -75,6 +75,7 @@ def __dir__() -> list[str]:
 
 
 # No TimeLimit: the horizon depends on the task, and the envs truncate themselves.
+# Batches take `max_episode_steps` themselves.
 # What needs `max_episode_steps` in the spec gets it from
 # `gym.make(..., horizon=1000, max_episode_steps=1000)`.
 gym.register(

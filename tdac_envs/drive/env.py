@@ -40,12 +40,14 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         info_of: The `info` of a step, from `robot.outcome` as a list.
         title: Title of the window.
         robot: Arrays of the robot; see `tdac_envs.drive.stepping`.
+        ends: Whether an episode must not be stepped on after its end.
         task: The task of the current episode.
         nominal: The task without variation.
     """
 
     info_of: Callable[[list[float]], dict[str, Any]] = staticmethod(info_of)
     title: str
+    ends = True
     robot: Any
     task: Any
     nominal: Any
@@ -94,7 +96,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         outcome = self.robot.outcome.tolist()
         reward, terminated, truncated = outcome[0], outcome[1] == 1.0, outcome[2] == 1.0
         if terminated or truncated:
-            self._is_over = True
+            self._is_over = self.ends
         info = self.info_of(outcome)
         if self.render_mode is not None:
             self._note(info["is_success"], info["collision"], truncated)

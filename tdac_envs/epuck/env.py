@@ -116,6 +116,9 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
        `info["collisions"]` counts the steps in contact.
     3. Truncation: the episode has lasted `horizon` steps.
 
+    After its end, call `reset`: a further step only warns, and its results are
+    undefined.
+
     ## Arguments
     Args:
         world: Bundled name (`tdac_envs.bundled_worlds()`), path of a `.wbt` file, or

@@ -97,7 +97,8 @@ class LadderVectorEnv(
         threads: Number of threads, which does not affect the results. Default: the
             number of cores.
         render_mode: `"rgb_array"`, for up to 64 robots, or None.
-        **options: Arguments of `LadderEnv`.
+        **options: Arguments of `LadderEnv`, and `max_episode_steps`, as for
+            `Map2DVectorEnv`.
     """
 
     make = LadderEnv

@@ -144,6 +144,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
        press against the robot waits.
     3. Truncation: the episode has lasted `horizon` steps.
 
+    After its end, call `reset`: a further step only warns, and its results are
+    undefined.
+
     ## Arguments
     Args:
         map: Bundled name (`tdac_envs.bundled_maps()`); path of an image, ROS

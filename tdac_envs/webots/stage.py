@@ -139,7 +139,7 @@ class ControllerWorld:
                 "reflectance": "webots",
                 "goal_visible": True,
             }
-        return EPuckEnv(
+        env = EPuckEnv(
             self.world,
             horizon=steps,
             on_collision="block",
@@ -147,6 +147,8 @@ class ControllerWorld:
             **sensors,
             **options,
         )
+        env.ends = self.has_goal
+        return env
 
 
 def open_stage(

@@ -103,11 +103,12 @@ def test_a_reading_beyond_the_table(stage_of):
 
 
 def test_a_goal_out_of_reach_is_not_used(stage_of):
-    """The world has no goal then, which a note explains."""
+    """The world has no goal then, which a note explains; so driving on is right."""
     walled = "WoodenBox { size 0.1 1 0.2 translation 0.3 0 0.1 }\n"
     goal = "DEF GOAL Pose { translation 0.7 0 0 }"
     stage, _ = stage_of(ARENA, walled, "E-puck { translation -0.5 0 0 }\n", goal)
     assert not stage.has_goal
+    assert not stage.make_env().ends
     assert "the file's GOAL is not used: no free path" in stage.notes[0]
 
 
