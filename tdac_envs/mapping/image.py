@@ -241,9 +241,10 @@ def _stored(picture: Image.Image) -> NDArray[np.uint8]:
         return np.asarray(picture.convert("RGBA"), np.uint8)
     values = np.asarray(picture, np.float64)
     is_deep = picture.mode[0] == "I" and 0 <= values.min() <= values.max() <= 65535
-    grey = np.rint(values / 257.0) if is_deep else _to_eight_bits(values)
-    alpha = np.where(values == picture.info.get("transparency"), 0, 255)
-    return np.dstack([grey, grey, grey, alpha]).astype(np.uint8)
+    scaled = np.rint(values / 257.0) if is_deep else _to_eight_bits(values)
+    clear = values == picture.info.get("transparency")
+    grey = scaled.astype(np.uint8)
+    return np.dstack([grey, grey, grey, np.where(clear, np.uint8(0), np.uint8(255))])
 
 
 def _to_eight_bits(values: NDArray[np.float64]) -> GreyImage:

@@ -42,7 +42,7 @@ def read_ros_yaml(path: Path) -> MapImage:
             f"{ros.mode} and negate {ros.negate:d}; correct these fields or the picture"
         )
     return MapImage(
-        composite(pixels),
+        composite(pixels) if (alpha < 255).any() else pixels[..., :3],
         printable(path.name),
         hashlib.sha256(text + data).hexdigest(),
         ~cells.free,
