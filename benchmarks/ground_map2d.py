@@ -9,8 +9,9 @@ import numpy as np
 import yaml
 
 from benchmarks.mutants import Original, originals_in
+from tdac_agent import load_task
 from tdac_agent.environments.map2d.builtin import Parameters, render_controller
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_envs.grid.grid import BoolGrid
 
 ZOO = Path(__file__).parent.parent / "tests" / "agent" / "zoo" / "map2d" / "good"

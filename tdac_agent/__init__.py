@@ -12,10 +12,11 @@ if TYPE_CHECKING:
     from tdac_agent.evaluation.robust import verify_robust
     from tdac_agent.evaluation.set_verify import verify_on_set
     from tdac_agent.runs.history import RunHistory, gather_run
+    from tdac_agent.runs.ownership import load_task
     from tdac_agent.runs.run_record import Run, load_run
     from tdac_agent.synthesis.loop import synthesize
     from tdac_agent.tasks.disturbance import Disturbance
-    from tdac_agent.tasks.task import Task, load_task
+    from tdac_agent.tasks.task import Task
     from tdac_agent.verification.diagnosis.report import Report
     from tdac_agent.verification.verify import verify
 
@@ -50,7 +51,7 @@ _MODULE_OF = {
     "gather_run": "runs.history",
     "load_controller": "evaluation.policy",
     "load_run": "runs.run_record",
-    "load_task": "tasks.task",
+    "load_task": "runs.ownership",
     "synthesize": "synthesis.loop",
     "verify": "verification.verify",
     "verify_on_set": "evaluation.set_verify",

@@ -18,13 +18,14 @@ from tdac_agent.executors.executor import Work
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.installation import seed_from
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TdacError

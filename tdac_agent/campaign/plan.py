@@ -23,9 +23,10 @@ from tdac_agent.prompting.prompt import (
     load_template,
 )
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.run_record import Setting
 from tdac_agent.tasks.setting import Setting as TaskSetting
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import bundled_task
 from tdac_agent.tasks.trust import permit
 from tdac_agent.verification.verify import suite_sha256

@@ -7,9 +7,9 @@ from pathlib import Path
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.synth import synthesise_and_show
 from tdac_agent.library.listing import next_folder
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.tasks.task import load_task
 
 _ABOUT = (
     "Replaying a language model's answers to the [bold]{prompt}[/] prompt for the task "

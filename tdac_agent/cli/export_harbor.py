@@ -12,7 +12,7 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.set_flags import check_set
 from tdac_agent.cli.spinner import Spinner
 from tdac_agent.harbor.folder import WORLDS, export_set, export_task
-from tdac_agent.tasks.task import load_task
+from tdac_agent.runs.ownership import load_task
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import load_set
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.sandbox import TIERS
 from tdac_agent.tasks.registry import environment_with_key
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile, checked
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import TEXT_BYTES, read_file

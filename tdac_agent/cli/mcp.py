@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tdac_agent.library.listing import next_folder
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.run_record import Agent
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.trust import allowed
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command

@@ -85,7 +85,7 @@ def compiled_step() -> str:
 def verification() -> str:
     """Verifies a good controller in the sandbox tier in use."""
     from tdac_agent.builtin.provider import template_of
-    from tdac_agent.tasks.task import load_task
+    from tdac_agent.runs.ownership import load_task
     from tdac_agent.verification.verify import verify
 
     task = load_task("maze")

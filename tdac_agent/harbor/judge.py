@@ -15,8 +15,8 @@ from pathlib import Path
 
 from tdac_agent.errors import Fault
 from tdac_agent.problems.problem import LevelProblem, Problem, TaskProblem
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.task import load_task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import parse_json

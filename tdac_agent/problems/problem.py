@@ -19,10 +19,11 @@ from tdac_agent.evaluation.set_verify import JUDGED, MOST_EPISODES, verify_on_se
 from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.prompt import FULL, generate_prompt
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
 from tdac_agent.set_synthesis.trials import BLOCKS
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import Task, load_task, write_workdir
+from tdac_agent.tasks.task import Task, write_workdir
 from tdac_agent.verification.judge.set_files import level_params
 from tdac_agent.verification.verify import verify
 from tdac_envs.core.arguments import one_of, whole_number

@@ -10,6 +10,7 @@ from typing import Literal, TypeVar
 from tdac_agent.episodes.trajectory import Trajectory, nominal_first
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.rules import RuleBook
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.rule_history import RuleChanges, rule_changes
 from tdac_agent.runs.run_record import (
     AGENT,
@@ -23,7 +24,7 @@ from tdac_agent.runs.run_record import (
     status_now,
 )
 from tdac_agent.storage.journal import read_records
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file

@@ -5,12 +5,16 @@ from __future__ import annotations
 import hmac
 import json
 from collections.abc import Container, Iterator
+from dataclasses import replace
 from pathlib import Path
 
+from tdac_agent.errors import RunError
 from tdac_agent.models.tariff import MAX_COST
 from tdac_agent.prompting.prompt import VARIANTS
-from tdac_agent.runs.run_record import PROMPT_FILE, Run
+from tdac_agent.runs.run_record import PROMPT_FILE, Run, load_run
 from tdac_agent.tasks.installation import keyed, lasting_secret
+from tdac_agent.tasks.task import Task, read_task
+from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish, tree_sha256
 
 OWN_SUITE = "suite"
@@ -76,6 +80,33 @@ def is_own_folder(run: Run) -> bool:
     """Like `is_own`, without reading the task: its tests are in the run folder."""
     suite = run.folder / OWN_SUITE
     return is_own(run, suite if suite.is_dir() else None)
+
+
+def load_task(
+    source: str | Path | TaskFile, *, base: Path | None = None, trust: bool = False
+) -> Task:
+    """Reads and checks a task; the tests of a run of this installation may run.
+
+    Args:
+        source: Name of a bundled task, path of a `task.yaml`, folder that contains
+            one, or its contents.
+        base: Folder that relative paths in the contents refer to. Default: the task
+            file's folder.
+        trust: Whether the tests that a task file brings may always run.
+
+    Raises:
+        TaskError: The file or the task cannot be used; the message says what to do.
+        MapError: The map cannot be used.
+        WorldError: The world cannot be used.
+    """
+    task = read_task(source, base=base, trust=trust)
+    if task.trusted or task.suite is None or task.folder is None:
+        return task
+    try:
+        own = is_own(load_run(task.folder), task.suite)
+    except (RunError, OSError):
+        own = False
+    return replace(task, trusted=own)
 
 
 def _facts(run: Run, suite: Path | None) -> bytes | None:

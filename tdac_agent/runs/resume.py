@@ -11,7 +11,7 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.given_rules import given_book
 from tdac_agent.prompting.prompt import VARIANTS
-from tdac_agent.runs.ownership import is_own, is_own_folder, wishes_of
+from tdac_agent.runs.ownership import is_own, is_own_folder, load_task, wishes_of
 from tdac_agent.runs.run_record import (
     AGENT,
     GIVEN_FILE,
@@ -22,7 +22,7 @@ from tdac_agent.runs.run_record import (
 )
 from tdac_agent.storage.files import UNFINISHED
 from tdac_agent.storage.locks import LOCK_FILE
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.tasks.trust import permit
 from tdac_envs.core.errors import one_line_reason

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.studio.board import Board, Kind, Place
 from tdac_agent.studio.passage import Passage, passage_on
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.core.errors import TdacError
 from tdac_envs.map2d.task import Map2DTask

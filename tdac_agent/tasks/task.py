@@ -13,7 +13,6 @@ from typing import Any
 
 import yaml
 
-from tdac_agent.errors import RunError
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.environment import Environment
 from tdac_agent.tasks.first_run import compile_first
@@ -150,7 +149,7 @@ class Task:
         return hashlib.sha256(text.encode()).hexdigest()
 
 
-def load_task(
+def read_task(
     source: str | Path | TaskFile, *, base: Path | None = None, trust: bool = False
 ) -> Task:
     """Reads and checks a task.
@@ -160,8 +159,7 @@ def load_task(
             one, or its contents.
         base: Folder that relative paths in the contents refer to. Default: the task
             file's folder.
-        trust: Whether the tests that a task file brings may run. Those of a run that
-            this installation created may always run.
+        trust: Whether the tests that a task file brings may run.
 
     Raises:
         TaskError: The file or the task cannot be used; the message says what to do.
@@ -177,21 +175,8 @@ def load_task(
     path = path / TASK_FILE if path.is_dir() else path
     spec, base = read_task_file(path, source), base or path.parent
     name = path.parent.resolve().name if path.name == TASK_FILE else path.stem
-    task = replace(_resolve(name, spec, base), folder=path.parent)
-    if task.suite is None or trust:
-        return task
-    return replace(task, trusted=_is_of_own_run(path.parent, task.suite))
-
-
-def _is_of_own_run(folder: Path, suite: Path) -> bool:
-    """Whether a folder is a run that this installation created with these tests."""
-    from tdac_agent.runs.ownership import is_own  # slow to import
-    from tdac_agent.runs.run_record import load_run
-
-    try:
-        return is_own(load_run(folder), suite)
-    except (RunError, OSError):
-        return False
+    task = _resolve(name, spec, base)
+    return replace(task, folder=path.parent, trusted=task.suite is None or trust)
 
 
 def _resolve(name: str | None, spec: TaskFile, base: Path) -> Task:
@@ -228,7 +213,7 @@ def display_name(task: Task) -> str:
 
 @functools.cache
 def _bundled(name: str) -> Task:
-    return load_task(name)
+    return read_task(name)
 
 
 def write_workdir(folder: Path, task: Task) -> None:

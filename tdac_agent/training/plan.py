@@ -10,9 +10,10 @@ from gymnasium.envs.registration import load_env_creator
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.errors import RunError
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import bundled_task
 from tdac_agent.training.curve import PLAN_FILE
 from tdac_agent.training.hyperparameters import (

@@ -13,9 +13,9 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from small import QUICK, write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.cli.main import main
 from tdac_agent.environments.map2d.builtin import Parameters, render_controller
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.judge.warm import WarmJudge
 
 

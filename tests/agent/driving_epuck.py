@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from driving import drive, import_from
 
+from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
-from tdac_agent.tasks.task import Task, load_task, write_workdir
+from tdac_agent.tasks.task import Task, write_workdir
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs import bundled_worlds, write_world
 from tdac_envs.core.errors import TdacError

@@ -80,7 +80,7 @@ STARTS = {
     """,
     "a verification": """
         from tdac_agent.builtin.provider import template_of
-        from tdac_agent.tasks.task import load_task
+        from tdac_agent import load_task
         from tdac_agent.verification.verify import verify
         task = load_task("maze")
         template = template_of(task.setting)

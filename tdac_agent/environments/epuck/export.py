@@ -9,9 +9,10 @@ from pathlib import Path
 
 from tdac_agent.environments.epuck.setting import WORLD_FILE
 from tdac_agent.errors import RunError
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.epuck.task import EPuckTask

@@ -20,7 +20,7 @@ from tdac_agent.sandbox import ControllerFault, Limits, SandboxError
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task, read_task
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.measures import (
     Measured,
@@ -158,7 +158,7 @@ def judge_seeds(job: SeededJob, child_pool: ChildPool) -> None:
     """
     job.out.mkdir(exist_ok=True)
     setup = EpisodeSetup(
-        load_task(job.task),
+        read_task(job.task),
         job.policy,
         job.task,
         job.disturbance,

@@ -32,7 +32,7 @@ from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.encode import encode
 from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
-from tdac_agent.tasks.task import load_task
+from tdac_agent.tasks.task import read_task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.jobs import SUITE, Job
 from tdac_agent.verification.judge.suite_episode import SuitePool, drive_known
@@ -72,7 +72,7 @@ def serve(child_pool: ChildPool | None = None, known: Path | None = None) -> Non
         child_pool = ChildPool()
         _warm_up()
         if known is not None:
-            load_task(known)
+            read_task(known)
         gc.collect()
     # Keeps the memory of existing objects shared with the workers.
     gc.freeze()

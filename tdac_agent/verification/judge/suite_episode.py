@@ -16,7 +16,7 @@ from tdac_agent.sandbox import (
     ControllerTimeout,
     Limits,
 )
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task, read_task
 from tdac_agent.verification.judge.blame import faults_of_judge
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.worker_pool import WorkerPool
@@ -99,7 +99,7 @@ def drive_known(
 
 @functools.lru_cache(maxsize=1)
 def _task_of(workdir: Path) -> Task:
-    return load_task(workdir)
+    return read_task(workdir)
 
 
 @faults_of_judge()

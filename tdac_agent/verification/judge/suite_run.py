@@ -6,7 +6,7 @@ import contextlib
 import sys
 from concurrent.futures import ThreadPoolExecutor
 
-from tdac_agent.tasks.task import load_task
+from tdac_agent.tasks.task import read_task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.jobs import Job
 from tdac_agent.verification.judge.judge import Judge
@@ -20,7 +20,7 @@ def judge_suite(
     later: contextlib.ExitStack,
 ) -> None:
     """Runs the suite of a job, and writes the findings."""
-    task = load_task(job.task)
+    task = read_task(job.task)
     judge = Judge(
         task,
         job.controller.read_bytes(),

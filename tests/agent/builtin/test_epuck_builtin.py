@@ -14,6 +14,7 @@ from driving_epuck import (
     world_task,
 )
 
+from tdac_agent import load_task
 from tdac_agent.builtin.parameters import read_parameters
 from tdac_agent.builtin.provider import Builtin, template_of
 from tdac_agent.builtin.remedies import MarginBounds
@@ -29,7 +30,6 @@ from tdac_agent.prompting.extract import extract_source
 from tdac_agent.prompting.rule_answer import MAX_OPERATIONS, apply, parse_operations
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.diagnosis.report import Diagnosis, Failure, Report
 from tdac_agent.verification.suite import contract

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from small import small_cells
 
+from tdac_agent import load_task
 from tdac_agent.cli.flags import TaskFlags
 from tdac_agent.cli.places import with_places
-from tdac_agent.tasks.task import load_task
 from tdac_envs.core.errors import RefusedError, TaskError
 
 # The small map is a ROS map of 0.1 m per px with its corner at (-2, -3) m.

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from small import small_cells
 
-from tdac_agent.tasks.task import lay_out, load_task
+from tdac_agent import load_task
+from tdac_agent.tasks.task import lay_out
 from tdac_agent.tasks.units import METRES, PIXELS
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
 from tdac_envs.grid.map_units import MapFrame, MapUnits

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import yaml
 
+from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.flat_world import flat_world
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.task import load_task, portable_task_file, write_workdir
+from tdac_agent.tasks.task import portable_task_file, write_workdir
 from tdac_agent.tasks.task_file import TaskFile, bundled_tasks
 from tdac_envs import bundled_maps, bundled_worlds, load_world, read_world
 from tdac_envs.core.errors import TaskError, WorldError

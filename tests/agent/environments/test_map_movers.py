@@ -5,10 +5,11 @@ import pytest
 import yaml
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.environments.map2d.moving import sentence_on
 from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.task import lay_out, load_task
+from tdac_agent.tasks.task import lay_out
 from tdac_agent.training.plan import make_batch, make_plan
 from tdac_agent.verification.suite.starts import episode_seed, spread_starts
 from tdac_envs.core.errors import TaskError

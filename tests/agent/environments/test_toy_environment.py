@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tdac_agent import load_task
 from tdac_agent.tasks.registry import environment
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.verify import verify
 from tdac_envs.core.errors import TaskError
 

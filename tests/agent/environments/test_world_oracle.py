@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tdac_agent import load_task
 from tdac_agent.environments.epuck.moved_world import Motion, reordered
 from tdac_agent.environments.epuck.oracle import occupied_at
 from tdac_agent.environments.epuck.world_copies import ANGLES, world_cases
-from tdac_agent.tasks.task import load_task
 from tdac_envs import bundled_worlds, load_world, read_world
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.worlds.bodies import at_body_height, bodies, floor_under

@@ -23,6 +23,7 @@ from scipy.stats import binom
 from small import QUICK, write_small_task
 
 import tdac_agent
+from tdac_agent import load_task
 from tdac_agent.episodes.learned import Learned
 from tdac_agent.episodes.sb3_file import SavedPolicy, read_metadata, write_metadata
 from tdac_agent.evaluation.entrants import entrants_of
@@ -34,7 +35,6 @@ from tdac_agent.metrics.exact import sign_test
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.tasks.provenance import sha256_of
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.measures import (
     measure,
     shortest_path_length,

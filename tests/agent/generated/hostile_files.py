@@ -20,6 +20,7 @@ import cv2
 import numpy as np
 import yaml
 
+from tdac_agent import load_task
 from tdac_agent.builtin.scripted import Script
 from tdac_agent.campaign.config import read_config
 from tdac_agent.cli.console import Console
@@ -36,7 +37,7 @@ from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, load_rules, load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.yaml_file import read_yaml
-from tdac_agent.tasks.task import Task, lay_out, load_task
+from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.training.curve import read_curve
 from tdac_agent.training.hyperparameters import read_hyperparameters
 from tdac_agent.training.plan import read_plan

@@ -11,9 +11,9 @@ from hostile_wire import Peer, conversations, told
 from hypothesis import HealthCheck, given, settings
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.episodes.episode import Record, run_own_loop, run_policy
 from tdac_agent.sandbox import ControllerFault
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.report import Failure
 
 LEAST_SHARE = 0.5

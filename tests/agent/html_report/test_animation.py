@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from tdac_agent import load_task
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.html_report import make_page
 from tdac_agent.html_report.animation import RAD, TOLERANCE, animations, thinned
 from tdac_agent.html_report.scene import scene_of
 from tdac_agent.runs.history import gather_run
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.figures import contact_of
 
 WALKS = arrays(

@@ -7,9 +7,9 @@ import pytest
 from few_worlds import KNOWN
 from mcp_agent import STILL, converse, journal, over_stdio, record
 
+from tdac_agent import load_task
 from tdac_agent.environments.map2d.builtin import Parameters, render_controller
 from tdac_agent.html_report import make_page
-from tdac_agent.tasks.task import load_task
 
 PNG = b"\x89PNG\r\n\x1a\n"
 TOOLS = {"read_task", "submit", "failures", "picture", "submissions", "choose"}

@@ -15,11 +15,11 @@ from enclosure import Canaries
 from grounds import write_map_task, zoo_task
 from mcp_agent import converse
 
+from tdac_agent import load_task
 from tdac_agent.mcp.opening import open_desk
 from tdac_agent.mcp.server import Counter
 from tdac_agent.sandbox import MAX_SOURCE_BYTES
 from tdac_agent.tasks.installation import lasting_secret
-from tdac_agent.tasks.task import load_task
 
 ATTACKS = [case for case in all_cases() if not case.passes]
 FEW = {

@@ -12,6 +12,7 @@ from hostile_server import ATTACKS, HUGE
 from small import write_small_task
 from test_faults import QUESTION, model_of
 
+from tdac_agent import load_task
 from tdac_agent.errors import Fault
 from tdac_agent.models.bounds import MAX_CHARS, MAX_TOKENS, check_reply
 from tdac_agent.models.provider import ProviderFault, Reply
@@ -21,7 +22,6 @@ from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 
 QUICK = ("2^63 tokens", "deep JSON", "a deep error", "a deep code", "a huge code")
 MOST_GROWTH_MB = 100

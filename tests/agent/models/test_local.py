@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import Fault, ProviderError
 from tdac_agent.models.choice import Options, choose_model, choose_models
 from tdac_agent.models.manual import Manual
@@ -25,7 +26,6 @@ from tdac_agent.models.provider import (
 )
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 from tdac_envs.core.extras import install_command
 
 QUESTION = Request("generate", "Wände? ÄÖ\n" * 20_000)

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.budget import NOTHING, Budget
 from tdac_agent.models.prices import SHIPPED, Price
@@ -16,7 +17,6 @@ from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.tariff import UNPRICED_TOKENS, Tariff, bounds_of, tariffs_of
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 from tdac_envs.core.extras import install_command
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"

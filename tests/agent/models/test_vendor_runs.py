@@ -11,11 +11,11 @@ import pytest
 from fault_server import ANTHROPIC, MODEL, OPENAI, PATHS, answers, begins, fails
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import Fault
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 STANDS = "def policy(obs):\n    return 0.0, 0.0\n"

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from tdac_agent import load_task
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.metrics import (
@@ -28,7 +29,6 @@ from tdac_agent.plots import (
     save_figure,
 )
 from tdac_agent.runs.run_record import Attempt, Run
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.verify import verify
 from tdac_envs import preprocess
 from tdac_envs.core.errors import TdacError

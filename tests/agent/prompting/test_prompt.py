@@ -8,6 +8,7 @@ import pytest
 from gymnasium import spaces
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.map2d.entry import MAP2D
 from tdac_agent.prompting.manual import ManualError, interface_of
@@ -19,7 +20,7 @@ from tdac_agent.prompting.prompt import (
     repair_prompt,
 )
 from tdac_agent.prompting.rules import BEGIN, RuleBook
-from tdac_agent.tasks.task import SENSORS_FILE, load_task, write_workdir
+from tdac_agent.tasks.task import SENSORS_FILE, write_workdir
 from tdac_agent.tasks.task_file import bundled_tasks
 from tdac_agent.verification.suite import contract, hygiene
 from tdac_agent.verification.verify import verify

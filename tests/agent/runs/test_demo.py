@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import Fault
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.verify import verify
 
 

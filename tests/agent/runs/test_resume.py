@@ -12,6 +12,7 @@ import yaml
 from script import NO_RULES, STILL, Script, code
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.models.provider import PermanentFault, Reply
 from tdac_agent.models.retry import RetryPolicy
@@ -21,7 +22,6 @@ from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 

@@ -11,6 +11,7 @@ import pytest
 import yaml
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.models.budget import Enough
 from tdac_agent.prompting.prompt import (
     PromptError,
@@ -26,7 +27,7 @@ from tdac_agent.studio.standing import is_from_elsewhere
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.setup import hold_folder
 from tdac_agent.tasks.installation import lasting_secret
-from tdac_agent.tasks.task import display_name, load_task
+from tdac_agent.tasks.task import display_name
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.trust import NotTrustedError, tree_sha256
 from tdac_agent.verification.verify import verify

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 from small import SHORT, write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.sandbox import ControllerTimeout, Limits
-from tdac_agent.tasks.task import load_task, write_workdir
+from tdac_agent.tasks.task import write_workdir
 from tdac_agent.verification.judge.judge import Judge
 
 pytestmark = pytest.mark.skipif(

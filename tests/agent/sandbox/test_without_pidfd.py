@@ -34,7 +34,7 @@ SCRIPT = """
     else:
         raise AssertionError("not refused")
 
-    from tdac_agent.tasks.task import load_task
+    from tdac_agent import load_task
     from tdac_agent.verification.verify import verify
     from tdac_agent.verification.judge.warm import WarmJudge
 

@@ -13,6 +13,7 @@ from few_worlds import KNOWN, write_set
 from script import NO_RULES, STILL, code
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.metrics import frames_of
@@ -25,7 +26,6 @@ from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.side_by_side import side_by_side
 from tdac_agent.synthesis.workload import whole
-from tdac_agent.tasks.task import load_task
 from tdac_envs import load_set
 
 AT_ONCE = RetryPolicy(first_wait=0.0)

@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.models.prices import SHIPPED, Price, PriceError, PriceList, load_prices
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS, Request
 from tdac_agent.models.tariff import Tariff
 from tdac_agent.models.tokens import estimate_tokens
 from tdac_agent.prompting.prompt import generate_prompt
 from tdac_agent.synthesis.cost_forecast import cost_of
-from tdac_agent.tasks.task import load_task
 
 PRICES = PriceList(
     dated=date(2026, 1, 2),

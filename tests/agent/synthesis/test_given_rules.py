@@ -7,6 +7,7 @@ import pytest
 from script import NO_RULES, STILL, Script, code
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.html_report import make_page
 from tdac_agent.models.provider import Reply
 from tdac_agent.models.retry import RetryPolicy
@@ -21,7 +22,6 @@ from tdac_agent.prompting.prompt import PromptError
 from tdac_agent.prompting.rules import MAX_RULE_TOKENS, RuleBook
 from tdac_agent.runs.run_record import load_rules, load_run
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 LEARNT = [

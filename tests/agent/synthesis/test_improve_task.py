@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from script import STILL, Script, code
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.html_report.page import make_page
@@ -26,7 +27,6 @@ from tdac_agent.synthesis.workload import (
     most_variations,
     task_shares,
 )
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TaskError
 

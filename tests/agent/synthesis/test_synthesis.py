@@ -12,12 +12,12 @@ from script import STILL as NOTHING
 from script import Script
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import Fault, ProviderError, RunError
 from tdac_agent.models.provider import PermanentFault, ProviderFault, Reply
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.verify import verify
 
 AT_ONCE = RetryPolicy(first_wait=0.0)

@@ -13,6 +13,7 @@ from PIL import Image
 from script import NO_RULES, Script, code
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.html_report import make_page
 from tdac_agent.models.picture import LARGEST_SIDE
@@ -27,7 +28,6 @@ from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.cost_forecast import cost_of
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.workload import rest_of
-from tdac_agent.tasks.task import load_task
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 BUMP = "def policy(obs):\n    return 1.0, 1.0\n"

@@ -79,7 +79,9 @@ def test_only_code_that_is_not_cached_is_compiled():
     if cache_folder() is None:
         pytest.skip("nothing is cached here")
     used = []
-    kernels.drive(example_words())
+    env = environment("TDAC-Map2D-v0").small_env()
+    env.reset(seed=0)
+    kernels.drive(env.addresses.words[0])
     parts = [
         CodePart(lambda: used.append("old"), "tdac_envs.map2d", "kernels.drive", 1.0),
         CodePart(lambda: used.append("new"), "tdac_envs.map2d", "kernels.none", 1.0),
@@ -87,12 +89,6 @@ def test_only_code_that_is_not_cached_is_compiled():
     assert [part.is_compiled() for part in parts] == [True, False]
     compile_first(parts)
     assert used == ["new"]
-
-
-def example_words():
-    env = environment("TDAC-Map2D-v0").small_env()
-    env.reset(seed=0)
-    return env.addresses.words[0]
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ LINE = "tdac: cannot store a secret ("
 END = ": jittered starts are drawn for this run only; its report has their seed"
 VERIFY = """
 import sys
-from tdac_agent.tasks.task import load_task
+from tdac_agent import load_task
 from tdac_agent.verification.verify import verify
 if __name__ == "__main__":
     seed = int(sys.argv[2]) if sys.argv[2:] else None

@@ -11,8 +11,8 @@ import pytest
 import yaml
 from small import small_cells
 
-from tdac_agent import verify
-from tdac_agent.tasks.task import lay_out, load_task
+from tdac_agent import load_task, verify
+from tdac_agent.tasks.task import lay_out
 from tdac_envs.core.errors import MapError, TaskError
 from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.env import Map2DEnv

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tdac_agent.tasks.task import load_task
+from tdac_agent import load_task
 from tdac_agent.tasks.task_file import ProgressSpec, RobotSpec, TaskFile, checked
 from tdac_envs.core.intake import parse_yaml
 

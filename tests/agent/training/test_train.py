@@ -19,10 +19,10 @@ import pytest
 import yaml
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.episodes.learned import Learned
 from tdac_agent.episodes.sb3_file import read_metadata
 from tdac_agent.errors import RunError
-from tdac_agent.tasks.task import load_task
 from tdac_agent.training.curve import Point, read_curve, write_curve
 from tdac_agent.training.hyperparameters import (
     config_file,

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.errors import Fault
-from tdac_agent.tasks.task import load_task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.suite.privileged import (
     BAD,

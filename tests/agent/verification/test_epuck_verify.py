@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from tdac_agent import load_task
 from tdac_agent.cli.play import drive_disturbed
 from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
 from tdac_agent.environments.epuck.entry import EPUCK
@@ -19,7 +20,6 @@ from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.task import load_task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.suite.starts import spread_starts

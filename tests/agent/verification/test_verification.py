@@ -16,11 +16,11 @@ import pytest
 from rich.console import Console
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.cli.report_view import show_report
 from tdac_agent.episodes.episode import as_wheels, wrong_action
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.sandbox import Limits
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.verify import load_trajectories, read_source, verify
 

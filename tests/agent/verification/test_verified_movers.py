@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small import write_small_task
 
-from tdac_agent.tasks.task import load_task
+from tdac_agent import load_task
 from tdac_agent.verification.verify import load_trajectories, verify
 
 NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"

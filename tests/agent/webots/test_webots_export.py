@@ -12,11 +12,12 @@ import pytest
 import yaml
 from worlds_for_controllers import OPEN
 
+from tdac_agent import load_task
 from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
 from tdac_agent.environments.epuck.export import POLICY, export_webots, project_name
 from tdac_agent.evaluation.policy import load_controller
 from tdac_agent.runs.run_record import Run
-from tdac_agent.tasks.task import load_task, portable_task_file, write_workdir
+from tdac_agent.tasks.task import portable_task_file, write_workdir
 from tdac_agent.webots.run import run_controller
 from tdac_envs import load_world
 from tdac_envs.webots.stage import open_stage

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 import yaml
 
+from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
-from tdac_agent.tasks.task import Task, load_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile
 
 WORLD = Path(__file__).parent / "epuck" / "world.wbt"

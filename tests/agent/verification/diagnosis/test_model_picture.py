@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from skimage.color import rgb2lab
 
-from tdac_agent.tasks.task import load_task
+from tdac_agent import load_task
 from tdac_agent.verification.diagnosis.model_picture import failure_picture
 from tdac_agent.verification.verify import load_trajectories, verify
 from tdac_envs.drawing.canvas import FREE, GREEN, MOVER, TRAIL, WALL

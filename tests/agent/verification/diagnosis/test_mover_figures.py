@@ -7,8 +7,8 @@ import pytest
 from driving import drive
 from small import write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.episodes.pictures import pictures_of
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.diagnosis.figures import contact_of
 from tdac_envs.drawing.canvas import MOVER
 from tdac_envs.drawing.closeup import Event, run_picture

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from small import QUICK, small_cells, write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.errors import Fault
 from tdac_agent.sandbox import Limits, available_tiers
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import load_trajectories, verify
 

@@ -9,9 +9,9 @@ from functools import partial
 
 import pytest
 
+from tdac_agent import load_task
 from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
 from tdac_agent.environments.epuck.entry import EPUCK
-from tdac_agent.tasks.task import load_task
 from tdac_agent.verification.verify import verify
 
 PARSE = ["test_parse_world"]

@@ -5,9 +5,10 @@ import os
 import pytest
 from small import QUICK, write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.environments.map2d.builtin import Parameters, render_controller
 from tdac_agent.errors import ControllerFileError, Fault
-from tdac_agent.tasks.task import load_task, write_workdir
+from tdac_agent.tasks.task import write_workdir
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.judge import Judge
 from tdac_agent.verification.verify import verify
