@@ -31,7 +31,8 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.errors import TdacError
 from tdac_envs.grid.grid import BoolGrid, OccupancyGrid, body_free, clearance
-from tdac_envs.mapping.image import ColourImage, load_image, luminance
+from tdac_envs.mapping.image import ColourImage, luminance
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.map_folder import planned_path
 from tdac_envs.mapping.params import MapParams
 from tdac_envs.mapping.preprocessing import preprocess

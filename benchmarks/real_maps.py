@@ -34,7 +34,8 @@ from tdac_envs.core.errors import TdacError
 from tdac_envs.grid.grid import BoolGrid, body_free, clearance
 from tdac_envs.grid.plan import path_length, plan_path
 from tdac_envs.mapping.binarize import disc, otsu
-from tdac_envs.mapping.image import ColourImage, load_image, luminance
+from tdac_envs.mapping.image import ColourImage, luminance
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.preprocessing import preprocess, rank_candidates
 
 Point = tuple[int, int]

@@ -32,7 +32,7 @@ CONTROLLERS = ("tdac_agent/builtin/levels/", "tdac_agent/bench/planners/")
 DATA = ("tests/agent/zoo/*/attacks/*", "tests/agent/webots/controllers/*")
 """Controllers that tests give to the judge; some of them are no Python."""
 SINGLE_FILES = (*CONTROLLERS, "tdac_envs/controller_kit/sensors.py")
-LONGEST, MOST_CIRCLES, LARGEST_CIRCLE = 350, 7, 17
+LONGEST, MOST_CIRCLES, LARGEST_CIRCLE = 350, 5, 6
 """Limits: lines of a module without docstrings, circles, modules of a circle."""
 
 

@@ -27,7 +27,7 @@ from tdac_agent.cli.campaign_live import LiveView
 from tdac_agent.cli.campaign_table import make_console, progress_line
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
-from tdac_agent.executors.executor import executor_of
+from tdac_agent.executors.choice import executor_of
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.provider import Provider

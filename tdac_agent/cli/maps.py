@@ -26,7 +26,7 @@ from tdac_envs.map2d.source import units_of
 from tdac_envs.map2d.task import Terrain, make_task
 from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.candidates import Candidate, Preset
-from tdac_envs.mapping.image import load_image
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.map_folder import write_map
 from tdac_envs.mapping.params import (
     FrameName,

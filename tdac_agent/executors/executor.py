@@ -114,14 +114,3 @@ class RetryQueue(Generic[J, O]):
             return Died(job, reason)
         message = f"its process died {MOST_DEATHS} times; last reason: {reason}"
         return Ended(job, self.work.failed(job.name, message))
-
-
-def executor_of(name: str) -> Executor[Any, Any]:
-    """The executor `local` or `ray`."""
-    if name == "ray":
-        from tdac_agent.executors.on_ray import run_on_ray
-
-        return run_on_ray
-    from tdac_agent.executors.local import run_locally
-
-    return run_locally

@@ -14,7 +14,8 @@ from PIL import Image
 from tdac_envs.drawing.canvas import Image as Picture
 from tdac_envs.grid.grid import BoolGrid, clearance
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
-from tdac_envs.mapping.image import MapImage, load_image
+from tdac_envs.mapping.image import MapImage
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.map_folder import png
 from tdac_envs.mapping.params import ReadingOptions
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates

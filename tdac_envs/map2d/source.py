@@ -25,7 +25,8 @@ from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.metric import Point
 from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
-from tdac_envs.mapping.image import check_size, load_image, read_bytes
+from tdac_envs.mapping.image import check_size, read_bytes
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.params import (
     DEFAULT_OPTIONS,
     FrameName,

@@ -92,25 +92,6 @@ def luminance(colour: ColourImage) -> GreyImage:
     return np.asarray(np.rint(colour @ _BT709), np.uint8)
 
 
-def load_image(path: str | Path) -> MapImage:
-    """Reads a picture, a ROS `map.yaml`, a MovingAI `.map` or a `.npy` grid.
-
-    Raises:
-        MapError: The file is missing, unreadable, too large or of a single colour.
-    """
-    from tdac_envs.mapping.map_files import read_grid, read_movingai, read_ros_yaml
-
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix in {".yaml", ".yml"}:
-        return read_ros_yaml(path)
-    if suffix == ".map":
-        return read_movingai(path)
-    if suffix == ".npy":
-        return read_grid(path)
-    return read_picture(path)
-
-
 def read_picture(path: Path) -> MapImage:
     """Reads a PNG, JPEG, PGM, BMP, GIF, TIFF or WebP file of any depth."""
     data = read_bytes(path)

@@ -19,8 +19,26 @@ from tdac_envs.mapping.image import (
     from_array,
     luminance,
     read_bytes,
+    read_picture,
 )
 from tdac_envs.mapping.ros_rule import RosMap, ros_cells, ros_notes
+
+
+def load_image(path: str | Path) -> MapImage:
+    """Reads a picture, a ROS `map.yaml`, a MovingAI `.map` or a `.npy` grid.
+
+    Raises:
+        MapError: The file is missing, unreadable, too large or of a single colour.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix in {".yaml", ".yml"}:
+        return read_ros_yaml(path)
+    if suffix == ".map":
+        return read_movingai(path)
+    if suffix == ".npy":
+        return read_grid(path)
+    return read_picture(path)
 
 
 def read_ros_yaml(path: Path) -> MapImage:

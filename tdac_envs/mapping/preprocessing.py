@@ -13,7 +13,8 @@ from tdac_envs.core.errors import PolarityError, RefusedError, TaskError
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.mapping.candidates import Candidate, Preset, ranked
-from tdac_envs.mapping.image import MapImage, from_array, load_image
+from tdac_envs.mapping.image import MapImage, from_array
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.params import (
     DEFAULT_OPTIONS,
     MapParams,

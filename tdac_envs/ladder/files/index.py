@@ -14,7 +14,8 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json, printable, read_file
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.files.found import FoundWorld
 from tdac_envs.map2d.source import prepare
-from tdac_envs.mapping.image import load_image, luminance
+from tdac_envs.mapping.image import luminance
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.params import ReadingOptions
 
 INDEX = "index.json"

@@ -44,7 +44,7 @@ from tdac_agent.training.plan import read_plan
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import check, parse_json, parse_yaml
 from tdac_envs.map2d.source import prepare
-from tdac_envs.mapping.image import load_image
+from tdac_envs.mapping.map_files import load_image
 
 Reader = Callable[[Path], object]
 

@@ -13,7 +13,8 @@ from PIL import Image
 from tdac_envs.core.errors import MapError
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.metric import to_metres, to_pixels
-from tdac_envs.mapping.image import from_array, load_image, luminance
+from tdac_envs.mapping.image import from_array, luminance
+from tdac_envs.mapping.map_files import load_image
 
 WALLS = np.zeros((40, 60), np.bool_)
 WALLS[:4] = WALLS[-4:] = WALLS[:, :4] = WALLS[:, -4:] = WALLS[10:30, 28:32] = True

@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tdac_envs.mapping.binarize import otsu, unknown_level
-from tdac_envs.mapping.image import ColourImage, GreyImage, load_image, luminance
+from tdac_envs.mapping.image import ColourImage, GreyImage, luminance
 from tdac_envs.mapping.lighting import photographed
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.preprocessing import preprocess, rank_candidates
 from tdac_envs.mapping.scene import MapReading
 

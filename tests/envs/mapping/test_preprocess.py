@@ -19,7 +19,8 @@ from tdac_envs.core.errors import MapError, TaskError
 from tdac_envs.grid.grid import body_free, clearance
 from tdac_envs.grid.pieces import nearest_free
 from tdac_envs.mapping.cleanup import cleanings
-from tdac_envs.mapping.image import load_image, luminance
+from tdac_envs.mapping.image import luminance
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.map_folder import FILES, planned_path, write_map
 from tdac_envs.mapping.params import MapParams
 from tdac_envs.mapping.preprocessing import preprocess, rank_candidates

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from tdac_envs.core.errors import MapError
-from tdac_envs.mapping.image import MapImage, load_image
+from tdac_envs.mapping.image import MapImage
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.preprocessing import preprocess
 
 LEVELS = np.arange(256, dtype=np.uint8)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tdac_envs import MapError, OccupancyGrid, preprocess
-from tdac_envs.mapping.image import load_image
+from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.ros_writer import write_ros_map
 
 
