@@ -26,6 +26,7 @@ from tdac_agent.runs.resume import (
 )
 from tdac_agent.runs.run_record import AGENT, Run, load_run
 from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.tasks.task_file import TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
@@ -59,7 +60,7 @@ def run(
         as_json: Whether to print the run record as JSON.
     """
     check_tier(wanted["tier"])
-    check_ready((wanted["learner"], wanted["optimizer"]), wanted)
+    check_models(wanted)
     console = Console(stderr=as_json)
     source = None if start_from is None else read_text(start_from)
     with console.status("preparing the task …"):
@@ -107,6 +108,18 @@ def resume(
     with console.status("preparing the task …"):
         wanted = resume_arguments(folder, {**given, **settings}, trust=trust)
     return synthesise_and_show(wanted, console)
+
+
+def check_models(wanted: dict[str, Any]) -> None:
+    """Checks the models of a new run before its task is loaded; see `check_ready`.
+
+    Args:
+        wanted: Arguments of `synthesize`.
+    """
+    names = [wanted["learner"], wanted["optimizer"] or wanted["learner"]]
+    loop = (wanted["patience"], wanted["improve"])
+    checked_vision(wanted["vision"], names[1], *loop)
+    check_ready(names, wanted)
 
 
 def check_ready_again(before: Run, given: dict[str, Any]) -> None:

@@ -17,13 +17,12 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.progress import Progress
 from tdac_agent.cli.run_view import print_budget_end, usage_of
-from tdac_agent.cli.synth import check_ready_again, read_text
+from tdac_agent.cli.synth import check_models, check_ready_again, read_text
 from tdac_agent.cli.synth_set_flags import SynthSetFlags
 from tdac_agent.errors import Fault
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.library.listing import next_folder
 from tdac_agent.models.choice import check_name
-from tdac_agent.models.ready import check_ready
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.improvement_record import NOT_SHOWN, is_shown
@@ -109,7 +108,7 @@ def run(
         as_json: Whether to print the run record as JSON.
     """
     check_tier(wanted["tier"])
-    check_ready((wanted["learner"], wanted["optimizer"]), wanted)
+    check_models(wanted)
     assert flags.name is not None
     tasks = load_set(flags.name)
     source = None if start_from is None else read_text(start_from)

@@ -437,7 +437,7 @@ def test_a_key_goes_nowhere_unencrypted(kind, url, safe, options, monkeypatch):
 
 @pytest.mark.slow
 def test_the_command_says_that_a_key_would_be_read(tdac, good, monkeypatch):
-    """Exit 2, one line, nothing sent; with the flag it goes on."""
+    """Exit 2, one line, nothing sent; with the flag the server is looked for."""
     monkeypatch.setenv("OPENAI_API_KEY", "key-12345678")
     words = ["synth", "--task", good, "--learner", "openai:m", "--max-tokens", 0]
     words += ["--base-url", "http://gpu.invalid/v1", "--out", "run"]
@@ -446,4 +446,5 @@ def test_the_command_says_that_a_key_would_be_read(tdac, good, monkeypatch):
     assert "would go unencrypted to http://gpu.invalid/v1: use https, unset" in err
     assert not Path("run").exists()
     code, _, err = tdac(*words, "--key-over-http")
-    assert (code, err) == (4, "")
+    assert (code, err.count("\n")) == (3, 1)
+    assert "no server answers at http://gpu.invalid/v1" in err

@@ -11,6 +11,7 @@ from small import write_small_task
 from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.map2d.entry import MAP2D
+from tdac_agent.prompting.context import contract_of
 from tdac_agent.prompting.manual import ManualError, interface_of
 from tdac_agent.prompting.prompt import (
     PromptError,
@@ -370,3 +371,11 @@ def test_repair_prompts_hide_the_held_out_starts(name, kind, warm, request):
     assert "jitter 3" not in text
     assert "test_no_collisions" in text
     assert "What happened: nominal: collision in step" in text
+
+
+def test_the_contract_names_what_a_controller_defines(small_task):
+    """For the profile `paper` what the environment lists, else `policy` alone."""
+    names = contract_of(small_task.with_profile("paper"))
+    assert names[0] == "policy"
+    assert {"plan_path", "OccMap2D", "N_RAYS", "run_episode", "main"} < {*names}
+    assert contract_of(small_task.with_profile("policy")) == ("policy",)

@@ -1,0 +1,40 @@
+"""The file in what an agent submits: all of it, or a refusal that does not count."""
+
+import pytest
+
+from tdac_agent.mcp.answers import Refused
+from tdac_agent.mcp.submitted import source_of
+
+FILE = "def policy(obs):\n    return 0.0, 0.0\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [FILE, f"```python\n{FILE}```\n", f"\ufeff```\n{FILE}```", f" ```\n{FILE}```"],
+)
+def test_a_file_is_taken_as_it_is_or_out_of_its_fence(text):
+    """Agents send the file, or an answer with it."""
+    assert source_of(text) == FILE
+
+
+@pytest.mark.parametrize("text", ["x = (\n", "import math\n", "Here it is."])
+def test_what_is_no_controller_is_judged_as_it_is(text):
+    """The tests say what is wrong with it."""
+    assert source_of(text) == text
+
+
+REFUSED = {
+    " \n": "is empty",
+    "x" * 200_001: "200001 bytes",
+    f"```python\n{FILE}": "has no end",
+    f"# ... unchanged ...\n{FILE}": "leaves out code",
+    f"```python\n# ... imports unchanged\n{FILE}```": "leaves out code",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED, ids=range(len(REFUSED)))
+def test_what_is_no_whole_file_does_not_count(text):
+    """Its reason is told, and the budget stays."""
+    with pytest.raises(Refused, match=REFUSED[text]) as caught:
+        source_of(text)
+    assert str(caught.value).endswith("was not judged and does not count")
