@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from tdac_agent.tasks.first_run import CodePart
 from tdac_agent.tasks.setting import JudgedEnv, Nominal, Setting
 from tdac_agent.tasks.units import Point, Units
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template
-    from tdac_agent.tasks.first_run import CodePart
     from tdac_agent.tasks.parts import Pictures, Surroundings
     from tdac_agent.tasks.task import Task
     from tdac_agent.tasks.task_file import TaskFile
@@ -79,14 +79,19 @@ class Environment(ABC):
     def small_env(self) -> JudgedEnv:
         """Returns an environment for warm-ups that is quick to construct."""
 
-    @abstractmethod
-    def code_parts(self, *, movers: bool, worlds: bool = False) -> list[CodePart]:
-        """Returns the parts of the compiled code that tasks need.
+    def code_parts(
+        self,
+        *,
+        movers: bool,  # noqa: ARG002 - for subclasses
+        worlds: bool = False,  # noqa: ARG002
+    ) -> list[CodePart]:
+        """Returns the parts of the compiled code that tasks need; by default, all.
 
         Args:
             movers: Whether there are moving obstacles.
             worlds: Whether the tasks are those of a task set, whose worlds are made.
         """
+        return [CodePart(self.use_kernels, self.kernels, "kernels.drive", 30.0)]
 
     @abstractmethod
     def use_kernels(self) -> None:

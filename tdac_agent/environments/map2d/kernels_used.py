@@ -69,10 +69,10 @@ def _plan_among_movers() -> None:
     drive_by_orca(env.task, Disturbances(), np.random.default_rng(0))
 
 
-ROBOT = CodePart(_drive, "tdac_envs.map2d", "kernels.drive", 7.0)
-MOVERS = CodePart(_drive_among_movers, "tdac_envs.map2d", "among.drive_among", 17.0)
-WORLDS = CodePart(_make_worlds, "tdac_envs.ladder", "dead_ends._mark", 7.0)
-PLANNERS = CodePart(_plan_among_movers, "tdac_envs.ladder", "orca_driver._choose", 7.0)
+ROBOT = CodePart(_drive, "tdac_envs.map2d", "rays.sees", 7.0)
+MOVERS = CodePart(_drive_among_movers, "tdac_envs.map2d", "among.drive_among", 16.0)
+WORLDS = CodePart(_make_worlds, "tdac_envs.ladder", "dead_ends._look", 6.0)
+PLANNERS = CodePart(_plan_among_movers, "tdac_envs.ladder", "orca_driver._choose", 8.0)
 
 
 def use_kernels() -> None:

@@ -1,5 +1,6 @@
 """What is compiled before the first run: what this run needs, and nothing else."""
 
+import importlib
 import inspect
 import json
 import subprocess
@@ -91,12 +92,21 @@ def test_only_code_that_is_not_cached_is_compiled():
     assert used == ["new"]
 
 
+@pytest.mark.parametrize("env_id", ["TDAC-Map2D-v0", "TDAC-EPuck-v0"])
+def test_the_mark_of_a_part_is_a_kernel(env_id):
+    """Only a kernel is kept on disk, so another function would never be found."""
+    for part in environment(env_id).code_parts(movers=True, worlds=True):
+        module, name = part.last.split(".")
+        found = getattr(importlib.import_module(f"{part.package}.{module}"), name)
+        assert found in KERNELS
+
+
 @pytest.mark.parametrize(
     ("movers", "worlds", "last"),
     [
-        (False, False, ["kernels.drive"]),
-        (True, False, ["kernels.drive", "among.drive_among"]),
-        (False, True, ["kernels.drive", "dead_ends._mark"]),
+        (False, False, ["rays.sees"]),
+        (True, False, ["rays.sees", "among.drive_among"]),
+        (False, True, ["rays.sees", "dead_ends._look"]),
     ],
 )
 def test_movers_and_worlds_are_parts_of_their_own(movers, worlds, last):
