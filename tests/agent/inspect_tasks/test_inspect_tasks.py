@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,15 +12,12 @@ import anyio
 import pytest
 from installed import installation
 
-pytest.importorskip("inspect_ai")
-
-from inspect_ai.log import list_eval_logs, read_eval_log
-
 from tdac_agent.problems.problem import problem_of
 from tdac_agent.tasks.task_file import bundled_tasks
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import set_names
 
+pytestmark = pytest.mark.skipif(find_spec("inspect_ai") is None, reason="no Inspect")
 MOCK_EVAL = Path(__file__).with_name("mock_eval.py")
 ROOT = Path(__file__).parents[3]
 NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
@@ -57,6 +55,8 @@ def evaluated(folder, python=sys.executable, **request):
 
 
 def log_in(logs):
+    from inspect_ai.log import list_eval_logs, read_eval_log  # slow to import
+
     [info] = list_eval_logs(str(logs))
     log = read_eval_log(info)
     assert log.status == "success", log.error

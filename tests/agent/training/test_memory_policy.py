@@ -1,20 +1,22 @@
 """The recurrent policy whose layers see the observation, too."""
 
+from importlib.util import find_spec
+
 import pytest
 
-pytest.importorskip("sb3_contrib")
-torch = pytest.importorskip("torch")
-
-from sb3_contrib.common.recurrent.policies import (  # noqa: E402
-    RecurrentActorCriticPolicy,
+pytestmark = pytest.mark.skipif(
+    find_spec("sb3_contrib") is None, reason="no sb3_contrib"
 )
-
-from tdac_agent.episodes.memory_policy import MemoryPolicy  # noqa: E402
 
 
 @pytest.mark.parametrize(("count", "steps"), [(5, 12), (5, 1), (1, 12)])
 def test_its_memory_is_that_of_sb3_contrib(count, steps):
     """Outputs, states and gradients, if some sequences begin with an episode."""
+    import torch  # slow to import
+    from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
+
+    from tdac_agent.episodes.memory_policy import MemoryPolicy
+
     lstm = torch.nn.LSTM(7, 16)
     features = torch.rand(count * steps, 7)
     states = torch.rand(1, count, 16), torch.rand(1, count, 16)
