@@ -28,7 +28,7 @@ from tdac_agent.runs.run_record import AGENT, Run, load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.tasks.task import Task, display_name
-from tdac_agent.tasks.task_file import TASK_FILE, Profile
+from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
 from tdac_agent.verification.verify import read_source
@@ -125,18 +125,20 @@ def check_models(wanted: dict[str, Any]) -> None:
 def check_ready_again(before: Run, given: dict[str, Any]) -> None:
     """Checks the models of a run of this installation before its task is loaded.
 
-    Another installation's run may name a server that needs the user's permission.
+    Another installation's run may name a server that needs the user's permission. A
+    run that was hardly begun, or that other models are given for, is refused later.
 
     Args:
         before: The run.
         given: Arguments given again; None keeps the run's limit.
     """
-    if is_own_folder(before):
-        known = {name: getattr(before, name) for name in RECORDED}
-        new = {name: value for name, value in given.items() if value is not None}
-        wanted = {**known, **new}
-        names = (wanted["learner"], wanted["optimizer"])
-        check_ready(names, wanted)
+    known = {name: getattr(before, name) for name in RECORDED}
+    new = {name: value for name, value in given.items() if value is not None}
+    wanted, models = {**known, **new}, ("learner", "optimizer")
+    same = all(wanted[name] == known[name] for name in models)
+    files = (before.folder / TASK_FILE, before.folder / SET_FILE)
+    if same and is_own_folder(before) and any(map(Path.is_file, files)):
+        check_ready([wanted[name] for name in models], wanted)
 
 
 def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:

@@ -196,6 +196,7 @@ class Peer(Child):
 
     def __init__(self, script: list[Move]) -> None:
         self.tier, self.limits = "none", LIMITS
+        self.pid = os.getpid()  # a thread has no CPU time of its own
         self._line = RunQueue("thread-self")
         ends = [os.pipe() for _ in range(4)]
         (requests, to), (answers, back), (output, printed), (life, lifeline) = ends
