@@ -18,6 +18,8 @@ SHORT = 1 << 12
 KEPT_OUTPUT = 4000
 # Most answers come sooner; run-queue wait time is measured only for later ones.
 SOON_SECONDS = 0.25
+# A pipe holds 64 kB, which is read in so many pieces.
+MOST_LATE_READS = 1 + (1 << 16) // SHORT
 # A child is busy if it was on a CPU for this share of its time outside the run queue.
 # Below it the machine may be to blame, e.g. the host of a virtual machine.
 BUSY_SHARE = 0.9
@@ -81,7 +83,9 @@ class Channel:
         self._line, self._own = line, RunQueue("thread-self")
         # Last reading of the run-queue statistics: when, values, for which deadline.
         self._seen_at, self._seen_times, self._seen_deadline = 0.0, (0.0, 0.0), 0.0
-        self._seen_own, self._late_deadline = 0.0, 0.0
+        self._seen_own = 0.0
+        self._late_deadline: Deadline = 0.0
+        self._late_reads = 0
         self._requests, self._answers, self._output = requests, answers, output
         self._frame_bytes, self._output_bytes = frame_bytes, output_bytes
         self._buffer = b""
@@ -154,9 +158,16 @@ class Channel:
 
     def _events(self, deadline: Deadline) -> list[tuple[int, int]]:
         if callable(deadline):
-            while (left := deadline()) > 0:
-                if events := self._poll.poll(math.ceil(left * 1000)):
+            try:
+                while (left := deadline()) > 0:
+                    if events := self._poll.poll(math.ceil(left * 1000)):
+                        return events
+            except DeadlineError:
+                if events := self._late_answer(deadline):
                     return events
+                raise
+            if events := self._late_answer(deadline):
+                return events
             raise DeadlineError(busy=False)
         left = deadline - time.monotonic()
         if left > SOON_SECONDS and self._seen_deadline != deadline:
@@ -169,21 +180,21 @@ class Channel:
             events = self._poll.poll(math.ceil(left * 1000))
             if events:
                 return events
-        return self._late_answer(deadline)
-
-    def _late_answer(self, deadline: float) -> list[tuple[int, int]]:
-        """Return an answer that is there, but that the judge had no CPU to read.
-
-        Once for each deadline, so that nothing can trickle in afterwards.
-
-        Raises:
-            DeadlineError: There is none.
-        """
-        events = [event for event in self._poll.poll(0) if event[0] == self._answers]
-        if events and self._late_deadline != deadline:
-            self._late_deadline = deadline
+        if events := self._late_answer(deadline):
             return events
         raise DeadlineError(busy=self._was_busy(deadline))
+
+    def _late_answer(self, deadline: Deadline) -> list[tuple[int, int]]:
+        """Return the event of an answer that the judge had no CPU to read; or none.
+
+        All of it must be there, and it is read in a few pieces, so that nothing can
+        trickle in afterwards.
+        """
+        if self._late_deadline != deadline:
+            self._late_deadline, self._late_reads = deadline, 0
+        self._late_reads += 1
+        events = [event for event in self._poll.poll(0) if event[0] == self._answers]
+        return events if self._late_reads <= MOST_LATE_READS else []
 
     def _was_busy(self, deadline: float) -> bool:
         if self._seen_deadline != deadline:

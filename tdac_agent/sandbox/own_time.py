@@ -70,25 +70,32 @@ class OwnTime:
         seconds: Time that it may compute, and sleep.
         look: Returns its CPU time and the run-queue wait time since it exists, and
             whether it is ready. It is called only when time may be used up.
+        judge_waited: Returns the run-queue wait time of the judge's thread. What it
+            waits between the turns is not part of them.
     """
 
     def __init__(
-        self, seconds: float, look: Callable[[], tuple[float, float, bool]]
+        self,
+        seconds: float,
+        look: Callable[[], tuple[float, float, bool]],
+        judge_waited: Callable[[], float],
     ) -> None:
-        self._seconds, self._look = seconds, look
+        self._seconds, self._look, self._judge_waited = seconds, look, judge_waited
+        self._judge_before, self._judge = 0.0, 0.0
         self._ran, self._waited, _ = look()
         self._wall, self._next_look = 0.0, seconds
         self._began, self._end = 0.0, math.inf
 
     def begin_turn(self, at_most: float) -> None:
         """Begins a turn that may last `at_most` seconds, whatever happens in it."""
-        self._began = time.monotonic()
+        self._began, self._judge_before = time.monotonic(), self._judge_waited()
         self._end = self._began + at_most
 
     def end_turn(self) -> float:
         """Ends the turn; returns its length, s."""
         turn = time.monotonic() - self._began
         self._wall += turn
+        self._judge += self._judge_waited() - self._judge_before
         return turn
 
     def left(self) -> float:
@@ -106,7 +113,9 @@ class OwnTime:
 
     def _checked(self, wall: float) -> float:
         ran, waited, ready = self._look()
-        spent = Spent(wall, ran - self._ran, waited - self._waited, ready)
+        judge = self._judge + self._judge_waited() - self._judge_before
+        waited = waited - self._waited + judge
+        spent = Spent(wall, ran - self._ran, waited, ready)
         cause = blame(spent, self._seconds)
         if cause == "machine":
             raise StarvedError

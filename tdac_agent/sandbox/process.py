@@ -259,7 +259,7 @@ class Child:
             timeout: Seconds that the controller may compute, and sleep, in total.
             max_left: Returns the current upper bound on the seconds left.
         """
-        own = OwnTime(timeout, self._look)
+        own = OwnTime(timeout, self._look, RunQueue("thread-self").waited)
         left = max_left()
         reply: tuple[Kind, Any] = (kind, value)
         while True:
@@ -282,9 +282,8 @@ class Child:
             left = min(left, max_left())
 
     def _look(self) -> tuple[float, float, bool]:
-        """Return CPU time, run-queue wait time with the judge's own, and readiness."""
-        waited = self._line.waited() + RunQueue("thread-self").waited()
-        return self.cpu_seconds(), waited, self._line.is_ready()
+        """Return CPU time, run-queue wait time, and whether it is ready."""
+        return self.cpu_seconds(), self._line.waited(), self._line.is_ready()
 
 
 def _split(

@@ -2,7 +2,8 @@
 
 import pytest
 
-from tdac_agent.sandbox.own_time import Spent, blame, seconds_to_next_look
+from tdac_agent.sandbox.channel import DeadlineError
+from tdac_agent.sandbox.own_time import OwnTime, Spent, blame, seconds_to_next_look
 from tdac_agent.sandbox.waiting import MOST_WAITED_SECONDS
 
 LAST = 2 * 8 + MOST_WAITED_SECONDS
@@ -40,3 +41,24 @@ def test_the_next_look_is_not_before_time_can_be_used_up():
     spent = Spent(wall=20.0, ran=3.0, waited=10.0, ready=False)
     assert seconds_to_next_look(spent, 8.0) == 1.0
     assert 0.0 < seconds_to_next_look(spent, 3.0) < 1.0
+
+
+def test_what_the_judge_waits_between_the_turns_is_no_excuse():
+    """A program that does nothing in its turns is late, however busy the judge is."""
+    judge = [0.0]
+    own = OwnTime(1e-9, lambda: (0.0, 0.0, False), lambda: judge[0])
+    own.begin_turn(60.0)
+    own.end_turn()
+    judge[0] += 1000.0
+    own.begin_turn(60.0)
+    with pytest.raises(DeadlineError):
+        own.left()
+
+
+def test_what_the_judge_waits_in_a_turn_is_not_the_programs():
+    """An answer may be there that the judge has no CPU to read."""
+    judge = [0.0]
+    own = OwnTime(1e-9, lambda: (0.0, 0.0, False), lambda: judge[0])
+    own.begin_turn(60.0)
+    judge[0] += 10.0
+    assert own.left() > 0.0

@@ -55,7 +55,7 @@ def test_a_verification_is_not_failed_by_other_work(
 def ends():
     """A channel, and the descriptors of the child's side of it."""
     (theirs, requests), (answers, to), (output, printed) = (os.pipe() for _ in range(3))
-    channel = Channel(requests, answers, output, 1000, 1000, RunQueue(os.getpid()))
+    channel = Channel(requests, answers, output, 1 << 16, 1000, RunQueue(os.getpid()))
     yield channel, to, printed
     channel.close()
     for descriptor in (theirs, to, printed):
@@ -69,6 +69,23 @@ def test_an_answer_that_is_there_is_read(ends):
     os.write(to, HEADER.pack(2, 32, 7) + b"ok")
     assert channel.receive(passed) == (32, 7, b"ok")
     os.write(to, b"\0")
+    with pytest.raises(DeadlineError):
+        channel.receive(passed)
+
+
+def no_time():
+    """A deadline that has passed, as a function."""
+    raise DeadlineError(busy=False)
+
+
+@pytest.mark.parametrize("deadline", [-5.0, lambda: 0.0, no_time])
+def test_a_long_answer_is_read_to_its_end(ends, deadline):
+    """All of it is there, although one read does not take it."""
+    channel, to, _ = ends
+    passed = deadline if callable(deadline) else time.monotonic() + deadline
+    answer = bytes(10_000)
+    os.write(to, HEADER.pack(len(answer), 32, 7) + answer)
+    assert channel.receive(passed) == (32, 7, answer)
     with pytest.raises(DeadlineError):
         channel.receive(passed)
 
