@@ -28,6 +28,7 @@ EXTRAS = {
     "ray": "ray",
     "inspect": "inspect_ai",
     "mcp": "mcp",
+    "studio": "nicegui",
 }
 TRIALS = (
     ("compiled step", "compiled_step", True),

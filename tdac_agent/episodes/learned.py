@@ -46,7 +46,7 @@ _NETWORKS = {
 _ACTIVATIONS = {"ReLU", "Tanh", "ELU", "LeakyReLU", "GELU", "SiLU", "Sigmoid", "SELU"}
 
 
-# The noise of a policy, with which its class calculates, is smaller.
+# Layers up to this size are built in memory: the policy class computes its noise there.
 _SMALL = 10_000
 
 
@@ -259,6 +259,6 @@ def _policy_kwargs(saved: SavedNetwork) -> dict[str, Any]:
     if saved.module == _WITHOUT_SDE:
         kwargs.pop("use_sde")
     elif saved.module != _SAC:
-        # Without numbers there is nothing to begin well with.
+        # `ortho_init` needs numbers, and these layers have none.
         kwargs["ortho_init"] = False
     return kwargs

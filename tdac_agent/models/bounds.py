@@ -1,4 +1,4 @@
-"""Bounds on answers, whoever gives them."""
+"""Bounds on the answers of all providers."""
 
 from __future__ import annotations
 

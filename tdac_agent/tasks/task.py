@@ -152,19 +152,9 @@ class Task:
 def read_task(
     source: str | Path | TaskFile, *, base: Path | None = None, trust: bool = False
 ) -> Task:
-    """Reads and checks a task.
+    """As `load_task` of `tdac_agent.runs.ownership`, but runs are trusted like others.
 
-    Args:
-        source: Name of a bundled task, path of a `task.yaml`, folder that contains
-            one, or its contents.
-        base: Folder that relative paths in the contents refer to. Default: the task
-            file's folder.
-        trust: Whether the tests that a task file brings may run.
-
-    Raises:
-        TaskError: The file or the task cannot be used; the message says what to do.
-        MapError: The map cannot be used.
-        WorldError: The world cannot be used.
+    The judge uses it, which gets the tests that may run with each job.
     """
     bundled = None if isinstance(source, TaskFile) else bundled_task(str(source))
     if isinstance(source, TaskFile):

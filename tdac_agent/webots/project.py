@@ -6,6 +6,7 @@ folders, so that `../../libraries` and `../OTHER` lead to the same files as in W
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 from tdac_agent.errors import ControllerFileError
@@ -88,9 +89,18 @@ def has_module(project: Path | None, name: str) -> str:
         return ""
     for folder in (CONTROLLERS, LIBRARIES, "."):
         for path in (project / folder / name, project / folder / f"{name}.py"):
-            if path.exists():
-                return str(path.relative_to(project))
+            with suppress(OSError):  # such as a name that is too long
+                if path.exists():
+                    return str(path.relative_to(project))
     return ""
+
+
+def is_beside(controller: Path, name: str) -> bool:
+    """Whether a Python module is in the folder above the controller's own."""
+    above = controller.resolve().parent.parent
+    with suppress(OSError):  # such as a name that is too long
+        return (above / name).is_dir() or (above / f"{name}.py").is_file()
+    return False
 
 
 def _folders(folder: Path) -> list[Path]:

@@ -13,7 +13,7 @@ from tdac_agent.sandbox import (
     ControllerFault,
     ControllerTimeout,
 )
-from tdac_agent.webots.project import has_module, project_of
+from tdac_agent.webots.project import has_module, is_beside, project_of
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.webots.log import Log, driven_length
 from tdac_envs.webots.stage import ControllerWorld
@@ -147,8 +147,7 @@ def _described(
             f"{text}; {place} of the project is not on Python's path, nor is it in "
             "Webots: extend sys.path, or put a copy of it beside the controller"
         )
-    beside = controller.resolve().parent.parent
-    if (beside / name).is_dir() or (beside / f"{name}.py").is_file():
+    if is_beside(controller, name):
         return (
             f"{text}; tdac copies only the controller's own folder: put a copy of "
             f"{name}, from the folder above, beside the controller"
