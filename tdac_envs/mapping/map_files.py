@@ -98,8 +98,13 @@ def read_grid(path: Path) -> MapImage:
     if cells.ndim != 2:
         raise MapError(f"{path}: expected a 2-D grid of cells, got shape {cells.shape}")
     check_size(path.name, cells.shape[1], cells.shape[0])
+    if cells.dtype.kind in "iu" and np.isin(cells, (0, 1)).all():
+        cells = cells == 1
     if cells.dtype != np.bool_:
-        raise MapError(f"{path}: expected a bool array, got {cells.dtype}")
+        raise MapError(
+            f"{path}: expected bool cells (True = occupied) or integers 0 and 1, got "
+            f"{cells.dtype}"
+        )
     return replace(from_array(cells), name=printable(path.name))
 
 

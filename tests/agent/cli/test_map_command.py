@@ -141,10 +141,13 @@ def test_a_numpy_grid(tdac, tmp_path):
     assert code == 0
     assert out.startswith("grid.npy, 160 x 120 px: obstacles are those of the grid")
     np.testing.assert_array_equal(np.load("grid-map/occupancy.npy"), small_cells())
-    np.save(tmp_path / "grey.npy", small_cells().astype(np.uint8))
+    np.save(tmp_path / "whole.npy", small_cells().astype(np.int64))
+    assert tdac("map", tmp_path / "whole.npy", *ends)[0] == 0
+    np.testing.assert_array_equal(np.load("whole-map/occupancy.npy"), small_cells())
+    np.save(tmp_path / "grey.npy", small_cells().astype(np.uint8) * 255)
     code, _, err = tdac("map", tmp_path / "grey.npy", *ends)
     assert (code, err.count("\n")) == (2, 1)
-    assert "expected a bool array, got uint8" in err
+    assert "(True = occupied) or integers 0 and 1, got uint8" in err
 
 
 @pytest.mark.parametrize(
