@@ -70,8 +70,8 @@ class OwnTime:
         seconds: Time that it may compute, and sleep.
         look: Returns its CPU time and the run-queue wait time since it exists, and
             whether it is ready. It is called only when time may be used up.
-        judge_waited: Returns the run-queue wait time of the judge's thread. What it
-            waits between the turns is not part of them.
+        judge_waited: Returns the run-queue wait time of the judge's thread, which must
+            be the calling one. What it waits between the turns is not part of them.
     """
 
     def __init__(
@@ -81,21 +81,25 @@ class OwnTime:
         judge_waited: Callable[[], float],
     ) -> None:
         self._seconds, self._look, self._judge_waited = seconds, look, judge_waited
-        self._judge_before, self._judge = 0.0, 0.0
+        self._judge_before, self._between = judge_waited(), 0.0
+        self._ended, self._ended_cpu = time.monotonic(), time.thread_time()
         self._ran, self._waited, _ = look()
         self._wall, self._next_look = 0.0, seconds
         self._began, self._end = 0.0, math.inf
 
     def begin_turn(self, at_most: float) -> None:
         """Begins a turn that may last `at_most` seconds, whatever happens in it."""
-        self._began, self._judge_before = time.monotonic(), self._judge_waited()
+        self._began = time.monotonic()
         self._end = self._began + at_most
+        # Between two turns the judge computes, or waits: this is cheaper to look up.
+        computed = time.thread_time() - self._ended_cpu
+        self._between += max(0.0, self._began - self._ended - computed)
 
     def end_turn(self) -> float:
         """Ends the turn; returns its length, s."""
-        turn = time.monotonic() - self._began
+        self._ended, self._ended_cpu = time.monotonic(), time.thread_time()
+        turn = self._ended - self._began
         self._wall += turn
-        self._judge += self._judge_waited() - self._judge_before
         return turn
 
     def left(self) -> float:
@@ -113,8 +117,8 @@ class OwnTime:
 
     def _checked(self, wall: float) -> float:
         ran, waited, ready = self._look()
-        judge = self._judge + self._judge_waited() - self._judge_before
-        waited = waited - self._waited + judge
+        judge = self._judge_waited() - self._judge_before - self._between
+        waited = waited - self._waited + max(0.0, judge)
         spent = Spent(wall, ran - self._ran, waited, ready)
         cause = blame(spent, self._seconds)
         if cause == "machine":

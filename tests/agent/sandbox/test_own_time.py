@@ -1,5 +1,7 @@
 """Only time on a CPU and time asleep are a program's own."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from tdac_agent.sandbox.channel import DeadlineError
@@ -43,14 +45,21 @@ def test_the_next_look_is_not_before_time_can_be_used_up():
     assert 0.0 < seconds_to_next_look(spent, 3.0) < 1.0
 
 
-def test_what_the_judge_waits_between_the_turns_is_no_excuse():
+def test_what_the_judge_waits_between_the_turns_is_no_excuse(monkeypatch):
     """A program that does nothing in its turns is late, however busy the judge is."""
-    judge = [0.0]
-    own = OwnTime(1e-9, lambda: (0.0, 0.0, False), lambda: judge[0])
+    now, judge = [0.0], [0.0]
+    clock = SimpleNamespace(monotonic=lambda: now[0], thread_time=lambda: 0.0)
+    monkeypatch.setattr("tdac_agent.sandbox.own_time.time", clock)
+    own = OwnTime(8.0, lambda: (0.0, 0.0, False), lambda: judge[0])
+    for _ in range(7):
+        own.begin_turn(60.0)
+        now[0] += 1.0
+        assert own.left() > 0.0
+        own.end_turn()
+        now[0] += 5.0
+        judge[0] += 5.0
     own.begin_turn(60.0)
-    own.end_turn()
-    judge[0] += 1000.0
-    own.begin_turn(60.0)
+    now[0] += 1.0
     with pytest.raises(DeadlineError):
         own.left()
 
