@@ -11,6 +11,7 @@ from typing import Any
 import pandas as pd
 
 from tdac_agent.bench.arena import (
+    DRIVEN,
     Arena,
     Part,
     Watch,
@@ -22,7 +23,7 @@ from tdac_agent.bench.compared import overall_of, pairs_of
 from tdac_agent.bench.entrants import named
 from tdac_agent.bench.figures import draw_figures
 from tdac_agent.bench.jobs import Drive, Reached, drive_all, drives_of
-from tdac_agent.bench.page import write_page
+from tdac_agent.bench.page import PAGE, write_page
 from tdac_agent.bench.record import Bench, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.salt import SEALED, drawn_salt
@@ -42,6 +43,10 @@ WORLDS = 100
 RESULTS, WORLD_TABLE, TIMING = "bench.json", "worlds.csv", "timing.csv"
 SALT = "salt.hex"
 ENTRANTS = "entrants.json"
+WRITTEN = (
+    *(RESULTS, WORLD_TABLE, TIMING, SALT, ENTRANTS, PAGE, "*.svg"),
+    *(SEALED, DRIVEN),
+)
 """Record of what drives on hidden worlds, written before their salt is drawn."""
 SPLITS = "dev", "test", "hidden"
 
@@ -99,7 +104,7 @@ def bench(
     _check_sets(tasks, split, worlds)
     parts = [part_of(each, own) for own in tasks for each in wanted]
     with contextlib.ExitStack() as stack:
-        stack.enter_context(own_folder(out, "bench"))
+        stack.enter_context(own_folder(out, *WRITTEN, who="bench"))
         drawn = split == "hidden" and salt_file is None
         if drawn:
             _record(out, parts, worlds)

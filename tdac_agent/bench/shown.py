@@ -12,7 +12,7 @@ from tdac_agent.bench.arena import DRIVEN, folder_of, sealed_episodes, world_row
 from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, publish
 from tdac_agent.bench.compared import Driven, overall_of, pairs_of
 from tdac_agent.bench.figures import draw_figures
-from tdac_agent.bench.page import write_page
+from tdac_agent.bench.page import PAGE, write_page
 from tdac_agent.bench.record import Bench, BenchRow, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.salt import SEALED
@@ -49,7 +49,8 @@ def write_merged(folders: Sequence[Path], out: Path) -> Bench:
     found = merged(folders)
     table = pd.concat([_table(folder) for folder in folders])
     table = table.drop_duplicates(["set", "entrant", "file", "index"])
-    with own_folder(out, "bench"):
+    written = RESULTS, WORLD_TABLE, PAGE, "*.svg"
+    with own_folder(out, *written, who="bench"):
         if any((out / name).exists() for name in (DRIVEN, SEALED)):
             raise RunError(f"{out} has a bench of its own: give another --out")
         figures = draw_figures(found, table, out)

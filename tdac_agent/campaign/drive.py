@@ -14,8 +14,7 @@ from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
 from tdac_agent.campaign.progress import Progress, RunEnded, RunUpdate
 from tdac_agent.executors.executor import Ended, Executor
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.links import refuse_links
-from tdac_agent.storage.locks import hold
+from tdac_agent.storage.locks import own_folder
 
 CONFIG_FILE = "campaign.yaml"
 Watch = Callable[[RunUpdate], None]
@@ -101,24 +100,20 @@ def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
         config: Text of the campaign file, which is copied to the folder.
 
     Raises:
-        CampaignError: The folder cannot be used, or another driver uses it.
-        RunError: A link leads out of it.
+        RunError: The folder cannot be used, another driver uses it, or a link leads
+            out of it.
     """
-    lock = out / f".driver-{shard.i}-of-{shard.n}.lock"
+    lock = f".driver-{shard.i}-of-{shard.n}.lock"
     with ExitStack() as stack:
         try:
             if out.is_dir() and any(out.iterdir()) and not (out / RUNS).is_dir():
                 reason = "is not empty; give another folder with --out"
                 raise CampaignError(f"{out} {reason}")
-            (out / RUNS).mkdir(parents=True, exist_ok=True)
-            refuse_links(out)
-            mine = stack.enter_context(hold(lock))
-            if mine:
-                write_atomic(out / CONFIG_FILE, config)
+            stack.enter_context(own_folder(out, "*", lock=lock))
+            (out / RUNS).mkdir(exist_ok=True)
+            write_atomic(out / CONFIG_FILE, config)
         except OSError as error:
             raise CampaignError(f"cannot write to {out}: {error.strerror}") from error
-        if not mine:
-            raise CampaignError(f"another process is at work on {out}")
         yield
 
 

@@ -140,8 +140,9 @@ def evaluate(
     seeds = episode_seeds(seed, episodes)
     results: list[Result] = []
     timings: list[Timing] = []
+    written = RESULTS, EPISODE_TABLE, TIMING, "*.png"
     with contextlib.ExitStack() as stack:
-        store = stack.enter_context(open_store(out))
+        store = stack.enter_context(open_store(out, *written))
         warm = judge or stack.enter_context(WarmJudge())
         for task in loaded:
             folder = Path(

@@ -14,6 +14,7 @@ from tdac_agent.evaluation.robust_report import (
 )
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.provenance import origin
@@ -74,8 +75,11 @@ def verify_robust(
         TaskError: A number is invalid, or the environment does not have a part of the
             disturbance.
         Fault: The sandbox is broken; the controller neither passes nor fails.
+        RunError: A link leads out of `out`, where the report is written.
     """
     began = time.monotonic()
+    if out is not None:
+        refuse_links(out, "robust.json")
     whole_number("episodes", episodes, 1, MOST_EPISODES)
     disturbance = disturbance or Disturbance()
     task.disturbed_options(disturbance)

@@ -181,7 +181,8 @@ def _open(out: Path, about: dict[str, Any], stack: contextlib.ExitStack) -> None
     Raises:
         RunError: It cannot be used, or has another evaluation.
     """
-    stack.enter_context(own_folder(out, "evaluation"))
+    written = RESULTS, EPISODE_TABLE, POLICIES
+    stack.enter_context(own_folder(out, *written, who="evaluation"))
     if not (out / RESULTS).is_file():
         return
     try:

@@ -14,14 +14,17 @@ from pathlib import Path
 
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.kept_sets import (
+    REPORT_FILE,
     ROWS_FILE,
     TRAJECTORIES,
+    UNFINISHED,
     keep_report,
     keep_sealed,
     keep_trajectories,
     unfinished,
 )
 from tdac_agent.evaluation.ledger import SEQUENTIAL, HiddenEvaluation, on_record
+from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_report import (
     SetProvenance,
     SetReport,
@@ -32,6 +35,7 @@ from tdac_agent.runs.run_record import load_run
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.first_run import compile_first
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.tasks.registry import environment
@@ -99,7 +103,10 @@ def verify_on_set(
         ControllerFileError: The file cannot be read.
         TaskError: An argument is not valid, or the ledger cannot be used.
         Fault: The sandbox is broken; the controller neither passes nor fails.
+        RunError: A link leads out of `out`, where the results are written.
     """
+    if out is not None:
+        refuse_links(out, REPORT_FILE, UNFINISHED, TRAJECTORIES, SEALED)
     one_of("split", split, JUDGED)
     whole_number("first", first, 0)
     if first > 0 and (worlds is None or split == "hidden"):

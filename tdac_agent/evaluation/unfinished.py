@@ -10,10 +10,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
-from tdac_agent.errors import RunError
 from tdac_agent.storage.files import clear_unfinished
-from tdac_agent.storage.links import refuse_links
-from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.storage.locks import LOCK_FILE, own_folder
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.kept_episodes import SUFFIX
@@ -23,10 +21,14 @@ FOLDER = "unfinished"
 
 
 @contextmanager
-def open_store(out: Path | None) -> Generator[Path]:
+def open_store(out: Path | None, *names: str) -> Generator[Path]:
     """Opens the folder of finished episodes; removes it if the block succeeds.
 
     An interrupted evaluation leaves the folder in `out`; without `out` it is temporary.
+
+    Args:
+        out: The folder of the evaluation.
+        names: What else is written in it, see `refuse_links`.
 
     Raises:
         RunError: The folder cannot be written, another evaluation writes to it, or a
@@ -38,14 +40,8 @@ def open_store(out: Path | None) -> Generator[Path]:
             yield Path(stack.enter_context(folder))
             return
         store = out.absolute() / FOLDER
-        try:
-            store.mkdir(parents=True, exist_ok=True)
-            refuse_links(out)
-            mine = stack.enter_context(hold(store / LOCK_FILE))
-        except OSError as error:
-            raise RunError(f"cannot write to {store}: {error.strerror}") from error
-        if not mine:
-            raise RunError(f"another evaluation writes to {out}; wait until it ends")
+        lock = f"{FOLDER}/{LOCK_FILE}"
+        stack.enter_context(own_folder(out, *names, who="evaluation", lock=lock))
         clear_unfinished(store)
         yield store
         shutil.rmtree(store)

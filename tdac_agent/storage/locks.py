@@ -37,12 +37,16 @@ def hold(file: Path) -> Generator[bool]:
 
 
 @contextmanager
-def own_folder(out: Path, what: str) -> Generator[None]:
+def own_folder(
+    out: Path, *names: str, who: str = "process", lock: str = LOCK_FILE
+) -> Generator[None]:
     """Makes a folder and holds its lock in a `with` block.
 
     Args:
         out: The folder.
-        what: What writes to it, for the message: `evaluation`.
+        names: What is written in it, see `refuse_links`.
+        who: What writes to it, for the message: `evaluation`.
+        lock: The lock file, relative to the folder.
 
     Raises:
         RunError: It cannot be written, another process holds its lock, or a link leads
@@ -51,12 +55,13 @@ def own_folder(out: Path, what: str) -> Generator[None]:
     with ExitStack() as stack:
         try:
             out.mkdir(parents=True, exist_ok=True)
-            refuse_links(out)
-            held = stack.enter_context(hold(out / LOCK_FILE))
+            refuse_links(out, *names, lock.partition("/")[0])
+            (out / lock).parent.mkdir(exist_ok=True)
+            held = stack.enter_context(hold(out / lock))
         except OSError as error:
             raise RunError(f"cannot write to {out}: {error.strerror}") from error
         if not held:
-            raise RunError(f"another {what} writes to {out}; wait until it ends")
+            raise RunError(f"another {who} is at work on {out}; wait until it ends")
         yield
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import importlib.metadata
 import secrets
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,8 +25,7 @@ from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, Run
 from tdac_agent.storage.files import clear_unfinished
 from tdac_agent.storage.journal import read_records, repair_end
-from tdac_agent.storage.links import refuse_links
-from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.installation import drawn_seed, lasting_secret
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
@@ -178,24 +177,14 @@ def settled_seed(
     return drawn_seed() if before is None else before.seed
 
 
-@contextmanager
-def hold_folder(out: Path) -> Generator[None]:
-    """Makes a run folder, and locks it against other processes.
+def hold_folder(out: Path) -> AbstractContextManager[None]:
+    """Makes a run folder, and locks it against other processes in a `with` block.
 
     Raises:
         RunError: The folder cannot be made, another process is at work in it, or a link
             leads out of it.
     """
-    with ExitStack() as stack:
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            refuse_links(out)
-            mine = stack.enter_context(hold(out / LOCK_FILE))
-        except OSError as error:
-            raise RunError(f"cannot write to {out}: {error.strerror}") from error
-        if not mine:
-            raise RunError(f"another process is at work on {out}; wait until it ends")
-        yield
+    return own_folder(out, "*")
 
 
 def open_record(

@@ -73,7 +73,7 @@ def check_extra() -> None:
 def _prepare(folder: Path, plan: TrainingPlan) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        refuse_links(folder)
+        refuse_links(folder, "*")
         used = any(folder.iterdir())
     except OSError as error:
         raise RunError(f"cannot use {folder}: {error.strerror}") from error

@@ -13,6 +13,7 @@ from tdac_agent.episodes.trajectory import Trajectory, nominal_first
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.provenance import origin, sha256_of, versions
 from tdac_agent.tasks.task import Task, display_name, lay_out
@@ -32,6 +33,7 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 EVERY_TASK = Path(__file__).parent / "suite" / "every_task.py"
 DEADLINE_SECONDS = 900.0
 MAX_FILE_BYTES = 64_000_000
+WRITTEN = "report.json", "robust.json", "trajectories"
 
 
 def verify(
@@ -74,8 +76,11 @@ def verify(
     Raises:
         ControllerFileError: The file cannot be read.
         Fault: The sandbox or the suite is broken; this is neither pass nor fail.
+        RunError: A link leads out of `out`, where the results are written.
     """
     began = time.monotonic()
+    if out is not None:
+        refuse_links(out, *WRITTEN)
     source = read_source(controller)
     suites = _suites(task, suite, shipped)
     with contextlib.ExitStack() as stack:

@@ -7,6 +7,7 @@ from tdac_agent.campaign.drive import campaign_folder, run_all
 from tdac_agent.campaign.perform import Outcome, Terms, work_of
 from tdac_agent.campaign.plan import WHOLE, Cell, Plan
 from tdac_agent.campaign.progress import Progress
+from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import MOST_DEATHS, Begun, Died, Ended, RetryQueue
 
 TERMS = Terms("none", 1, None, None, "all")
@@ -97,7 +98,7 @@ def test_a_second_driver_is_refused_and_a_shard_of_its_own_is_not(tmp_path):
     out = tmp_path / "out"
     with campaign_folder(out, WHOLE, "name: x"):
         with (
-            pytest.raises(CampaignError, match="another process is at work"),
+            pytest.raises(RunError, match="another process is at work"),
             campaign_folder(out, WHOLE, "name: x"),
         ):
             pass

@@ -591,7 +591,7 @@ def test_a_killed_evaluation_goes_on(tdac, tmp_path):
     words = ["evaluate", "go-to-goal", "--task", folder, "--episodes", 6, "--out", out]
     with hold(out / FOLDER / LOCK_FILE):
         code, _, errors = tdac(*words)
-    assert (code, "another evaluation writes to" in errors) == (2, True)
+    assert (code, "another evaluation is at work on" in errors) == (2, True)
     code, text, errors = tdac(*words)
     assert code == 0, errors
     assert f"{kept} finished episodes of an interrupted evaluation" in text

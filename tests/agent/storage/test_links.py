@@ -4,17 +4,22 @@ import os
 
 import pytest
 
+from tdac_agent import load_task
 from tdac_agent.errors import RunError
+from tdac_agent.evaluation.robust import verify_robust
+from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.evaluation.unfinished import open_store
 from tdac_agent.runs.run_record import JOURNAL
 from tdac_agent.storage.links import refuse_links
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.synthesis.setup import hold_folder
+from tdac_agent.verification.verify import verify
+from tdac_envs.ladder.task_sets import load_set
 
 HOLDERS = {
     "run": hold_folder,
-    "evaluation": lambda out: own_folder(out, "evaluation"),
-    "store": open_store,
+    "evaluation": lambda out: own_folder(out, "*"),
+    "store": lambda out: open_store(out, "*"),
 }
 
 
@@ -50,4 +55,38 @@ def test_other_links_are_fine(place):
     """Those within the folder, and the folder itself."""
     (place / "run" / "also").symlink_to("inner")
     (place / "named").symlink_to("run")
-    refuse_links(place / "named")
+    refuse_links(place / "named", "*")
+    refuse_links(place / "none", "*")
+
+
+def test_only_what_is_written_counts(place):
+    """A folder that has a `.venv` can be written to."""
+    (place / "run" / ".venv").mkdir()
+    (place / "run" / ".venv" / "python").symlink_to("/usr/bin/python3")
+    refuse_links(place / "run", "report.json", "inner")
+    with open_store(place / "run", "*.png"):
+        (place / "run" / "maze.png").symlink_to("../outside/kept")
+    with pytest.raises(RunError, match=r"maze\.png is a link"):
+        refuse_links(place / "run", "*.png")
+
+
+@pytest.mark.parametrize("name", ["report.json", "robust.json", "trajectories"])
+def test_verify_writes_through_no_link(place, name):
+    """It ends before the controller is tested."""
+    (place / "run" / name).symlink_to("../outside")
+    task = load_task("maze")
+    with pytest.raises(RunError, match=rf"{name} is a link that leads out of"):
+        verify("def policy():\n", task, out=place / "run")
+    assert os.listdir(place / "outside") == ["kept"]
+
+
+def test_other_verifications_write_through_no_link(place):
+    """The disturbed episodes, and the worlds of a set."""
+    run = place / "run"
+    (run / "robust.json").symlink_to("../outside/kept")
+    with pytest.raises(RunError, match=r"robust\.json is a link"):
+        verify_robust("def policy():\n", load_task("maze"), 1, out=run)
+    (run / "sealed").symlink_to("../outside")
+    with pytest.raises(RunError, match=r"sealed is a link"):
+        verify_on_set("def policy():\n", load_set("known"), out=run)
+    assert os.listdir(place / "outside") == ["kept"]
