@@ -1,10 +1,7 @@
 """Write, test and repair robot controllers until they are verified."""
 
-from __future__ import annotations
-
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+# No module is imported here: see `tdac_agent.interpreter`.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from tdac_agent.evaluation.evaluate import evaluate
     from tdac_agent.evaluation.evaluation_report import Evaluation
@@ -59,10 +56,12 @@ _MODULE_OF = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Imports a public name on first use."""
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'tdac_agent' has no attribute {name!r}")
+    from importlib import import_module
+
     return getattr(import_module(f"tdac_agent.{_MODULE_OF[name]}"), name)
 
 

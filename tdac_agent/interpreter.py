@@ -2,13 +2,16 @@
 
 That folder may be somebody else's. With `-m` and `-c`, Python looks there for modules
 first, before its own library; with an empty or relative entry of PYTHONPATH, too.
-"""
 
-from __future__ import annotations
+Until `make_safe` has run, only modules are imported that Python has loaded by itself.
+"""
 
 import os
 import sys
-from collections.abc import Mapping
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 SAFE, PATHS = "PYTHONSAFEPATH", "PYTHONPATH"
 OURS = "tdac"
@@ -22,7 +25,7 @@ def python(*words: str) -> list[str]:
     return [sys.executable, "-P", *words]
 
 
-def safe_environment(given: Mapping[str, str] = os.environ) -> dict[str, str]:
+def safe_environment(given: "Mapping[str, str]" = os.environ) -> dict[str, str]:
     """An environment for Python processes, and for those that they start.
 
     Args:
@@ -39,7 +42,7 @@ def safe_environment(given: Mapping[str, str] = os.environ) -> dict[str, str]:
     return safe
 
 
-def given_environment(safe: Mapping[str, str] = os.environ) -> dict[str, str]:
+def given_environment(safe: "Mapping[str, str]" = os.environ) -> dict[str, str]:
     """The environment as the user gave it, for a program of the user's own.
 
     Args:
@@ -54,7 +57,25 @@ def given_environment(safe: Mapping[str, str] = os.environ) -> dict[str, str]:
 
 
 def make_safe() -> None:
-    """Makes the environment of this process safe, for all processes that it starts."""
+    """Makes this process safe, and its environment for all processes that it starts."""
+    _leave_out(os.environ.get(PATHS, ""))
     safe = safe_environment()
     os.environ.pop(PATHS, None)
     os.environ.update(safe)
+
+
+def _leave_out(given: str) -> None:
+    """Removes from the module path what relative entries of PYTHONPATH have added.
+
+    Python has made them absolute. The folder of this package stays.
+    """
+    own = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    try:
+        added = {
+            os.path.abspath(path)
+            for path in (given.split(os.pathsep) if given else ())
+            if not os.path.isabs(path)
+        }
+    except OSError:  # there is no working directory any more
+        return
+    sys.path[:] = [path for path in sys.path if path == own or path not in added]

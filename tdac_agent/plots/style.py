@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from matplotlib import matplotlib_fname, rc_context, rcdefaults
+from matplotlib import matplotlib_fname, rc_context, rcdefaults, rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -17,6 +17,8 @@ from tdac_agent.storage.files import write_atomic
 # That of the working directory may be anyone's, and can have LaTeX started.
 if not os.path.isabs(matplotlib_fname()):
     rcdefaults()
+    # This is no default: it is kept, and can be any module.
+    rcParams["backend"] = os.environ.get("MPLBACKEND") or "agg"
 
 # Okabe and Ito (2008): distinct with any colour vision and, in this order, in grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -1,6 +1,7 @@
 """No module of the folder in which a process works ever runs."""
 
 import os
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -135,6 +136,36 @@ def test_no_planted_module_runs(kind, planted, tmp_path):
         [sys.executable, str(script)],
         cwd=folder,
         env={**os.environ, "OUT": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=SECONDS,
+        check=False,
+    )
+    assert signs(target) == ""
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("path", [".", "", "src/..", ":/none"])
+def test_the_first_process_imports_nothing_from_a_relative_path(planted, path):
+    """All modules count that Python has not loaded by itself before."""
+    folder, target = planted
+    (folder / "src").mkdir()
+    for name in ("typing", "collections", "importlib/abc", "re", "__future__"):
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / f"{name}.py").write_text(
+            f"open({str(target)!r}, 'a').write({name!r})"
+        )
+    for name in ("sitecustomize", "usercustomize"):  # those come too early for us
+        (folder / f"{name}.py").unlink()
+    for package in ("tdac_agent", "tdac_envs"):
+        shutil.rmtree(folder / package)
+    code = "import sys\nfrom tdac_agent.__main__ import main\nmain()\n"
+    script = folder.parent / "tdac"
+    script.write_text(code)
+    done = subprocess.run(
+        [sys.executable, str(script), "runs", "."],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path},
         capture_output=True,
         text=True,
         timeout=SECONDS,

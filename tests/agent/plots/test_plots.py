@@ -1,6 +1,7 @@
 """Figures show the numbers that they are made from."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -266,10 +267,13 @@ def test_the_stages_of_preprocessing():
 
 def test_a_style_of_the_working_directory_is_not_used(tmp_path):
     """It may be anyone's, and LaTeX would be started with its preamble."""
-    (tmp_path / "matplotlibrc").write_text("text.usetex: True\n")
+    foreign = "text.usetex: True\nbackend: module://foreign\n"
+    (tmp_path / "matplotlibrc").write_text(foreign)
     code = (
-        "import tdac_agent.plots, matplotlib; print(matplotlib.rcParams['text.usetex'])"
+        "import tdac_agent.plots; from matplotlib import rcParams as used;"
+        "print(used['text.usetex'], used['backend'])"
     )
     words = [sys.executable, "-P", "-c", code]
-    told = subprocess.run(words, cwd=tmp_path, capture_output=True, check=True)
-    assert told.stdout == b"False\n"
+    env = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
+    told = subprocess.run(words, cwd=tmp_path, capture_output=True, check=True, env=env)
+    assert told.stdout == b"False agg\n"
