@@ -7,6 +7,7 @@ that this installation did not write is shown, and is never started or stopped.
 
 from __future__ import annotations
 
+import errno
 import os
 import shlex
 import signal
@@ -16,16 +17,19 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from tdac_agent.interpreter import python, safe_environment
 from tdac_agent.library.listing import next_folder
 from tdac_agent.studio.folder import STATE, made_within
 from tdac_agent.studio.job_file import JobFile, read_job, write_job
+from tdac_envs.core.errors import one_line_reason
 from tdac_envs.core.intake import read_file
 
 JOBS, ABOUT, OUTPUT, ENDING = f"{STATE}/jobs", "job.json", "output.txt", "exit"
-MOST_BYTES = 1 << 20
 TAIL = 4000
 """Characters of an output that are shown."""
+TAIL_BYTES = 4 * TAIL
 MOST_KNOWN = 10_000
 _STARTED: list[subprocess.Popen[bytes]] = []
 _KNOWN: dict[Path, Job] = {}
@@ -93,8 +97,14 @@ class Job:
 
     def output(self) -> str:
         """The end of what it has printed."""
+        file = self.folder / OUTPUT
         try:
-            data = read_file(self.folder / OUTPUT, MOST_BYTES)
+            if not file.is_file():
+                return ""
+            with file.open("rb") as stream:
+                size = stream.seek(0, os.SEEK_END)
+                stream.seek(max(0, size - TAIL_BYTES))
+                data = stream.read(TAIL_BYTES)
         except OSError:
             return ""
         return data.decode("utf-8", "replace")[-TAIL:]
@@ -114,8 +124,14 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
         about: What it works on.
 
     Raises:
-        OSError: The folder cannot be written, or a link leads out of it.
+        OSError: The folder cannot be written, a link leads out of it, or the command
+            is too long to be recorded.
     """
+    now = datetime.now(UTC).replace(microsecond=0)
+    try:  # before anything is started; the process is filled in below
+        facts = JobFile(words=tuple(words), started=now, pid=2, born="", about=about)
+    except ValidationError as error:
+        raise OSError(errno.EINVAL, one_line_reason(error)) from error
     before = job_of(place, about)
     if before is not None and before.running and before.words == tuple(words):
         return before
@@ -133,13 +149,8 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
             env=environment,
         )
     _STARTED.append(process)
-    facts = JobFile(
-        words=tuple(words),
-        started=datetime.now(UTC).replace(microsecond=0),
-        pid=process.pid,
-        born=_born(process.pid),
-        about=about,
-    )
+    own = {"pid": process.pid, "born": _born(process.pid)}
+    facts = facts.model_copy(update=own)
     write_job(folder / ABOUT, facts)
     return _job(folder, facts, ours=True)
 

@@ -227,3 +227,21 @@ def test_a_job_from_elsewhere_hides_none_of_ours(tmp_path):
     put(tmp_path, {**FACTS, "started": "2999-01-01T00:00:00+00:00"}, "00002")
     assert job_of(tmp_path, "bench-1") == job
     wait(job)
+
+
+@pytest.mark.parametrize("words", [["x" * 5000], ["x"] * 2000, []])
+def test_what_cannot_be_recorded_is_not_started(tmp_path, words):
+    """Nobody could find or stop it; the pages show an OSError."""
+    with pytest.raises(OSError, match="words") as caught:
+        start(tmp_path, words, "x")
+    assert "\n" not in caught.value.strerror
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_end_of_a_long_output_is_shown(tmp_path):
+    """However much was printed before."""
+    file = put(tmp_path, FACTS)
+    (file.parent / "output.txt").write_bytes(b"\xc3\xa4" * (1 << 20) + b"the end")
+    (job,) = jobs(tmp_path)
+    assert job.output().endswith("\u00e4the end")
+    assert len(job.output()) == module.TAIL
