@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import shlex
 import shutil
 import signal
 import subprocess
+import threading
 from contextlib import suppress
 
 from tdac_agent.errors import ProviderError
@@ -19,6 +21,8 @@ from tdac_agent.models.provider import ProviderFault, Reply, Request
 from tdac_agent.storage.secrets import one_line, without_secrets
 
 AFTER_KILL_SECONDS = 5.0
+_running: set[subprocess.Popen[bytes]] = set()
+_registry = threading.Lock()
 
 
 def make(words: str, options: Options) -> Command:
@@ -63,14 +67,16 @@ class Command:
         """Returns the program's output; afterwards its process group is killed."""
         pipe = subprocess.PIPE
         try:
-            process = subprocess.Popen(
-                self._argv,
-                stdin=pipe,
-                stdout=pipe,
-                stderr=pipe,
-                start_new_session=True,
-                env=given_environment(),
-            )
+            with _registry:
+                process = subprocess.Popen(
+                    self._argv,
+                    stdin=pipe,
+                    stdout=pipe,
+                    stderr=pipe,
+                    start_new_session=True,
+                    env=given_environment(),
+                )
+                _running.add(process)
         except OSError as error:
             raise ProviderFault(f"cannot start the program: {error.strerror}") from None
         try:
@@ -79,6 +85,8 @@ class Command:
             raise ProviderFault(f"no answer in {seconds:.0f} s") from None
         finally:
             _end(process)
+            with _registry:
+                _running.discard(process)
         if process.returncode != 0:
             last_line = err.decode("utf-8", "replace").strip().rpartition("\n")[2]
             detail = f": {last_line}" if last_line else ""
@@ -93,10 +101,26 @@ def _ending(process: subprocess.Popen[bytes]) -> str:
 
 def _end(process: subprocess.Popen[bytes]) -> None:
     """Kills a program with its process group, and closes its pipes."""
-    with suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
+    _kill(process)
     process.wait(AFTER_KILL_SECONDS)
     for pipe in (process.stdin, process.stdout, process.stderr):
         if pipe is not None:
             with suppress(OSError):
                 pipe.close()
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+@atexit.register
+def _kill_all() -> None:
+    """Kills all programs when this process ends, e.g. after an interrupt.
+
+    The interrupt does not wait for the threads that asked them. The lock is kept: no
+    thread starts another program, and none records a killed one as a fault.
+    """
+    _registry.acquire()
+    for process in _running:
+        _kill(process)

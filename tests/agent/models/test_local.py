@@ -1,8 +1,11 @@
 """Providers without a vendor: a program, a person, a recorded run."""
 
 import json
+import os
 import re
 import shutil
+import signal
+import subprocess
 import sys
 import threading
 import tomllib
@@ -86,6 +89,35 @@ def test_a_program_that_fails(program, no_traces, source, reason):
     with pytest.raises(ProviderFault, match=reason) as caught:
         model.complete(replace(QUESTION, seconds=1.0))
     assert "\n" not in str(caught.value)
+
+
+ASKS = """
+import signal, sys
+from tdac_agent.models.choice import Options, choose_model
+from tdac_agent.models.provider import Request
+from tdac_agent.synthesis.side_by_side import side_by_side
+
+# As the command line does.
+signal.signal(signal.SIGTERM, signal.default_int_handler)
+model = choose_model(sys.argv[1], Options(None))
+side_by_side([lambda: model.complete(Request("generate", "x"))] * 2)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_no_program_outlives_an_interrupt(tmp_path, no_traces, number):
+    """Nor does what it started, although the threads that asked are not awaited."""
+    begun = tmp_path / "begun"
+    os.mkfifo(begun)
+    command = f"command:sh -c 'echo begun > {begun}; sleep 60; echo late'"
+    asking = subprocess.Popen(
+        [sys.executable, "-c", ASKS, command], stderr=subprocess.PIPE
+    )
+    with begun.open() as said:
+        assert said.readline() == "begun\n"
+        asking.send_signal(number)
+        _, err = asking.communicate(timeout=30)
+    assert err.splitlines()[-1] == b"KeyboardInterrupt"
 
 
 @pytest.mark.slow_after(1)
