@@ -58,6 +58,13 @@ def check_reply(reply: Reply) -> Reply:
     counts = (reply.tokens_in, reply.tokens_out, read, written)
     if any(type(count) is not int or check_count(count) != count for count in counts):
         raise ProviderFault("malformed answer: a number of tokens is not a count")
-    words = (*reply.notes[:MAX_NOTES], reply.model or "", reply.request_id or "")
+    notes = reply.notes
+    if not isinstance(notes, tuple | list) or len(notes) > MAX_NOTES:
+        raise ProviderFault(
+            f"malformed answer: not a list of {MAX_NOTES} notes or less"
+        )
+    words = (*notes, reply.model or "", reply.request_id or "")
+    if not all(isinstance(word, str) for word in words):
+        raise ProviderFault("malformed answer: a note or name is not a string")
     check_length("".join(words))
     return reply

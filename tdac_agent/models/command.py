@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import errno
 import os
 import shlex
 import shutil
@@ -17,7 +18,12 @@ from tdac_agent.models.bounds import check_length
 from tdac_agent.models.choice import Options
 from tdac_agent.models.decoding import decode_answer
 from tdac_agent.models.exchange import exchange
-from tdac_agent.models.provider import ProviderFault, Reply, Request
+from tdac_agent.models.provider import (
+    PermanentFault,
+    ProviderFault,
+    Reply,
+    Request,
+)
 from tdac_agent.storage.secrets import one_line, without_secrets
 
 AFTER_KILL_SECONDS = 5.0
@@ -78,7 +84,7 @@ class Command:
                 )
                 _running.add(process)
         except OSError as error:
-            raise ProviderFault(f"cannot start the program: {error.strerror}") from None
+            raise _unstarted(self._argv[0], error) from None
         try:
             out, err = exchange(process, prompt, seconds)
         except TimeoutError:
@@ -92,6 +98,21 @@ class Command:
             detail = f": {last_line}" if last_line else ""
             raise ProviderFault(one_line(f"{_ending(process)}{detail}"))
         return out
+
+
+def _unstarted(program: str, error: OSError) -> ProviderFault:
+    """The fault if a program cannot be started; a script's interpreter is named."""
+    first = b""
+    with suppress(OSError), open(shutil.which(program) or program, "rb") as file:
+        first = file.readline(200).rstrip()
+    line = first.decode("utf-8", "replace")
+    of = f" (its first line is {line!r})" if line.startswith("#!") else ""
+    busy = error.errno in {errno.EAGAIN, errno.ENOMEM}
+    fault = (ProviderFault if busy else PermanentFault)(
+        one_line(without_secrets(f"cannot start {program!r}: {error.strerror}{of}"))
+    )
+    fault.billed = False
+    return fault
 
 
 def _ending(process: subprocess.Popen[bytes]) -> str:

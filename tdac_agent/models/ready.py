@@ -72,7 +72,8 @@ def _unreachable(url: str) -> str | None:
     """Says why there is no connection to a server; None if there is one."""
     parts = urlsplit(url)
     host = parts.hostname or ""
-    if not is_loopback(url) and parts.scheme in getproxies() and not proxy_bypass(host):
+    proxied = not getproxies().keys().isdisjoint((parts.scheme, "all"))
+    if not is_loopback(url) and proxied and not proxy_bypass(host):
         return None
 
     def connect() -> None:

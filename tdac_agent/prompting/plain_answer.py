@@ -30,7 +30,10 @@ _ENDING = re.compile(
     re.IGNORECASE | re.MULTILINE,
 )
 _CODE_TAGS = re.compile(r"^[ \t]*(?:<(?:pre|code)\b[^<>\n]*>)+", re.I | re.MULTILINE)
-_CODE_ENDS = re.compile(r"(?:</(?:pre|code)>)+[ \t]*$", re.I | re.MULTILINE)
+# A match begins with the first of several tags, so that each is read once.
+_CODE_ENDS = re.compile(
+    r"(?<!</pre>)(?<!</code>)(?:</(?:pre|code)>)+[ \t]*$", re.I | re.MULTILINE
+)
 _ESCAPE = re.compile(r"&(?:lt|gt|amp|quot|apos|nbsp|#\d{1,7}|#x[0-9a-f]{1,6});", re.I)
 _QUOTED = re.compile(r"^[ \t]*> ?", re.MULTILINE)
 _SPACES = dict.fromkeys(map(ord, "\u00a0\u1680\u202f\u205f\u3000"), " ")

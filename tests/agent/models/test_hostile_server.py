@@ -169,6 +169,11 @@ WRONG = {
     "text": Reply("a" * (MAX_CHARS + 1)),
     "no text": Reply(None),
     "notes": Reply("a", notes=("b" * MAX_CHARS, "b")),
+    "many notes": Reply("a", notes=("",) * 1000 + ("b" * (MAX_CHARS + 1),)),
+    "a note that is none": Reply("a", notes=("b", 7)),
+    "notes that are none": Reply("a", notes=7),
+    "model": Reply("a", model=["m"]),
+    "request": Reply("a", request_id=7),
 }
 
 

@@ -91,6 +91,27 @@ def test_a_program_that_fails(program, no_traces, source, reason):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (
+            "#!/no/such/interp -x\n",
+            r"No such file .*first line is '#!/no/such/interp -x'",
+        ),
+        ("\0\0\0\0", "Exec format error$"),
+    ],
+)
+def test_a_program_that_cannot_be_started(tmp_path, options, text, reason):
+    """It is not tried again, and the line says what is wrong with which program."""
+    script = tmp_path / "model"
+    script.write_text(text)
+    script.chmod(0o755)
+    with pytest.raises(PermanentFault, match=reason) as caught:
+        choose_model(f"command:'{script}'", options).complete(QUESTION)
+    assert f"cannot start '{script}': " in str(caught.value)
+    assert not caught.value.billed
+
+
 ASKS = """
 import signal, sys
 from tdac_agent.models.choice import Options, choose_model

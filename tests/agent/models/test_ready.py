@@ -65,10 +65,13 @@ def test_an_address_that_is_none(url):
         check_servers([Served(url)])
 
 
-def test_a_server_behind_a_proxy_is_not_tried(monkeypatch):
+@pytest.mark.parametrize("variable", ["http_proxy", "ALL_PROXY", "all_proxy"])
+def test_a_server_behind_a_proxy_is_not_tried(monkeypatch, variable):
     """Only the proxy can say whether it answers."""
-    monkeypatch.setenv("http_proxy", "http://127.0.0.1:1")
-    monkeypatch.delenv("no_proxy", raising=False)
+    for name in ("http", "all", "no"):
+        monkeypatch.delenv(f"{name}_proxy", raising=False)
+        monkeypatch.delenv(f"{name}_proxy".upper(), raising=False)
+    monkeypatch.setenv(variable, "http://127.0.0.1:1")
     check_servers([Served("http://models.invalid/v1"), Served(None)])
 
 
