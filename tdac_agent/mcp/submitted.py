@@ -27,7 +27,7 @@ def source_of(text: str) -> str:
     if plain_text(text).lstrip().startswith("```"):
         answer = read_answer(text, (POLICY,))
         source, problem = answer.source or "", answer.problem
-    elif (gap := left_out(text, None)) is not None:
+    elif (gap := left_out(text, (POLICY,))) is not None:
         problem = f"the file leaves out code ({gap!r})"
     if problem:
         raise Refused(f"{problem}; it was not judged and does not count")

@@ -114,7 +114,7 @@ def _read(text: str, contract: frozenset[str], *, ended: bool) -> Answer:
     bare = _bare_file(text, contract) if contract else None
     if bare is not None:
         cut = Answer(None, f"{_NO_FENCE}, and its last line may be cut")
-        return _checked(bare, parse(bare)) if ended or text[-1] == "\n" else cut
+        return _checked(bare, contract) if ended or text[-1] == "\n" else cut
     lines = text.split("\n")
     fences = find_fences(lines)
     if len(fences) > MAX_FENCES:
@@ -131,7 +131,7 @@ def _read(text: str, contract: frozenset[str], *, ended: bool) -> Answer:
         return Answer(None, f"its block of Python {lacks}")
     if any(_rivals(file, best) for file in files):
         return Answer(None, "it has two blocks that may be the file; give only one")
-    return _checked(best.block.text, best.tree)
+    return _checked(best.block.text, contract)
 
 
 def _bare_file(text: str, contract: frozenset[str]) -> str | None:
@@ -152,9 +152,9 @@ def _file(block: Block, tree: ast.Module, contract: frozenset[str]) -> _File:
     return _File(contract <= names, size, block.length, block, tree, names)
 
 
-def _checked(source: str, tree: ast.Module) -> Answer:
+def _checked(source: str, contract: frozenset[str]) -> Answer:
     """The file, unless it leaves something out."""
-    gap = left_out(source, tree)
+    gap = left_out(source, contract)
     return Answer(source) if gap is None else Answer(None, _incomplete(gap))
 
 
@@ -197,7 +197,7 @@ def _problem(text: str, blocks: list[Block]) -> str:
     """Says why an answer has no file."""
     broken = [b for b in blocks if b.tree is None and not b.opening.is_other]
     worst = max(broken, key=lambda block: block.length, default=None)
-    gap = None if worst is None else left_out(worst.text, None)
+    gap = None if worst is None else left_out(worst.text)
     if gap is not None:
         return _incomplete(gap)
     if _DIFF.search(text):

@@ -85,7 +85,10 @@ def _untagged(text: str) -> str:
 
 
 def _unescaped(text: str) -> str:
-    return html.unescape(text) if _ESCAPE.search(text) else text
+    try:
+        return html.unescape(text) if _ESCAPE.search(text) else text
+    except ValueError:  # a number with thousands of digits
+        return text
 
 
 def _unquoted(text: str) -> str:

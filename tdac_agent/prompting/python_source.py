@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import ast
+import io
 import re
+import tokenize
 import warnings
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from contextlib import suppress
 from typing import TypeGuard
 
 from tdac_agent.verification.suite.contract import top_level_names
 
 UNPARSABLE = (SyntaxError, ValueError, RecursionError, MemoryError)
+_BODIES = (ast.stmt, ast.excepthandler, ast.match_case)
 _CODE = r"(?:code|file|program|functions?|helpers?|methods?|class(?:es)?|imports?|body)"
 _GONE = (
     r"(?:unchanged|omitted|elided|no changes?|rest(?: of\b|\W*$)|as before"
@@ -20,17 +24,21 @@ _GONE = (
 )
 _PLACEHOLDERS = [
     # An ellipsis at the start or the end, and what it stands for: "# ... unchanged".
-    rf"\W*?(?:\.\.\.|…).*\b{_GONE}",
+    rf"(?>\W*?(?:\.\.\.|…)).*\b{_GONE}",
     rf"\W*(?:the )?{_GONE}.*(?:\.\.\.|…)\W*$",
     # Without one: "# rest of the code is the same", "# code omitted for brevity".
     rf"\W*(?:the )?(?:rest|remainder|remaining|other|existing|previous)\b.{{0,40}}"
     rf"\b{_CODE}\b.*(?:unchanged|same|as before|omitted|here|above)\b",
     rf"\W*\b{_CODE}\b.{{0,40}}\b(?:omitted|elided|remains? (?:unchanged|the same))\b",
-    rf"\W*(?:{_CODE} |(?:the )?rest (?:is )?)?unchanged\W*$",
+    rf"\W*(?:{_CODE} |(?:the )?rest (?:is )?)unchanged\W*$",
+]
+# In a whole file these are headings or remarks: "# existing code", "pass  # unchanged".
+_HEADINGS = [
     rf"\W*(?:keep )?(?:the )?(?:rest of|existing) (?:the |your |this )?{_CODE}\W*$",
-    r"\W*(?:same as before|omitted(?: for brevity)?)\W*$",
+    r"\W*(?:unchanged|same as before|omitted(?: for brevity)?)\W*$",
 ]
 _PLACEHOLDER = re.compile("|".join(_PLACEHOLDERS), re.IGNORECASE)
+_HEADING = re.compile("|".join(_HEADINGS), re.IGNORECASE)
 _COMMENT = re.compile(r"^[ \t]*(?:(?:\.\.\.|pass)[ \t]*)?#(.{1,200})", re.MULTILINE)
 
 
@@ -86,45 +94,92 @@ def quotes(part: ast.Module, whole: ast.Module) -> bool:
         return False
 
 
-def left_out(source: str, tree: ast.Module | None) -> str | None:
+def left_out(source: str, contract: Collection[str] = ()) -> str | None:
     """Returns the line that stands for code which was left out; None if there is none.
 
     That is a comment such as "# ... unchanged ...", or `...` as a statement.
 
     Args:
-        source: The source.
-        tree: Its syntax tree, None if it does not parse.
+        source: The source, which need not parse.
+        contract: Names that a whole file defines. A comment such as "# existing code"
+            says nothing about such a file, unless a function of it does nothing.
     """
-    for match in _COMMENT.finditer(source):
-        if _PLACEHOLDER.match(match[1]):
-            return match[0].strip()[:80]
+    try:
+        tree = parse(source)
+    except UNPARSABLE:
+        tree = None
+    found = list(_placeholders(source, whole=_is_whole(tree, contract)))
+    if found and tree is not None:
+        comments = _comments(source)
+        found = [match for match in found if match[1].strip() in comments]
+    if found:
+        return found[0][0].strip()[:80]
     for statement in _ellipses(tree) if tree is not None else ():
         return f"line {statement.lineno}: ..."
     return None
 
 
+def _placeholders(source: str, *, whole: bool) -> Iterator[re.Match[str]]:
+    """Yields the lines that look like comments in the place of code."""
+    for match in _COMMENT.finditer(source):
+        if _PLACEHOLDER.match(match[1]) or (not whole and _HEADING.match(match[1])):
+            yield match
+
+
+def _comments(source: str) -> set[str]:
+    """Returns the beginnings of the comments, without lines of strings."""
+    found = set()
+    with suppress(tokenize.TokenError, SyntaxError):
+        for token in tokenize.generate_tokens(io.StringIO(source).readline):
+            if token.type == tokenize.COMMENT:
+                found.add(token.string[1:201].strip())
+    return found
+
+
+def _is_whole(tree: ast.Module | None, contract: Collection[str]) -> bool:
+    """Whether a file defines all names, and each of its functions does something."""
+    if tree is None or not contract or not defined_names(tree).issuperset(contract):
+        return False
+    return not any(
+        isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+        and all(isinstance(each, ast.Pass) or _is_text(each) for each in node.body)
+        for node in ast.walk(tree)
+    )
+
+
 def _ellipses(tree: ast.Module) -> Iterator[ast.stmt]:
-    """Yields the statements `...` of the file and its functions.
+    """Yields the statements `...` of the file, in all bodies that it has.
 
     Those of classes with a base and of decorated functions may have a purpose.
     """
-    bodies: list[ast.Module | ast.FunctionDef | ast.ClassDef] = [tree]
+    bodies: list[ast.AST] = [tree]
     while bodies:
         body = bodies.pop()
-        for node in body.body:
-            if _is_plain(node):
+        for node in ast.iter_child_nodes(body):
+            if _is_ellipsis(node):
+                if not isinstance(body, ast.ClassDef):
+                    yield node
+            elif isinstance(node, _BODIES) and not _may_be_stub(node):
                 bodies.append(node)
-            elif not isinstance(body, ast.ClassDef) and _is_ellipsis(node):
-                yield node
 
 
-def _is_plain(node: ast.stmt) -> TypeGuard[ast.FunctionDef | ast.ClassDef]:
+def _may_be_stub(node: ast.AST) -> bool:
     if isinstance(node, ast.ClassDef):
-        return not node.bases
-    return isinstance(node, ast.FunctionDef) and not node.decorator_list
+        return bool(node.bases)
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+        return bool(node.decorator_list)
+    return False
 
 
-def _is_ellipsis(node: ast.stmt) -> bool:
+def _is_text(node: ast.stmt) -> bool:
+    return (
+        isinstance(node, ast.Expr)
+        and isinstance(node.value, ast.Constant)
+        and isinstance(node.value.value, str)
+    )
+
+
+def _is_ellipsis(node: ast.AST) -> TypeGuard[ast.Expr]:
     return (
         isinstance(node, ast.Expr)
         and isinstance(node.value, ast.Constant)

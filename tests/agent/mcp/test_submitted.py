@@ -28,6 +28,7 @@ REFUSED = {
     "x" * 200_001: "200001 bytes",
     f"```python\n{FILE}": "has no end",
     f"# ... unchanged ...\n{FILE}": "leaves out code",
+    f"def helper():\n    ...\n\n\n{FILE}": "leaves out code",
     f"```python\n# ... imports unchanged\n{FILE}```": "leaves out code",
 }
 

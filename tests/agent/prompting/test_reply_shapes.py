@@ -272,9 +272,47 @@ COMMENTS = {
 @pytest.mark.parametrize("comment", COMMENTS)
 def test_placeholders_are_recognised(comment):
     """A comment that stands for code is one; a comment about the code is none."""
-    assert (left_out(f"x = 1\n{comment}\ny = 2\n", None) is not None) == COMMENTS[
-        comment
-    ]
+    assert (left_out(f"x = 1\n{comment}\ny = 2\n") is not None) == COMMENTS[comment]
+
+
+GAPS = {
+    "# existing code": False,
+    "# Rest of the function": False,
+    "if x:\n    pass  # unchanged": False,
+    '"""Text:\n# ... rest of the code unchanged\n"""': False,
+    "# ... unchanged ...": True,
+    "# ... unchanged ...\r": True,
+    "# rest of the code is unchanged": True,
+    "def f():\n    pass  # unchanged": True,
+    "def f():\n    # existing code\n    pass": True,
+    "if x: ...": True,
+    "for x in y:\n    z = 1\nelse: ...": True,
+    "try: f()\nexcept ValueError: ...": True,
+    "match x:\n    case 1: ...": True,
+    "async def f(): ...": True,
+    "class A:\n    async def f(self): ...": True,
+    "class A(Protocol):\n    def f(self): ...": False,
+    "@overload\ndef f(x): ...": False,
+    "x[..., 0] = y": False,
+}
+
+
+@pytest.mark.parametrize("text", GAPS)
+def test_gaps_in_a_file_with_a_policy(text):
+    """What could be a heading is one there; a gap is found in any body."""
+    assert (left_out(f"{text}\n{FILE}", ("policy",)) is not None) == GAPS[text]
+
+
+@pytest.mark.parametrize(
+    "piece",
+    ["</code>", "</code> ", "<pre>", "# " + "." * 197 + "\n", "&lt;&#1" + "1" * 9999],
+)
+def test_a_long_answer_that_repeats_itself(piece):
+    """It is read in a time that grows with its length, and without an error."""
+    text = piece * (200_000 // len(piece))
+    assert read_answer(f"{text}\n{BLOCK}", ("policy",)).source.strip() == FILE.strip()
+    assert read_answer(text, ("policy",)).problem
+    assert left_out(text) is None
 
 
 @pytest.mark.parametrize(
