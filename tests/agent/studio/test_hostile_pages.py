@@ -11,7 +11,9 @@ pytest.importorskip("nicegui", reason="needs tdac[studio]")
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
+from tdac_agent.html_report.page import make_page, own_script
 from tdac_agent.runs.replay import DEMO
+from tdac_agent.studio.pages.files import headers_of
 from tdac_envs.mapping.bundled import bundled_map
 
 SECONDS = 90
@@ -22,7 +24,7 @@ MAP = f'm" :alt="{CAME}" onclick="{CAME}.png'
 PAGE = f"""<title>x</title><script>
 try {{ parent.{CAME} }} catch {{}}
 fetch("/alive").then(() => parent.postMessage("answered", "*"))
-</script>"""
+</script><meta http-equiv="refresh" content="0;url=/alive">"""
 JOB = {
     "words": ["bench", SCRIPT, "--set", SCRIPT, "-n", "10"],
     "started": "2026-01-01T00:00:00+00:00",
@@ -110,6 +112,22 @@ def test_a_page_of_the_folder_asks_no_server(browser, hostile):
 
     def refused(b):
         logged.extend(line["message"] for line in b.get_log("browser"))
-        return any("Content Security Policy" in line for line in logged)
+        return any("sandboxed" in line for line in logged)
 
     WebDriverWait(browser, SECONDS).until(refused)
+    assert browser.current_url.endswith("bench.html")
+
+
+def test_only_the_script_of_our_own_reports_may_run():
+    """A script, or a page that refreshes itself, could go to any server."""
+    ours = make_page(DEMO).html
+    rights = headers_of(ours)["Content-Security-Policy"]
+    assert f"script-src '{own_script()}'" in rights
+    assert own_script().encode() in ours
+    refresh = b'<META HTTP-EQUIV=refresh content="0;url=http://127.0.0.1:1/">'
+    for page in (
+        *(PAGE.encode(), refresh, b"<!doctype html>" + refresh, ours + refresh),
+        *(ours.decode().encode("utf-16"), b""),
+    ):
+        rights = headers_of(page)["Content-Security-Policy"]
+        assert rights.startswith("sandbox;")

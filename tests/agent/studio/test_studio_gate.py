@@ -95,7 +95,7 @@ def test_files_outside_of_the_folder(studio, ask, cookie):
     (studio.place / "own.png").write_bytes(b"picture")
     status, headers, _ = ask("/file?at=own.png", Cookie=cookie)
     assert status == 200
-    rights = "sandbox allow-scripts; default-src 'unsafe-inline' data:"
+    rights = "sandbox; default-src 'unsafe-inline' data:"
     assert headers["Content-Security-Policy"] == rights
 
 
