@@ -3,15 +3,12 @@
 Such a file is a zip file with a pickle, `NAME/data.pkl`, and one file for each storage,
 `NAME/data/KEY`. Source: torch, "Serialization semantics". The pickle may only describe
 tensors, and a tensor only what its storage holds, so that the size of the file bounds
-the memory. Nothing of torch is needed.
+the memory. Nothing of torch is needed, nor Python's own reader of pickles.
 """
 
 from __future__ import annotations
 
-import io
-import pickle
 import pickletools
-from collections import OrderedDict
 from dataclasses import dataclass
 from math import prod
 from typing import Any
@@ -21,17 +18,16 @@ from tdac_envs.core.intake import one_line, read_zip
 ITEM_BYTES = {"Float": 4, "Double": 8, "Half": 2, "BFloat16": 2}
 """Bytes of a number, by kind of storage."""
 MOST_DIMENSIONS = 4
-# Eight critics of 16 layers, with their targets, need 18,000. More could nest tuples so
-# deeply that hashing them overflows the stack.
+# Eight critics of 16 layers, with their targets, need 18,000.
 _MOST_OPERATIONS = 30_000
-_OPERATIONS = {
-    *("PROTO", "STOP", "MARK", "NONE", "NEWTRUE", "NEWFALSE"),
-    *("BININT", "BININT1", "BININT2", "LONG1", "BINUNICODE"),
-    *("EMPTY_DICT", "SETITEM", "SETITEMS"),
-    *("EMPTY_TUPLE", "TUPLE", "TUPLE1", "TUPLE2", "TUPLE3"),
-    *("GLOBAL", "BINPERSID", "REDUCE", "BUILD"),
-    *("BINPUT", "BINGET", "LONG_BINPUT", "LONG_BINGET"),
-}
+_DICT, _TENSOR, _PARAMETER = (
+    "collections OrderedDict",
+    "torch._utils _rebuild_tensor_v2",
+    "torch._utils _rebuild_parameter",
+)
+_STORAGES = {f"torch {kind}Storage": kind for kind in ITEM_BYTES}
+_NAMES = {_DICT, _TENSOR, _PARAMETER, *_STORAGES}
+_CONSTANTS = {"NONE": None, "NEWTRUE": True, "NEWFALSE": False}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +60,8 @@ def read_weights(file: bytes) -> dict[str, Weights]:
     folder = pickles[0].removesuffix(".pkl")
     if parts.get(f"{folder.removesuffix('data')}byteorder", b"little") != b"little":
         raise ValueError("its numbers are not little-endian")
-    pickled = parts[pickles[0]]
-    _check_operations(pickled)
     try:
-        found = _Reader(pickled, parts, folder).load()
+        found = _Reader(parts, folder).read(parts[pickles[0]])
     # An invalid pickle may raise anything.
     except Exception as error:
         raise ValueError(one_line(error)) from None
@@ -77,87 +71,163 @@ def read_weights(file: bytes) -> dict[str, Weights]:
 def _checked(found: Any, most: int) -> dict[str, Weights]:
     if not isinstance(found, dict):
         raise ValueError("expected tensors by name")
-    for name, tensor in found.items():
-        if not (isinstance(name, str) and isinstance(tensor, Weights)):
-            raise ValueError("its weights are not tensors by name")
+    if not all(isinstance(tensor, Weights) for tensor in found.values()):
+        raise ValueError("its weights are not tensors by name")
     if sum(len(tensor.data) for tensor in found.values()) > most:
         raise ValueError("its tensors together are larger than the file")
-    return dict(found)
+    return found
 
 
-def _check_operations(pickled: bytes) -> None:
-    """Checks that a pickle only describes tensors, before anything reads it."""
-    for count, (operation, argument, _) in enumerate(pickletools.genops(pickled)):
-        if count >= _MOST_OPERATIONS:
-            raise ValueError(f"more than {_MOST_OPERATIONS} operations in its data.pkl")
-        name = str(argument) if operation.name == "GLOBAL" else operation.name
-        if name not in _OPERATIONS and name not in _MEANINGS:
-            raise ValueError(f"holds more than weights: {name}")
-        # Python's reader makes a table of that size.
-        if operation.name == "LONG_BINPUT" and int(str(argument)) > _MOST_OPERATIONS:
-            raise ValueError(f"number {argument} of its data.pkl is out of range")
+@dataclass(frozen=True, slots=True)
+class _Name:
+    """One of `_NAMES`, which imports nothing."""
+
+    text: str
 
 
-class _Reader(pickle.Unpickler):
-    """Reads the pickle; names mean what `_MEANINGS` says, and import nothing."""
+@dataclass(frozen=True, slots=True)
+class _Storage:
+    kind: str
+    data: memoryview
 
-    def __init__(self, pickled: bytes, parts: dict[str, bytes], folder: str) -> None:
-        super().__init__(io.BytesIO(pickled))
+
+class _Reader:
+    """Carries out the operations with which torch describes tensors, and no others.
+
+    Only strings, names and tensors can be used again, and dictionaries keep nothing but
+    tensors, so that what the pickle makes is a tree of small depth.
+    """
+
+    def __init__(self, parts: dict[str, bytes], folder: str) -> None:
         self._parts, self._folder = parts, folder
+        # The last list has what came since the last mark.
+        self._stacks: list[list[Any]] = [[]]
+        self._memo: dict[object, str | _Name | Weights] = {}
 
-    def find_class(self, module: str, name: str) -> Any:
-        return _MEANINGS[f"{module} {name}"]
+    def read(self, pickled: bytes) -> object:
+        """Returns what a pickle describes."""
+        for count, (operation, argument, _) in enumerate(pickletools.genops(pickled)):
+            if count >= _MOST_OPERATIONS:
+                raise ValueError(
+                    f"more than {_MOST_OPERATIONS} operations in its data.pkl"
+                )
+            if operation.name in {"BINPUT", "LONG_BINPUT"}:
+                self._remember(argument)
+            elif operation.name == "MARK":
+                self._stacks.append([])
+            elif operation.name == "BUILD":
+                # The state of a dictionary, which torch's modules use, is dropped.
+                self._stacks[-1].pop()
+            elif operation.name in {"SETITEM", "SETITEMS"}:
+                self._set(self._taken(2 if operation.name == "SETITEM" else None))
+            elif operation.name not in {"PROTO", "STOP"}:
+                made = self._made(operation.name, argument)
+                self._stacks[-1].append(made)
+        return self._stacks[-1].pop()
 
-    def persistent_load(self, pid: Any) -> tuple[str, memoryview]:
-        """Returns kind and bytes of a storage."""
-        _, kind, key, _, count = pid
+    def _made(self, operation: str, argument: Any) -> object:
+        """Returns what an operation puts on the stack."""
+        match operation:
+            case "NONE" | "NEWTRUE" | "NEWFALSE":
+                made: object = _CONSTANTS[operation]
+            case "BININT" | "BININT1" | "BININT2" | "LONG1" | "BINUNICODE":
+                made = argument
+            case "EMPTY_DICT":
+                made = {}
+            case "EMPTY_TUPLE":
+                made = ()
+            case "TUPLE":
+                made = _tuple(self._taken())
+            case "TUPLE1" | "TUPLE2" | "TUPLE3":
+                made = _tuple(self._taken(int(operation[-1])))
+            case "GLOBAL" if argument in _NAMES:
+                made = _Name(argument)
+            case "BINGET" | "LONG_BINGET":
+                made = self._remembered(argument)
+            case "BINPERSID":
+                made = self._storage(self._stacks[-1].pop())
+            case "REDUCE":
+                made = _called(*self._taken(2))
+            case _:
+                shown = argument if operation == "GLOBAL" else operation
+                raise ValueError(f"holds more than weights: {shown}")
+        return made
+
+    def _taken(self, count: int | None = None) -> list[Any]:
+        """Takes the last values from the stack, or all since the last mark."""
+        if count is None:
+            return self._stacks.pop()
+        return [self._stacks[-1].pop() for _ in range(count)][::-1]
+
+    def _remember(self, number: object) -> None:
+        value = self._stacks[-1][-1]
+        self._memo.pop(number, None)
+        if isinstance(value, str | _Name | Weights):
+            self._memo[number] = value
+
+    def _remembered(self, number: object) -> object:
+        if number not in self._memo:
+            raise ValueError(
+                "its data.pkl uses again what is no string, name or tensor"
+            )
+        return self._memo[number]
+
+    def _set(self, items: list[Any]) -> None:
+        held = self._stacks[-1][-1]
+        for key, value in zip(items[::2], items[1::2], strict=True):
+            if not (isinstance(held, dict) and isinstance(key, str)):
+                raise ValueError("its weights are not tensors by name")
+            held[key] = value if isinstance(value, Weights) else None
+
+    def _storage(self, described: object) -> _Storage:
+        match described:
+            case ("storage", _Name(name), str(key), str(), int(count)):
+                kind = _STORAGES[name]
+            case _:
+                raise ValueError("a storage is not described as torch does")
         size, data = ITEM_BYTES[kind] * count, self._parts[f"{self._folder}/{key}"]
         if not 0 < size <= len(data):
             raise ValueError(f"storage {key} claims {size} bytes, and has {len(data)}")
-        return kind, memoryview(data)[:size]
+        return _Storage(kind, memoryview(data)[:size])
 
 
-class _Tensor:
-    """Stands for `torch._utils._rebuild_tensor_v2`; without state to change."""
-
-    __slots__ = ()
-
-    def __call__(
-        self,
-        storage: tuple[str, memoryview],
-        offset: int,
-        shape: tuple[int, ...],
-        strides: tuple[int, ...],
-        *_: Any,
-    ) -> Weights:
-        """Returns a tensor that is stored in full."""
-        kind, data = storage
-        if len(shape) > MOST_DIMENSIONS or not all(size > 0 for size in shape):
-            raise ValueError(f"a tensor of {len(shape)} dimensions, or of none")
-        dense = [prod(shape[axis + 1 :]) for axis in range(len(shape))]
-        rows = zip(shape, strides, dense, strict=True)
-        if any(size > 1 and stride != step for size, stride, step in rows):
-            raise ValueError("a tensor does not store each of its numbers")
-        item = ITEM_BYTES[kind]
-        begin, end = item * offset, item * (offset + prod(shape))
-        if not 0 <= begin < end <= len(data):
-            raise ValueError("a tensor reaches beyond its storage")
-        return Weights(kind, tuple(shape), data[begin:end])
+def _tuple(items: list[Any]) -> tuple[Any, ...]:
+    """Returns a tuple; the arguments of a tensor have tuples of numbers."""
+    inner = (part for item in items if isinstance(item, tuple) for part in item)
+    if any(isinstance(part, tuple) for part in inner):
+        raise ValueError("its data.pkl nests tuples too deeply")
+    return tuple(items)
 
 
-class _Parameter:
-    """Stands for `torch._utils._rebuild_parameter`."""
+def _called(function: object, arguments: object) -> object:
+    """Returns what one of the names makes of arguments."""
+    match function, arguments:
+        case _Name(text), () if text == _DICT:
+            return {}
+        case (
+            _Name(text),
+            (_Storage() as storage, int(offset), tuple(shape), tuple(strides), *_),
+        ) if text == _TENSOR:
+            return _tensor(storage, offset, shape, strides)
+        case _Name(text), (Weights() as tensor, *_) if text == _PARAMETER:
+            return tensor
+    raise ValueError("holds more than weights: an unknown call")
 
-    __slots__ = ()
 
-    def __call__(self, tensor: Weights, *_: Any) -> Weights:
-        """Returns the tensor."""
-        return tensor
-
-
-_MEANINGS: dict[str, Any] = {
-    "collections OrderedDict": OrderedDict,
-    "torch._utils _rebuild_tensor_v2": _Tensor(),
-    "torch._utils _rebuild_parameter": _Parameter(),
-    **{f"torch {kind}Storage": kind for kind in ITEM_BYTES},
-}
+def _tensor(
+    storage: _Storage, offset: int, shape: tuple[Any, ...], strides: tuple[Any, ...]
+) -> Weights:
+    """Returns a tensor that is stored in full."""
+    if len(shape) > MOST_DIMENSIONS or not all(
+        type(size) is int and size > 0 for size in shape
+    ):
+        raise ValueError(f"a tensor of {len(shape)} dimensions, or of none")
+    dense = [prod(shape[axis + 1 :]) for axis in range(len(shape))]
+    rows = zip(shape, strides, dense, strict=True)
+    if any(size > 1 and stride != step for size, stride, step in rows):
+        raise ValueError("a tensor does not store each of its numbers")
+    item = ITEM_BYTES[storage.kind]
+    begin, end = item * offset, item * (offset + prod(shape))
+    if not 0 <= begin < end <= len(storage.data):
+        raise ValueError("a tensor reaches beyond its storage")
+    return Weights(storage.kind, shape, storage.data[begin:end])

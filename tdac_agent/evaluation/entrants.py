@@ -170,8 +170,8 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
             f"(wrappers: {known}; [] without any), or give tdac evaluate --wrapper NAME"
         )
     check_wrappers(names)
-    load_weights(found.weights)
     check_kind(found)
+    load_weights(found.weights)
     content = read_file(file, MOST_BYTES)
     if not found.complete:
         # The same network with other observations is another policy.

@@ -40,7 +40,9 @@ class Tensor:
     """A tensor as the pickle describes it."""
 
     def __init__(self, shape, strides, offset=0, **storage):
-        arguments = (Storage(**storage), offset, shape, strides, False, OrderedDict())
+        # As in torch, no two tensors have one tuple.
+        sizes = (*shape,), (*strides,)
+        arguments = (Storage(**storage), offset, *sizes, False, OrderedDict())
         self.call = divmod, arguments
 
 
@@ -79,6 +81,26 @@ def test_what_torch_saves_is_read():
 
 
 @pytest.mark.parametrize(
+    ("algo", "options"), [("PPO", {}), ("SAC", {"buffer_size": 1})]
+)
+def test_what_stable_baselines3_saves_is_read(algo, options, tmp_path):
+    """Each byte of each tensor is what torch loads from the same file."""
+    torch = pytest.importorskip("torch")
+    sb3 = pytest.importorskip("stable_baselines3")
+    make = getattr(sb3, algo)
+    model = make("MlpPolicy", "Pendulum-v1", device="cpu", **options)
+    model.save(tmp_path / "model.zip")
+    with zipfile.ZipFile(tmp_path / "model.zip") as archive:
+        file = archive.read("policy.pth")
+    loaded = torch.load(io.BytesIO(file), weights_only=True)
+    found = read_weights(file)
+    assert list(found) == list(loaded)
+    for name, tensor in loaded.items():
+        assert found[name].shape == tuple(tensor.shape)
+        assert bytes(found[name].data) == tensor.numpy().tobytes()
+
+
+@pytest.mark.parametrize(
     ("tensor", "match"),
     [
         (Tensor((4096, 4096), (0, 0)), "does not store each"),
@@ -110,24 +132,49 @@ def test_tensors_are_not_larger_than_their_file():
         read_weights(described(16_000, **many))
 
 
+SHARED = b"K\x01" + b"".join(b"q%ch%c\x86" % (i, i) for i in range(59))
+"""Pairs of pairs of pairs, with 2^59 numbers in the end."""
+DICT = b"ccollections\nOrderedDict\n)R"
+STATE = b"}(%b%bub" % tuple(
+    b"X%c\0\0\0%bccollections\nOrderedDict\n" % (len(name), name)
+    for name in (b"items", b"values")
+)
+"""Gives the dictionary before it methods that return an empty one."""
+
+
 @pytest.mark.parametrize(
     ("pickled", "match"),
     [
         (b"\x80\x02cos\nsystem\n.", "holds more than weights: os system"),
         (b"\x80\x02\x8cxx.", "expected 120 bytes"),
         (b"\x80\x02]a.", "holds more than weights: EMPTY_LIST"),
-        (b"\x80\x02}r\xff\xff\xff\x7f.", "out of range"),
-        (b"\x80\x02})" + b"\x85" * 40_000 + b"Ns.", "more than 30000"),
-        (b"\x80\x02})" + b"\x85" * 29_000 + b"Ns.", "not tensors by name"),
+        (b"\x80\x02}" + b"N0" * 40_000 + b".", "more than weights: POP"),
+        (b"\x80\x02}" + b"q\0" * 40_000 + b".", "more than 30000"),
+        (b"\x80\x02})" + b"\x85" * 29_000 + b"Ns.", "nests tuples"),
+        (b"\x80\x02})Ns.", "not tensors by name"),
+        (b"\x80\x02}(" + SHARED + b"K\x01u.", "uses again"),
+        (b"\x80\x02}((X\x07\0\0\0storagectorch\nFloatStorage\n" + SHARED, "again"),
+        (b"\x80\x02}q\0h\0.", "uses again"),
+        (b"\x80\x02}q\0h\1.", "uses again"),
+        (b"\x80\x02((X\x07\0\0\0storagectorch\nFloatStorage\n))K\x04tQ.", "a storage"),
+        (b"\x80\x02X\0\0\0\0)R.", "an unknown call"),
+        (b"\x80\x02" + DICT + b"X\x01\0\0\0aNs" + STATE + b".", "not tensors by name"),
         (b"\x80\x02N.", "expected tensors by name"),
         (b"\x80\x02}X\x01\0\0\0aNs.", "not tensors by name"),
     ],
-    ids=range(8),
+    ids=range(16),
 )
 def test_a_pickle_only_describes_tensors(pickled, match):
     """Anything else is refused before it is read, at the cost of its bytes."""
     with pytest.raises(ValueError, match=match):
         read_weights(zipped(pickled))
+
+
+def test_the_state_of_a_dictionary_is_dropped():
+    """It cannot hide tensors from what checks them."""
+    pickled = b"\x80\x02" + DICT + STATE + b"."
+    assert read_weights(zipped(pickled)) == {}
+    assert read_weights(zipped(b"\x80\x02}r\xff\xff\xff\x7f.")) == {}
 
 
 def test_there_is_one_pickle():

@@ -115,15 +115,25 @@ def _sparse(here: Path) -> None:
     os.truncate(here / NAME, 10**12)
 
 
-def _tensors(make: str) -> Maker:
+_FITTING = {
+    "log_std": (2,),
+    "action_net.weight": (2, 4),
+    "action_net.bias": (2,),
+    "value_net.weight": (1, 4),
+    "value_net.bias": (1,),
+}
+"""Shapes of the weights of a network without layers."""
+
+
+def _tensors(make: str, data: object = DATA) -> Maker:
     """A policy with weights of torch's own making."""
 
     def write(here: Path) -> None:
         import torch
 
         content = io.BytesIO()
-        torch.save(eval(make, {"torch": torch}), content)
-        (here / NAME).write_bytes(policy(pth=content.getvalue()))
+        torch.save(eval(make, {"torch": torch, "fitting": _FITTING}), content)
+        (here / NAME).write_bytes(policy(data, pth=content.getvalue()))
 
     return write
 
@@ -180,7 +190,14 @@ OFFERS = [
     _offer("weights_code", policy(pth=weights(Call(os.system, "true"))), "holds more"),
     _offer("weights_large", policy(pth=weights(Call(bytearray, 10**11))), "holds more"),
     network("weights_list", policy(pth=weights([1, 2])), "weights"),
-    network("weights_nan", _tensors("{'a': torch.full((2,), float('nan'))}"), "finite"),
+    network(
+        "weights_nan",
+        _tensors(
+            "{name: torch.full(size, float('nan')) for name, size in fitting.items()}",
+            DATA | {"policy_kwargs": {"net_arch": []}},
+        ),
+        "finite",
+    ),
     network("weights_whole", _tensors("{'a': torch.zeros(2).to(int)}"), "holds more"),
     _offer("said_torn", policy(said=b"{"), "tdac.json"),
     _offer("said_deep", policy(said=b"[" * 9999), "nested deeper"),

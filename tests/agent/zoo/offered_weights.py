@@ -155,6 +155,28 @@ def _zeros_twice(here: Path) -> None:
     (here / NAME).write_bytes(raw)
 
 
+def _text(value: str) -> bytes:
+    return b"X" + struct.pack("<I", len(value)) + value.encode()
+
+
+_SHARED = b"K\1" + b"".join(b"q%ch%c\x86" % (i, i) for i in range(59))
+"""Pairs of pairs of pairs: whoever looks at all of them never ends."""
+_SHARED_KEY = b"(" + _text("storage") + b"ctorch\nFloatStorage\n" + _SHARED
+_EMPTY = b"ccollections\nOrderedDict\n"
+
+
+def _hidden(items: bytes, size: int) -> bytes:
+    """A dictionary whose own methods say that it is empty."""
+    state = _text("items") + _EMPTY + _text("values") + _EMPTY
+    pickled = b"\x80\2" + _EMPTY + b")R(" + items + b"u}(" + state + b"ub."
+    inner = zipped({"archive/data.pkl": pickled, "archive/data/0": bytes(size)})
+    return policy(pth=inner, method=DEFLATED)
+
+
+_HALVES = _tensor(400_000, (400_000,), (1,)).replace(b"FloatS", b"HalfS")
+_MANY = b"".join(_text(f"t{number}") + _HALVES for number in range(1200))
+
+
 OFFERS = [
     _small("wide", kwargs(net_arch=_WIDE), "do not fit its settings"),
     _small("wide_parts", kwargs(net_arch={"pi": _WIDE, "vf": _WIDE}), "do not fit its"),
@@ -202,11 +224,11 @@ OFFERS = [
     _small("two_pickles", _two_pickles(), "expected one data.pkl, got 2"),
     _small("pickle_twice", _twice(), "two files of one name"),
     _small("behind_a_pickle", _prefixed(), "damaged|do not fit its"),
-    _small("memo", _pth(b"\x80\2}r\xff\xff\xff\x7f."), "out of range"),
+    _small("memo", _pth(b"\x80\2}r\xff\xff\xff\x7f."), "do not fit its"),
     _small("long", _pth(b"\x80\2}\x8b\xff\xff\xff\x7f1."), "damaged"),
-    _small("deep", _pth(b"\x80\2})" + b"\x85" * 10**6 + b"Ns."), "more than 30000"),
+    _small("deep", _pth(b"\x80\2})" + b"\x85" * 10**6 + b"Ns."), "nests tuples"),
     _small(
-        "deep_enough", _pth(b"\x80\2})" + b"\x85" * 29_000 + b"Ns."), "not tensors by"
+        "deep_enough", _pth(b"\x80\2})" + b"\x85" * 29_000 + b"Ns."), "nests tuples"
     ),
     _small(
         "many_tensors",
@@ -215,5 +237,13 @@ OFFERS = [
     ),
     _small(
         "many_sizes", _pth(_named({"a": _tensor(1, (1,) * 4000, (1,) * 4000)})), "4000"
+    ),
+    _small("hidden", _hidden(_text("a") + b"N", 16), "not tensors by name"),
+    _small("hidden_tensors", _hidden(_MANY, 800_000), "larger than the file"),
+    _small("shared_name", _pth(b"\x80\2}(" + _SHARED + b"K\1u."), "uses again"),
+    _small(
+        "shared_key",
+        _pth(b"\x80\2}(" + _text("a") + _SHARED_KEY + b"X\3\0\0\0cpuK\4tQu."),
+        "uses again",
     ),
 ]
