@@ -6,7 +6,6 @@ in the folder of `tdac_envs.core.code_cache`.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -18,7 +17,6 @@ from numba import config, njit
 from numba.core import event
 from numpy.typing import DTypeLike, NDArray
 
-from tdac_envs.core import NUMBA_FILE
 from tdac_envs.core.code_cache import cache_folder
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -91,17 +89,6 @@ class _Progress(event.Listener):  # type: ignore[misc]
             self.message = ""
 
 
-def _without_file(reload: Callable[[], None]) -> Callable[[], None]:
-    """Keeps numba, which reloads its settings often, from those of a foreign file."""
-
-    def reload_config() -> None:
-        if not os.path.exists(NUMBA_FILE):
-            reload()
-
-    return reload_config
-
-
-config.reload_config = _without_file(config.reload_config)
 _progress = _Progress()
 event.register("numba:compile", _progress)
 

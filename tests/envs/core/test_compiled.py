@@ -338,17 +338,3 @@ def test_a_program_can_show_what_is_compiled():
     with event.trigger_event("numba:compile", data={"dispatcher": KERNELS[0]}):
         assert "compiling for this machine" in compiling()
     assert compiling() == ""
-
-
-@pytest.mark.parametrize("text", ["[1, 2]\n", "disable_jit: 1\nopt: 0\n"])
-def test_settings_of_the_working_directory_are_not_used(tmp_path, text):
-    """They may be anyone's; numba reads them at its import and before it compiles."""
-    (tmp_path / ".numba_config.yaml").write_text(text)
-    code = (
-        "import tdac_envs.core.compiled as c; from numba import njit, config;"
-        "njit(lambda x: x)(1); print(config.DISABLE_JIT, int(config.OPT))"
-    )
-    env = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA_")}
-    words = [sys.executable, "-P", "-c", code]
-    told = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, check=True)
-    assert told.stdout == b"0 3\n"
