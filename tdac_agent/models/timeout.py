@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from typing import TypeVar
 
 from tdac_agent.models.provider import ProviderFault
@@ -12,6 +13,7 @@ from tdac_agent.models.provider import ProviderFault
 T = TypeVar("T")
 
 CONNECT_SECONDS = 15.0
+LOOK_SECONDS = 0.2
 STALL_SECONDS = 300.0
 """Longest gap between two pieces of an answer; small machines read prompts slowly."""
 
@@ -42,8 +44,12 @@ def run_with_timeout(
             future.set_exception(error)
 
     threading.Thread(target=run, daemon=True, name="tdac-call").start()
+    end = time.monotonic() + seconds
     try:
-        return future.result(seconds)
+        # In slices: a signal that comes just before a wait does not end it.
+        while time.monotonic() < end and not wait([future], LOOK_SECONDS).done:
+            pass
+        return future.result(0.0)
     except TimeoutError:
         let_go()
         raise ProviderFault(f"no complete answer within {seconds:.3g} s") from None

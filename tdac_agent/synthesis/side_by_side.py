@@ -5,7 +5,10 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import TypeVar
+
+from tdac_agent.models.timeout import LOOK_SECONDS
 
 T = TypeVar("T")
 _Outcome = tuple[int, T | None, BaseException | None]
@@ -30,10 +33,17 @@ def side_by_side(functions: Sequence[Callable[[], T]]) -> list[T]:
 
     for number, function in enumerate(functions):
         threading.Thread(target=call, args=(number, function), daemon=True).start()
-    found = sorted((outcomes.get() for _ in functions), key=lambda each: each[0])
+    found = sorted((_next(outcomes) for _ in functions), key=lambda each: each[0])
     results: list[T] = []
     for _, result, error in found:
         if error is not None:
             raise error
         results.append(result)  # type: ignore[arg-type]
     return results
+
+
+def _next(outcomes: queue.SimpleQueue[_Outcome[T]]) -> _Outcome[T]:
+    """The next outcome; a signal that comes just before a wait does not end it."""
+    while True:
+        with suppress(queue.Empty):
+            return outcomes.get(timeout=LOOK_SECONDS)
