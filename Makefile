@@ -16,7 +16,7 @@
 #                     after an interruption it goes on.
 #   make docs         The site, in build/site, with its links checked and its notebooks run.
 #   make linkcheck    Links to other sites; needs a network.
-#   make lint         Style, types and import rules.
+#   make lint         Style, types, import rules, circles of imports and long modules.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
