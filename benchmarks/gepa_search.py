@@ -52,7 +52,7 @@ from benchmarks.timing import whole_from_one
 from benchmarks.tune_planners import drawn
 from tdac_agent.bench.rivals import ranges_of, source_of, with_values
 from tdac_agent.builtin.variation import varied
-from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
+from tdac_agent.verification.episode_report import EpisodeProvenance, EpisodeReport, summarise
 from tdac_agent.metrics.paired import bootstrap
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import Run
@@ -70,7 +70,7 @@ from tdac_agent.synthesis.dialogue import ModelAnswer
 from tdac_agent.synthesis.improve import ImprovingSearch
 from tdac_agent.synthesis.workload import Shares, shares
 from tdac_agent.tasks.provenance import sha256_of
-from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 LEVEL, PLANNER = "unknown", "dwa"
@@ -80,7 +80,7 @@ SCREENED = 8
 """Worlds that tell whether a start is weak."""
 SEARCHES = "ours", "gepa"
 PAIRS = "pairs.csv"
-Drive = Callable[[str, str, int], WorldEpisode]
+Drive = Callable[[str, str, int], EpisodeRow]
 """The episode of a controller on a world of a split."""
 
 
@@ -130,10 +130,10 @@ class Terms(NamedTuple):
         first = PURPOSES.index(purpose) * BLOCKS + first_world(self.seed, 0)
         return list(range(first, first + number))
 
-    def report(self, source: str, worlds: Sequence[int]) -> SetReport:
+    def report(self, source: str, worlds: Sequence[int]) -> EpisodeReport:
         """How a controller drives on worlds of `dev`."""
         episodes = [self.drive(source, "dev", index) for index in worlds]
-        about = SetProvenance.unconfined(
+        about = EpisodeProvenance.unconfined(
             self.tasks, "dev", None, sha256_of(source.encode())
         )
         return summarise(about, episodes, None, 0.0, per_world=True)
@@ -156,7 +156,7 @@ class _Trials(Trials):
         first: int,
         count: int,
         out: Path,  # noqa: ARG002
-    ) -> SetReport:
+    ) -> EpisodeReport:
         return self._terms.report(candidate.source, range(first, first + count))
 
 

@@ -23,7 +23,7 @@ from tdac_agent.sandbox import ControllerFault
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.judge.driving import FOREVER
 from tdac_agent.verification.judge.set_files import write_files
-from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of
+from tdac_agent.verification.judge.episode_row import EpisodeRow, figures_of
 from tdac_envs.ladder.env import OnSet, make
 
 
@@ -72,16 +72,16 @@ class Drives:
     def __init__(self, level: str) -> None:
         self._level = level
         self._envs: dict[str, OnSet] = {}
-        self._driven: dict[tuple[str, str, int], WorldEpisode] = {}
+        self._driven: dict[tuple[str, str, int], EpisodeRow] = {}
 
-    def __call__(self, source: str, split: str, index: int) -> WorldEpisode:
+    def __call__(self, source: str, split: str, index: int) -> EpisodeRow:
         """The episode of a controller on a world."""
         key = sha256_of(source.encode()), split, index
         if key not in self._driven:
             self._driven[key] = self._drive(source, split, index)
         return self._driven[key]
 
-    def _drive(self, source: str, split: str, index: int) -> WorldEpisode:
+    def _drive(self, source: str, split: str, index: int) -> EpisodeRow:
         if split not in self._envs:
             made = make(self._level, split=split, train_pool=0, privileged=True)
             self._envs[split] = made

@@ -35,7 +35,7 @@ from tdac_agent.bench.figures import draw_figures, frame_of
 from tdac_agent.bench.record import Bench, BenchRow, Interval
 from tdac_agent.bench.rivals import levels_of, rival_names
 from tdac_agent.bench.shown import merged, reveal
-from tdac_agent.evaluation.salt import SEALED, drawn_salt
+from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.warm import WarmJudge

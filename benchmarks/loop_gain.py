@@ -28,8 +28,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from benchmarks.recorded_answers import driven_on, episodes_in, interval
-from tdac_agent.evaluation.kept_sets import kept_report
-from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.verification.store import kept_report
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import sha256_of
@@ -97,7 +97,7 @@ def best_of_n(
         raw = source.encode()
         kept = out / "dev" / tasks.name / sha256_of(raw)[:16]
         about = sha256_of(raw), tasks.sha256, "dev", share
-        report = kept_report(kept, *about) or verify_on_set(
+        report = kept_report(kept, *about) or verify_episodes(
             raw, tasks, "dev", share, out=kept, judge=judge
         )
         means.append(np.mean([each.time_score for each in report.episodes]))

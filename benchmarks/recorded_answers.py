@@ -30,10 +30,10 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tdac_agent.builtin.level import LEVELS
-from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE
-from tdac_agent.evaluation.salt import SEALED, drawn_salt
-from tdac_agent.evaluation.set_report import SetReport
-from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.verification.store import REPORT_FILE, ROWS_FILE
+from tdac_agent.verification.salt import SEALED, drawn_salt
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import sha256_of
@@ -75,7 +75,7 @@ def judge(answers: Path, out: Path, levels: list[str], worlds: int) -> None:
                     continue
                 kept = out / SEALED / level / name
                 report = driven_on(source, level, worlds, salt, kept, warm)
-                driven = episodes_in(kept) if report.worlds else None
+                driven = episodes_in(kept) if report.count else None
                 rows.append(_row(level, name, report, driven, first))
                 print(rows[-1], flush=True)
                 if driven is not None:
@@ -90,18 +90,18 @@ def judge(answers: Path, out: Path, levels: list[str], worlds: int) -> None:
 
 def driven_on(
     source: str, level: str, worlds: int, salt: Path, kept: Path, warm: WarmJudge
-) -> SetReport:
+) -> EpisodeReport:
     """The report of an entrant, which an interrupted run may have kept."""
     tasks = load_set(level)
     raw = source.encode("utf-8", "surrogatepass")
     file = kept / REPORT_FILE
     if file.is_file():
-        report = SetReport.model_validate_json(file.read_bytes())
-        own = report.provenance.set_sha256, report.provenance.controller_sha256
+        report = EpisodeReport.model_validate_json(file.read_bytes())
+        own = report.provenance.sha256, report.provenance.controller_sha256
         same = own == (tasks.sha256, sha256_of(raw))
-        if same and report.worlds == worlds:
+        if same and report.count == worlds:
             return report
-    return verify_on_set(
+    return verify_episodes(
         raw, tasks, "hidden", worlds, salt_file=salt, out=kept, judge=warm
     )
 
@@ -114,7 +114,7 @@ def episodes_in(kept: Path) -> pd.DataFrame:
 def _row(
     level: str,
     name: str,
-    report: SetReport,
+    report: EpisodeReport,
     driven: pd.DataFrame | None,
     builtin: pd.DataFrame | None,
 ) -> dict[str, Any]:
@@ -122,7 +122,7 @@ def _row(
     row: dict[str, Any] = {"level": level, "entrant": name}
     row["refused"] = "; ".join(report.told) if report.refused else ""
     if driven is not None and report.scores is not None and report.interval is not None:
-        row |= {"worlds": report.worlds, "success": report.scores.success}
+        row |= {"worlds": report.count, "success": report.scores.success}
         row |= {"low": report.interval.low, "high": report.interval.high}
         row |= {"time_score": report.scores.time, "path_score": report.scores.path}
         row["failures"] = ", ".join(f"{n} {name}" for name, n in report.causes.items())
@@ -130,7 +130,7 @@ def _row(
             ahead = (builtin["time_score"] - driven["time_score"]).to_numpy()
             row |= {"ahead": ahead.mean()}
             row |= dict(zip(("ahead_low", "ahead_high"), interval(ahead), strict=True))
-    row |= {"set_sha256": about.set_sha256, "salt_sha256": about.salt_sha256}
+    row |= {"set_sha256": about.sha256, "salt_sha256": about.salt_sha256}
     return row | {"controller_sha256": about.controller_sha256}
 
 

@@ -30,7 +30,7 @@ from benchmarks.recorded_answers import (
     episodes_in,
     interval,
 )
-from tdac_agent.evaluation.salt import SEALED, drawn_salt
+from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.warm import WarmJudge

@@ -6,8 +6,6 @@ if TYPE_CHECKING:
     from tdac_agent.evaluation.evaluate import evaluate
     from tdac_agent.evaluation.evaluation_report import Evaluation
     from tdac_agent.evaluation.policy import Policy, load_controller
-    from tdac_agent.evaluation.robust import verify_robust
-    from tdac_agent.evaluation.set_verify import verify_on_set
     from tdac_agent.runs.history import RunHistory, gather_run
     from tdac_agent.runs.ownership import load_task
     from tdac_agent.runs.run_record import Run, load_run
@@ -16,6 +14,7 @@ if TYPE_CHECKING:
     from tdac_agent.tasks.task import Task
     from tdac_agent.verification.diagnosis.report import Report
     from tdac_agent.verification.verify import verify
+    from tdac_agent.verification.verify_episodes import verify_episodes
 
 __all__ = [
     "Disturbance",
@@ -32,8 +31,7 @@ __all__ = [
     "load_task",
     "synthesize",
     "verify",
-    "verify_on_set",
-    "verify_robust",
+    "verify_episodes",
 ]
 
 _MODULE_OF = {
@@ -51,8 +49,7 @@ _MODULE_OF = {
     "load_task": "runs.ownership",
     "synthesize": "synthesis.loop",
     "verify": "verification.verify",
-    "verify_on_set": "evaluation.set_verify",
-    "verify_robust": "evaluation.robust",
+    "verify_episodes": "verification.verify_episodes",
 }
 
 

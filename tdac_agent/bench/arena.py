@@ -13,12 +13,12 @@ from tdac_agent.bench.page import MOST_WORLDS, Replay
 from tdac_agent.bench.record import BenchFile, BenchRow
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import ControllerFileError, RunError
-from tdac_agent.evaluation.kept_sets import ROWS_FILE, TRAJECTORIES, kept_report
-from tdac_agent.evaluation.salt import SEALED
-from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.tasks.provenance import sha256_of
-from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.salt import SEALED
+from tdac_agent.verification.store import ROWS_FILE, TRAJECTORIES, kept_report
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.source import read_salt
@@ -166,14 +166,20 @@ def is_driven(arena: Arena, tasks: TaskSet, member: Member) -> bool:
     return _kept(arena, tasks, member) is not None
 
 
-def _kept(arena: Arena, tasks: TaskSet, member: Member) -> SetReport | None:
-    folder, own = place_of(arena, tasks, member), (member.sha256, tasks.sha256)
-    return kept_report(folder, *own, arena.split, arena.count, arena.salt_sha256)
+def _kept(arena: Arena, tasks: TaskSet, member: Member) -> EpisodeReport | None:
+    wanted = {
+        "controller_sha256": member.sha256,
+        "sha256": tasks.sha256,
+        "split": arena.split,
+        "salt_sha256": arena.salt_sha256,
+    }
+    folder = place_of(arena, tasks, member)
+    return kept_report(folder, wanted, range(arena.count))
 
 
 def _report(
     arena: Arena, part: Part, member: Member
-) -> tuple[SetReport, tuple[WorldEpisode, ...]]:
+) -> tuple[EpisodeReport, tuple[EpisodeRow, ...]]:
     """The report of a file, and its episodes."""
     tasks, folder = part.tasks, place_of(arena, part.tasks, member)
     report = _kept(arena, tasks, member)
@@ -192,7 +198,7 @@ def _report(
     return report, sealed_episodes(folder, member.sha256)
 
 
-def sealed_episodes(folder: Path, sha256: str) -> tuple[WorldEpisode, ...]:
+def sealed_episodes(folder: Path, sha256: str) -> tuple[EpisodeRow, ...]:
     """The episodes of a file on hidden worlds.
 
     Args:
@@ -210,7 +216,7 @@ def sealed_episodes(folder: Path, sha256: str) -> tuple[WorldEpisode, ...]:
             f"the file {sha256[:8]} was driven on these hidden worlds before, and its "
             f"episodes are not in {folder}; tdac bench show puts the folders together"
         ) from None
-    return tuple(map(WorldEpisode.model_validate_json, lines))
+    return tuple(map(EpisodeRow.model_validate_json, lines))
 
 
 def first_tasks(arena: Arena, tasks: TaskSet) -> dict[int, AnyTask]:
@@ -231,7 +237,7 @@ def _replays(arena: Arena, part: Part, episodes: Episodes) -> Iterator[Replay]:
         if path.is_file():
             trajectory = Trajectory.load(path)
             name, outcome = part.entrant.name, episode.outcome
-            yield Replay(name, episode.index, outcome, trajectory)
+            yield Replay(name, episode.number, outcome, trajectory)
 
 
 def _timing(name: str, entrant: str, episodes: Episodes) -> dict[str, Any]:

@@ -26,13 +26,13 @@ from tdac_agent.bench.jobs import Drive, Reached, drive_all, drives_of
 from tdac_agent.bench.page import PAGE, write_page
 from tdac_agent.bench.record import Bench, BenchSet
 from tdac_agent.errors import RunError
-from tdac_agent.evaluation.salt import SEALED, drawn_salt
-from tdac_agent.evaluation.set_verify import MOST_EPISODES
 from tdac_agent.executors.executor import Executor
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.provenance import versions
+from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file

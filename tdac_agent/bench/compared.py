@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.bench.record import BenchOverall, BenchPair, Interval
-from tdac_agent.evaluation.set_report import cause_of
 from tdac_agent.metrics.exact import exact_interval, sign_test
 from tdac_agent.metrics.paired import (
     Bootstrap,
@@ -23,10 +22,11 @@ from tdac_agent.metrics.paired import (
     over_sets,
     probability_of_improvement,
 )
-from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.episode_report import cause_of
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 
 Array = NDArray[np.float64]
-Episodes = Sequence[Sequence[WorldEpisode]]
+Episodes = Sequence[Sequence[EpisodeRow]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

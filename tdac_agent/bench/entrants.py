@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tdac_agent.bench.privileged import (
-    PRIVILEGED,
-    check_movers,
-    plan_worlds,
-    planner_sha256,
-)
+from tdac_agent.bench.privileged import PRIVILEGED, check_movers, planner_sha256
 from tdac_agent.bench.record import Kind
 from tdac_agent.bench.rivals import rival_names, rival_on
 from tdac_agent.episodes.sb3_file import POLICY, SavedPolicy
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.evaluation.entrants import BUILTIN, Entrant, is_training, not_found
-from tdac_agent.evaluation.set_entrants import set_entrants
-from tdac_agent.evaluation.set_learned import LearnedRuns
-from tdac_agent.evaluation.set_report import SetReport
-from tdac_agent.evaluation.set_verify import verify_on_set, written_by
+from tdac_agent.evaluation.policies import (
+    BUILTIN,
+    entrants_of,
+    fitted,
+    is_training,
+    knowledge,
+    not_found,
+)
+from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.verification.drive_episodes import Request
+from tdac_agent.verification.drive_episodes import drive as drive_request
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.verify import read_source
+from tdac_agent.verification.verify_episodes import written_by
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -71,23 +76,20 @@ class Member:
         kind: `builtin`, a classical `planner`, any other `controller`, `learned` with
             stable-baselines3, or `privileged`, a planner that knows the true world.
         sha256: Its hash.
-        source: The file, if it is a program.
+        policy: The policy; that of a planner has no file yet.
+        source: Source of a planner.
         lineage: Id of the run that wrote the program, if one did.
-        learned: The policy, if it was trained with stable-baselines3.
+        saved: What a policy records about its training, if anything.
         tuned: Whether its constants were tuned for the set; None if it has none.
     """
 
     kind: Kind
     sha256: str
+    policy: PolicySpec
     source: bytes | None = None
     lineage: str | None = None
-    learned: Entrant | None = None
+    saved: SavedPolicy | None = None
     tuned: bool | None = None
-
-    @property
-    def saved(self) -> SavedPolicy | None:
-        """What a policy records about its training, if anything."""
-        return None if self.learned is None else self.learned.saved
 
     @property
     def steps(self) -> int | None:
@@ -158,24 +160,25 @@ def member_of(word: str, tasks: TaskSet) -> Member:
     """
     if word == PRIVILEGED:
         check_movers(tasks)
-        return Member("privileged", planner_sha256())
+        return Member("privileged", planner_sha256(), PolicySpec("privileged"))
     if word in rival_names():
         rival = rival_on(word, tasks)
-        source = rival.source.encode()
-        return Member("planner", sha256_of(source), source, tuned=rival.tuned)
-    (entrant,) = set_entrants((word,), tasks)
-    file, sha256 = entrant.policy.file, entrant.sha256
-    assert file is not None
+        source, spec = rival.source.encode(), PolicySpec("controller")
+        return Member("planner", sha256_of(source), spec, source, tuned=rival.tuned)
+    (named,) = entrants_of((word,))
+    entrant = fitted(named, tasks)
+    policy, sha256 = entrant.policy, entrant.sha256
+    assert policy.file is not None
     assert sha256 is not None
-    if entrant.policy.kind == "sb3":
-        return Member("learned", sha256, learned=entrant)
+    if policy.kind == "sb3":
+        return Member("learned", sha256, policy, saved=entrant.saved)
     kind: Kind = "builtin" if word == BUILTIN else "controller"
-    return Member(kind, sha256, read_source(file), written_by(file))
+    return Member(kind, sha256, policy, lineage=written_by(policy.file))
 
 
 def drive(
     member: Member, worlds: Worlds, folder: Path, judge: WarmJudge, watch: Watch
-) -> SetReport:
+) -> EpisodeReport:
     """Drives a file on worlds.
 
     Args:
@@ -186,38 +189,29 @@ def drive(
         watch: Called repeatedly with the numbers of episodes and successes so far.
 
     Raises:
-        ControllerFileError: A policy does not fit what is observed.
         TaskError: The ledger of hidden evaluations cannot be used.
         Fault: The sandbox is broken.
     """
-    salt_file = worlds.salt_file
-    if member.kind == "privileged":
-        own = worlds.tasks, worlds.split, worlds.count, salt_file
-        report = plan_worlds(*own, folder)
-        watch(report.worlds, report.successes)
-        return report
-    if member.learned is not None:
-        runs = LearnedRuns.of(member.learned, worlds.tasks, worlds.split, salt_file)
-        return runs.report(worlds.count, folder, watch)
-    assert member.source is not None
-    return verify_on_set(
-        member.source,
-        worlds.tasks,
-        worlds.split,
-        worlds.count,
-        salt_file=salt_file,
-        lineage=member.lineage,
-        tier=worlds.tier,
-        out=folder,
-        judge=judge,
-        watch=watch,
-    )
+    with tempfile.TemporaryDirectory(prefix="tdac-bench-") as name:
+        policy = member.policy
+        if member.source is not None:
+            file = Path(name) / "controller.py"
+            write_atomic(file, member.source)
+            policy = replace(policy, file=file)
+        request = Request(
+            policy,
+            member.sha256,
+            episodes_of(worlds.tasks),
+            Part(range(worlds.count), worlds.split, worlds.salt_file),
+            lineage=member.lineage,
+            tier=worlds.tier,
+            trajectories=True,
+        )
+        return drive_request(request, folder, judge, watch)
 
 
 def knows(member: Member, tasks: TaskSet) -> str:
     """What a file may use."""
     if member.kind == "privileged":
         return "all"
-    if member.learned is None:
-        return "+ map" if tasks.file.map else "sensors"
-    return "+ map" if "map-view" in member.learned.policy.wrappers else "sensors"
+    return knowledge(member.policy, tasks)

@@ -17,13 +17,13 @@ from tdac_agent.cli.flags import TaskFlags, check_tier
 from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import ControllerFileError, Fault
-from tdac_agent.evaluation.entrants import entrants_of
-from tdac_agent.evaluation.evaluate import evaluate, load_tasks
-from tdac_agent.evaluation.unfinished import count_kept
+from tdac_agent.evaluation.evaluate import evaluate, load_problems
+from tdac_agent.evaluation.policies import entrants_of
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.store import count_unfinished
 from tdac_envs.core.errors import TaskError
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def run(
         bar.update(row, completed=count, successes=successes, doing=doing, refresh=True)
 
     with ChildPool() as child_pool, _keeping(console, out):
-        loaded = load_tasks(_tasks(tasks, flags))
+        loaded = load_problems(_tasks(tasks, flags))
         with WarmJudge(child_pool) as judge, bar:
             found = evaluate(
                 policies,
@@ -82,7 +82,9 @@ def run(
     if as_json:
         sys.stdout.write(found.model_dump_json(indent=2) + "\n")
     else:
-        units = {task.name: task.setting.shown for task in loaded}
+        units = {
+            task.name: task.setting.shown for task in loaded if isinstance(task, Task)
+        }
         show_evaluation(found, console, units)
         if out is not None and not is_driven:
             done = f"{out} already has this evaluation; nothing was driven"
@@ -116,13 +118,13 @@ def _tasks(names: list[str], flags: TaskFlags) -> list[Task]:
 @contextmanager
 def _keeping(console: Console, out: Path | None) -> Generator[None]:
     """Reports the finished episodes that an interrupted evaluation left or leaves."""
-    if out is not None and (before := count_kept(out)):
+    if out is not None and (before := count_unfinished(out)):
         left = f"{before} finished episodes of an interrupted evaluation"
         print_sentences(console, f"{out} has {left}; none of them is driven again")
     try:
         yield
     except (KeyboardInterrupt, Fault, OSError):
-        if out is not None and (now := count_kept(out)):
+        if out is not None and (now := count_unfinished(out)):
             kept = f"{now} finished episodes are kept in {out}"
             print_sentences(console, f"{kept}; the same command continues from there")
         raise

@@ -16,9 +16,8 @@ from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.titled_table import titled_table
-from tdac_agent.evaluation.evaluate import EPISODES
-from tdac_agent.evaluation.set_evaluate import POLICIES, evaluate_on_set
-from tdac_agent.evaluation.set_evaluation import SetEvaluation, SetRow
+from tdac_agent.evaluation.evaluate import EPISODES, POLICIES, evaluate
+from tdac_agent.evaluation.evaluation_report import Evaluation, PolicyRow
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.ladder.task_sets import load_set
@@ -58,18 +57,18 @@ def run(
     bar = policy_bar(console)
     row = bar.add_task("", total=count, successes=0, doing="preparing")
 
-    def watch(policy: str, episodes: int, successes: int) -> None:
-        doing = escape(f"{tasks.name}: {policy}")
+    def watch(task: str, policy: str, episodes: int, successes: int) -> None:
+        doing = escape(f"{task}: {policy}")
         bar.update(
             row, completed=episodes, successes=successes, doing=doing, refresh=True
         )
 
     with ChildPool() as child_pool, WarmJudge(child_pool) as judge, bar:
-        found = evaluate_on_set(
+        found = evaluate(
             policies,
-            tasks,
-            split or "test",
+            [tasks],
             count,
+            split=split or "test",
             wrappers=names,
             tier=tier,
             out=out,
@@ -91,10 +90,11 @@ def run(
     return 0
 
 
-def show(found: SetEvaluation, console: Console) -> None:
+def show(found: Evaluation, console: Console) -> None:
     """Prints the scores, those by generator, failures, and pairs."""
-    worlds = f"worlds 0 to {found.worlds - 1} of {found.split}"
-    title = f"{found.set} {found.set_sha256[:8]}: {worlds}"
+    (own,) = found.tasks
+    worlds = f"worlds 0 to {found.episodes - 1} of {own.split}"
+    title = f"{own.name} {own.sha256[:8]}: {worlds}"
     console.print(_scores(found, title))
     console.print()
     for row in found.rows:
@@ -110,14 +110,14 @@ def show(found: SetEvaluation, console: Console) -> None:
         console.print(PAIRED, style="dim", highlight=False)
 
 
-def _table(title: str, found: SetEvaluation) -> Table:
+def _table(title: str, found: Evaluation) -> Table:
     table = titled_table(title)
     longest = max(len(row.policy) for row in found.rows)
     table.add_column("policy", overflow="fold", min_width=min(longest, WIDEST))
     return table
 
 
-def _scores(found: SetEvaluation, title: str) -> Table:
+def _scores(found: Evaluation, title: str) -> Table:
     table = _table(title, found)
     table.add_column("knows", no_wrap=True)
     for name in ("reached", "95 %", "SCT", "SPL", "BARN", "hit", "late", "error"):
@@ -125,21 +125,23 @@ def _scores(found: SetEvaluation, title: str) -> Table:
     for policy, row in zip(found.policies, found.rows, strict=True):
         cells = [NONE] * 5
         if row.scores is not None and row.interval is not None:
-            colour = "green" if row.successes == row.worlds else "yellow"
+            colour = "green" if row.successes == row.episodes else "yellow"
             colour = colour if row.successes else "red"
             low, high = 100 * row.interval.low, 100 * row.interval.high
             scores = row.scores.time, row.scores.path, row.scores.barn
             cells = [
-                f"[{colour}]{row.successes}/{row.worlds}[/]",
+                f"[{colour}]{row.successes}/{row.episodes}[/]",
                 f"{low:.0f}–{high:.0f}",
                 *(f"{score:.3f}" for score in scores),
             ]
-        counts = (str(count) for count in (row.hit, row.timeouts, row.errors))
-        table.add_row(escape(policy.name), policy.knows, *cells, *counts)
+        hit, late = (row.outcomes.get(each, 0) for each in ("collision", "out of time"))
+        rest = row.episodes - row.successes - hit - late
+        counts = map(str, (hit, late, rest))
+        table.add_row(escape(policy.name), row.knows, *cells, *counts)
     return table
 
 
-def _by_generator(found: SetEvaluation, kinds: Sequence[str]) -> Table:
+def _by_generator(found: Evaluation, kinds: Sequence[str]) -> Table:
     """Success and SCT of each policy in the worlds of each generator."""
     table = _table("by generator: reached, SCT", found)
     for kind in kinds:
@@ -154,7 +156,7 @@ def _by_generator(found: SetEvaluation, kinds: Sequence[str]) -> Table:
     return table
 
 
-def _print_failures(row: SetRow, console: Console) -> None:
+def _print_failures(row: PolicyRow, console: Console) -> None:
     """The failures of a policy by cause; if nothing was driven, the reasons."""
     if row.scores is None:
         for text in row.told:

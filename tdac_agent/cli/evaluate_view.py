@@ -11,7 +11,7 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.titled_table import titled_table
 from tdac_agent.evaluation.evaluation_report import (
-    EvaluatedTask,
+    EvaluatedProblem,
     Evaluation,
     PairedComparison,
     PolicyRow,
@@ -66,7 +66,7 @@ def show_evaluation(
 
 def _table(
     found: Evaluation,
-    task: EvaluatedTask,
+    task: EvaluatedProblem,
     rows: Sequence[PolicyRow],
     timings: dict[tuple[str, str], Timing],
     units: Units,
@@ -79,7 +79,7 @@ def _table(
     }
     title = (
         f"{task.called or task.name}: {found.episodes} episodes each, "
-        f"{starts.get(found.variation, 'the nominal start')}, seed {found.seed}"
+        f"{starts.get(str(found.variation), 'the nominal start')}, seed {found.seed}"
     )
     table = titled_table(title, gap=0)
     longest = max(len(row.policy) for row in rows)
@@ -90,7 +90,11 @@ def _table(
         table.add_column(name, justify="right", no_wrap=True)
     for row in rows:
         timing = timings[row.task, row.policy]
-        gaps = [units.scale * gap for gap in (row.clearance_min, row.clearance_mean)]
+        gaps = [
+            units.scale * (gap or 0.0)
+            for gap in (row.clearance_min, row.clearance_mean)
+        ]
+        assert row.interval is not None
         colour = "green" if row.rate == 1.0 else "red" if row.rate == 0.0 else "yellow"
         table.add_row(
             escape(row.policy),

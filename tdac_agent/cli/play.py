@@ -16,15 +16,15 @@ from tdac_agent.cli.robust_flags import DisturbanceFlags, require_flag
 from tdac_agent.cli.verify import controller_and_task
 from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Rollout
-from tdac_agent.errors import Fault
-from tdac_agent.sandbox import Limits, SandboxError
+from tdac_agent.evaluation.policies import Entrant
+from tdac_agent.evaluation.replay import drive_episode
+from tdac_agent.problems.episodes import Part
 from tdac_agent.storage.plain import one_line
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task import Task, write_workdir
-from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.drivers import PolicySpec
-from tdac_agent.verification.judge.driving import EpisodeSetup, SeededResult, drive_seed
+from tdac_agent.verification.judge.episode_job import Driven
 from tdac_agent.verification.judge.judge import Judge
 from tdac_agent.verification.suite.starts import JITTERS
 from tdac_agent.verification.verify import read_source
@@ -129,23 +129,14 @@ def drive(task: Task, source: bytes, name: str, tier: str) -> Rollout:
 
 def drive_disturbed(
     task: Task, source: bytes, seed: int, disturbance: Disturbance, tier: str
-) -> SeededResult:
+) -> Driven:
     """Runs the judged episode of a seed, as in a robust verification."""
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
-        work, child_pool = Path(folder) / "work", ChildPool(ahead=False)
-        write_workdir(work, task)
-        controller = Path(folder) / "controller.py"
-        controller.write_bytes(source)
-        driver = PolicySpec("controller", controller)
-        setup = EpisodeSetup(
-            task, driver, work, disturbance, tier, Limits(), child_pool
-        )
-        try:
-            return drive_seed(setup, seed)
-        except SandboxError as error:
-            raise Fault(error.fault) from error
-        finally:
-            child_pool.close()
+        file = Path(folder) / "controller.py"
+        file.write_bytes(source)
+        entrant = Entrant(file.name, PolicySpec("controller", file))
+        part = Part((seed,), disturbance=disturbance)
+        return drive_episode(entrant, task, part, tier)
 
 
 def _checked(episode: str | None) -> str:

@@ -13,9 +13,9 @@ from tdac_agent.cli.play import check_video, show
 from tdac_agent.environments.epuck import pictures as on_worlds
 from tdac_agent.environments.map2d import pictures as on_maps
 from tdac_agent.episodes.trajectory import Rollout
-from tdac_agent.evaluation.set_entrants import set_entrants
-from tdac_agent.evaluation.set_play import check_shown, play_world
-from tdac_agent.evaluation.set_verify import compile_for_set
+from tdac_agent.evaluation.policies import entrants_of, fitted
+from tdac_agent.evaluation.replay import check_shown, drive_episode
+from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet, load_set
 from tdac_envs.map2d.task import Map2DTask
@@ -35,10 +35,12 @@ def run(
     check_shown(split)
     check_video(video)
     tasks = load_set(name)
-    compile_for_set(tasks)
+    episodes_of(tasks).compile()
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
-        (entrant,) = set_entrants([_file_of(controller, tasks, folder)], tasks)
-        rollout, task = play_world(entrant, tasks, split, index, tier)
+        (named,) = entrants_of([_file_of(controller, tasks, folder)])
+        task = tasks.task(split, index)
+        part, entrant = Part((index,), split), fitted(named, tasks)
+        rollout = drive_episode(entrant, tasks, part, tier).rollout
     title = f"{tasks.name}, {split} {index}"
     return show(rollout, partial(_frames, task, rollout), title, video, speed)
 

@@ -10,11 +10,11 @@ from rich.progress import TimeRemainingColumn as TimeLeft
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.robust_flags import RobustFlags
-from tdac_agent.evaluation.robust import verify_robust
-from tdac_agent.evaluation.robust_report import RobustReport
 from tdac_agent.tasks.task import Task
+from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.sequential import MARGIN
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.verify_episodes import verify_episodes
 
 
 def measure(
@@ -26,7 +26,7 @@ def measure(
     out: Path | None,
     judge: WarmJudge,
     as_json: bool,
-) -> RobustReport:
+) -> EpisodeReport:
     """Runs the disturbed episodes with a progress bar."""
     assert wanted.robust is not None
     columns = (
@@ -48,12 +48,12 @@ def measure(
     row = bar.add_task("", total=wanted.robust, successes=0)
     try:
         with bar:
-            return verify_robust(
+            return verify_episodes(
                 file,
                 task,
                 wanted.robust,
                 disturbance=wanted.disturbed.disturbance(),
-                first_seed=wanted.first_seed,
+                first=wanted.first_seed,
                 accept_at=wanted.accept_at,
                 margin=MARGIN if wanted.margin is None else wanted.margin,
                 tier=tier,
@@ -66,7 +66,7 @@ def measure(
         console.print(f"{reached}; no success rate computed")
         if out is not None:
             console.print(
-                escape(f"{out} contains the report of the suite, but no robust.json"),
+                escape(f"{out} contains the report of the suite, but no episodes.json"),
                 soft_wrap=True,
             )
         raise

@@ -10,22 +10,22 @@ from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
-from tdac_agent.evaluation.robust_report import (
+from tdac_agent.tasks.units import Units
+from tdac_agent.verification.episode_report import (
+    EpisodeReport,
     Interval,
-    RobustReport,
     SequentialResult,
     decision_text,
     percent,
 )
-from tdac_agent.tasks.units import Units
-from tdac_agent.verification.judge.seeded import SeededEpisode
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 
 LEAST, MOST, ERRORS = 5, 10, 3
 REACHED = "reached"
 
 
 def show_robust(
-    report: RobustReport, console: Console, play: list[str], units: Units
+    report: EpisodeReport, console: Console, play: list[str], units: Units
 ) -> None:
     """Prints the worst episodes, the success rate and the sequential test's decision.
 
@@ -36,7 +36,7 @@ def show_robust(
     say(worst_table(report, units))
     for error in _errors(report):
         print_sentences(console, error, indent=2)
-    replay = shlex.join([*play, "--seed", str(report.worst[0].seed)])
+    replay = shlex.join([*play, "--seed", str(report.worst[0].number)])
     # Not wrapped, so that it can be copied.
     line = f"  replay the first of them: [bold]{escape(replay)}[/]"
     console.print(line, soft_wrap=True, highlight=False)
@@ -44,7 +44,7 @@ def show_robust(
     outcomes = report.outcomes.items()
     others = ", ".join(f"{count} {name}" for name, count in outcomes if name != REACHED)
     say(
-        f"{report.successes} of {report.episodes} episodes reached the goal without a "
+        f"{report.successes} of {report.count} episodes reached the goal without a "
         f"contact{f' ({others})' if others else ''}; they took {report.seconds:.0f} s"
     )
     if report.time_outs:
@@ -56,19 +56,19 @@ def show_robust(
         say(rate_text(report.rate, report.interval))
     if report.sequential is not None:
         result = report.sequential
-        colour = "green" if report.accepted else "red"
+        colour = "green" if report.passed else "red"
         say(
-            f"[bold {colour}]{decision_text(result)}[/] after {report.episodes} of at "
+            f"[bold {colour}]{decision_text(result)}[/] after {report.count} of at "
             f"most {result.test.limit} episodes"
         )
         say(_legend(result))
         say(error_rates(result))
 
 
-def worst_table(report: RobustReport, units: Units) -> Table:
+def worst_table(report: EpisodeReport, units: Units) -> Table:
     """The worst episodes: up to `MOST` failures, then the slowest successes."""
-    first, failures = report.provenance.first_seed, len(report.failed_seeds)
-    seeds = f"the seeds {first} to {first + report.episodes - 1} ({units.length})"
+    first, failures = report.provenance.first, len(report.failures)
+    seeds = f"the seeds {first} to {first + report.count - 1} ({units.length})"
     title = f"Worst of {seeds}" if failures else f"No failure; the slowest of {seeds}"
     if failures > MOST:
         title += f", {failures - MOST} further failures"
@@ -82,32 +82,32 @@ def worst_table(report: RobustReport, units: Units) -> Table:
     return table
 
 
-def _row(episode: SeededEpisode, units: Units) -> list[str]:
+def _row(episode: EpisodeRow, units: Units) -> list[str]:
     cause = episode.side if episode.outcome == "collision" else episode.cause
     more = "" if cause in (None, episode.outcome) else f", {cause}"
     return [
-        str(episode.seed),
+        str(episode.number),
         f"[{'green' if episode.success else 'red'}]{episode.outcome}{more}[/]",
         str(episode.steps),
-        f"{units.amount(units.scale * episode.d_min, 0)} of "
-        f"{units.amount(units.scale * episode.d0, 0)}",
+        f"{units.amount(units.scale * (episode.d_min or 0.0), 0)} of "
+        f"{units.amount(units.scale * (episode.d0 or 0.0), 0)}",
         "" if episode.step is None else str(episode.step),
         _place(episode, units),
     ]
 
 
-def _place(episode: SeededEpisode, units: Units) -> str:
+def _place(episode: EpisodeRow, units: Units) -> str:
     if episode.x is None or episode.y is None:
         return ""
     return units.place_text(episode.x, episode.y)
 
 
-def _errors(report: RobustReport) -> list[str]:
+def _errors(report: EpisodeReport) -> list[str]:
     """The distinct errors of the worst episodes, each with its first seed."""
     first: dict[str, int] = {}
     for episode in report.worst:
         if episode.error is not None:
-            first.setdefault(episode.error, episode.seed)
+            first.setdefault(episode.error, episode.number)
     return [f"seed {seed}: {error}" for error, seed in first.items()][:ERRORS]
 
 

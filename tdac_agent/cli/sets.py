@@ -18,7 +18,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.verification.judge.sequential import MARGIN
-from tdac_agent.verification.judge.set_job import movers_of
+from tdac_agent.verification.judge.worlds import movers_of
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.epuck.infrared import RANGE

@@ -20,7 +20,6 @@ from tdac_agent.cli.run_view import print_budget_end, usage_of
 from tdac_agent.cli.synth import check_models, check_ready_again, read_text
 from tdac_agent.cli.synth_set_flags import SynthSetFlags
 from tdac_agent.errors import Fault
-from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.library.listing import next_folder
 from tdac_agent.models.choice import check_name
 from tdac_agent.prompting.prompt import load_template
@@ -37,6 +36,7 @@ from tdac_agent.runs.selection_record import (
 from tdac_agent.set_synthesis.resume import resume_set_arguments
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.tasks.task_file import SET_FILE
+from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
@@ -245,7 +245,7 @@ def _show_selected(run: Run, console: Console) -> None:
     hidden = run.folder / HIDDEN_FILE
     if run.status != "selected" and hidden.is_file():
         text = read_file(hidden, RECORD_BYTES)
-        verify_set.show(SetReport.model_validate_json(text), console)
+        verify_set.show(EpisodeReport.model_validate_json(text), console)
         return
     given = str(run.controller), "--set", str(run.folder / SET_FILE)
     line = escape(f"  not verified yet: {shlex.join(['tdac', 'verify', *given])}")

@@ -22,7 +22,7 @@ from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 
 if TYPE_CHECKING:
-    from tdac_agent.evaluation.robust_report import RobustReport
+    from tdac_agent.verification.episode_report import EpisodeReport
 
 
 def run(
@@ -83,7 +83,7 @@ def run(
     elif robust.robust is not None:
         replay = _replay(controller, flags, robust, tier)
         _show_robust(measured, replay, task.setting.shown)
-    accepted = measured is None or measured.accepted
+    accepted = measured is None or measured.passed
     return 0 if report.passed and accepted else 1
 
 
@@ -105,7 +105,7 @@ def _show(report: Report, out: Path | None, task: Task) -> None:
 
 
 def _show_robust(
-    measured: RobustReport | None, replay: list[str], units: Units
+    measured: EpisodeReport | None, replay: list[str], units: Units
 ) -> None:
     from tdac_agent.cli.console import Console
     from tdac_agent.cli.robust_view import show_robust
@@ -117,7 +117,7 @@ def _show_robust(
         show_robust(measured, console, replay, units)
 
 
-def _json(report: Report, robust: RobustFlags, measured: RobustReport | None) -> str:
+def _json(report: Report, robust: RobustFlags, measured: EpisodeReport | None) -> str:
     """The report as JSON; `--robust` adds the key `robust`, null if it was not run."""
     if robust.robust is None:
         return report.model_dump_json(indent=2)

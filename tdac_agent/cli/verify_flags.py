@@ -57,7 +57,7 @@ def verify(
         Optional[Path],  # noqa: UP045
         dir_flag(
             "--out",
-            help="Folder for report.json (and robust.json), the trajectories and a "
+            help="Folder for report.json (and episodes.json), the trajectories and a "
             "picture of each failed episode.",
         ),
     ] = None,

@@ -22,14 +22,17 @@ from tdac_agent.cli.robust_view import error_rates, rate_text
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.set_flags import SetFlags
 from tdac_agent.cli.verify import check_folder, controller_file
-from tdac_agent.evaluation.entrants import BUILTIN
-from tdac_agent.evaluation.kept_sets import REPORT_FILE, TRAJECTORIES
-from tdac_agent.evaluation.robust_report import decision_text
-from tdac_agent.evaluation.set_report import HiddenCount, SetReport
-from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
-from tdac_agent.runs.selection_record import Scores
+from tdac_agent.evaluation.policies import BUILTIN
+from tdac_agent.verification.episode_report import (
+    EpisodeReport,
+    HiddenCount,
+    decision_text,
+)
 from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.episode_row import Scores
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.store import REPORT_FILE, TRAJECTORIES
+from tdac_agent.verification.verify_episodes import most_worlds, verify_episodes
 from tdac_envs.ladder.task_sets import load_set
 
 MOST_CAUSES = 6
@@ -83,11 +86,11 @@ def run(
         pulse(f"{tasks.name}: the goal reached in {successes} of {episodes} worlds …")
 
     with WarmJudge(child_pool) as judge, bar:
-        report = verify_on_set(
+        report = verify_episodes(
             file,
             tasks,
-            flags.split or "test",
             flags.worlds,
+            split=flags.split or "test",
             salt_file=flags.salt_file,
             tier=tier,
             out=out,
@@ -103,7 +106,7 @@ def run(
     return 0 if report.passed else 1
 
 
-def show(report: SetReport, console: Console) -> None:
+def show(report: EpisodeReport, console: Console) -> None:
     """Prints the scores or the decision, the failures by cause, and diagnoses."""
     say = partial(console.print, highlight=False)
     about = report.provenance
@@ -111,9 +114,9 @@ def show(report: SetReport, console: Console) -> None:
         _say_refused(report, console)
         return
     say(
-        f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}, worlds 0 to "
-        f"{report.worlds - 1} of {about.split}: {report.successes} reached, "
-        f"{report.worlds - report.successes} failed; {report.seconds:.0f} s"
+        f"[bold]{escape(about.name)}[/] {about.sha256[:8]}, worlds 0 to "
+        f"{report.count - 1} of {about.split}: {report.successes} reached, "
+        f"{report.count - report.successes} failed; {report.seconds:.0f} s"
     )
     if report.scores is not None and report.interval is not None:
         say(_scores(report, report.scores))
@@ -134,23 +137,27 @@ def show(report: SetReport, console: Console) -> None:
         verdict = "verified" if report.passed else "not verified"
         say(
             f"[bold {colour}]{verdict}[/]: {decision_text(result)} after "
-            f"{report.worlds} of at most {result.test.limit} worlds"
+            f"{report.count} of at most {result.test.limit} worlds"
         )
         say(error_rates(result))
     else:
         say("no verdict: -n asks for scores; leave it out for a verdict")
     if report.hidden is not None:
-        say(_counted(report.hidden, about.set))
+        say(_counted(report.hidden, about.name))
 
 
 def _say_how_to_go_on(
-    report: SetReport, name: str, controller: str, out: Path | None, console: Console
+    report: EpisodeReport,
+    name: str,
+    controller: str,
+    out: Path | None,
+    console: Console,
 ) -> None:
     """Prints how to see the first failure, and where the files are."""
     failed = [episode.index for episode in report.episodes if not episode.success]
     if failed:
         play = ["tdac", "play", controller, "--set", name]
-        play += ["--split", report.provenance.split, "--index", str(failed[0])]
+        play += ["--split", str(report.provenance.split), "--index", str(failed[0])]
         # Not wrapped, so that it can be copied.
         line = f"watch the first failure: [bold]{escape(shlex.join(play))}[/]"
         console.print(line, soft_wrap=True, highlight=False)
@@ -160,11 +167,11 @@ def _say_how_to_go_on(
         console.print(line, soft_wrap=True, highlight=False)
 
 
-def _say_refused(report: SetReport, console: Console) -> None:
+def _say_refused(report: EpisodeReport, console: Console) -> None:
     """Prints the tests that failed; no world was driven."""
     about, tests = report.provenance, list(report.tests.values())
     console.print(
-        f"[bold]{escape(about.set)}[/] {about.set_sha256[:8]}: "
+        f"[bold]{escape(about.name)}[/] {about.sha256[:8]}: "
         f"{tests.count('failed')} of {len(tests)} tests failed, so no world was driven",
         highlight=False,
     )
@@ -185,7 +192,7 @@ def _counted(hidden: HiddenCount, name: str) -> str:
     return text
 
 
-def _scores(report: SetReport, whole: Scores) -> Table:
+def _scores(report: EpisodeReport, whole: Scores) -> Table:
     """A row for each generator, and one for all worlds."""
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
     table.add_column("worlds")

@@ -66,8 +66,13 @@ class Trajectory:
         since = max(step - math.ceil(GHOST_SECONDS / self.dt), 0)
         return list(self.movers[since : step + 1].astype(np.float64))
 
-    def save(self, path: Path) -> None:
-        """Writes an `.npz` with one array per attribute."""
+    def save(self, path: Path, calls: NDArray[np.float64] | None = None) -> None:
+        """Writes an `.npz` with one array per attribute.
+
+        Args:
+            path: The file.
+            calls: Duration of each call of the policy, s, to be kept beside them.
+        """
         arrays: dict[str, Any] = {
             "schema_version": SCHEMA_VERSION,
             "poses": self.poses,
@@ -79,6 +84,8 @@ class Trajectory:
         }
         if self.movers is not None:
             arrays["movers"] = self.movers
+        if calls is not None:
+            arrays["calls"] = calls.astype(np.float32)
         np.savez_compressed(path, **arrays)
 
     @classmethod
@@ -107,6 +114,19 @@ class Trajectory:
                 f"{path} is not a trajectory: {one_line_reason(error)}"
             ) from error
         return loaded
+
+
+def load_calls(path: Path) -> NDArray[np.float32]:
+    """The durations of the calls beside a trajectory, s; none if it has none.
+
+    Raises:
+        RunError: The file is missing or damaged.
+    """
+    try:
+        found = _arrays(read_file(path, MOST_BYTES)).get("calls", np.zeros(0))
+        return np.asarray(found, np.float32).reshape(-1)
+    except (OSError, ValueError, LookupError) as error:
+        raise RunError(f"{path}: {one_line_reason(error)}") from error
 
 
 def _arrays(content: bytes) -> dict[str, NDArray[Any]]:

@@ -1,24 +1,25 @@
-"""The results of an evaluation: a row per policy and task, and comparisons."""
+"""The results of an evaluation: a row per policy and problem, and comparisons."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from statistics import fmean, median
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 
 from tdac_agent.episodes.trajectory import Outcome
-from tdac_agent.evaluation.robust_report import Interval, success_interval
 from tdac_agent.metrics.exact import sign_test
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.units import Place
-from tdac_agent.verification.diagnosis.measures import Measured
+from tdac_agent.verification.episode_report import EpisodeReport, Interval
 from tdac_agent.verification.judge.drivers import Kind
+from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,15 +32,15 @@ class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-class EvaluatedTask(_Record):
-    """A task of the evaluation."""
+class EvaluatedProblem(_Record):
+    """A task or a task set of the evaluation."""
 
     name: str
     called: str = Field("", description="Display name; with details unless bundled.")
-    task_sha256: str
-    map_sha256: str
+    sha256: str
+    map_sha256: str | None = Field(None, description="Of the map or world of a task.")
+    split: str | None = Field(None, description="Of a set.")
     unit: Place = Field(description="Unit of lengths.")
-    body_radius: float
 
 
 class EvaluatedPolicy(_Record):
@@ -47,23 +48,25 @@ class EvaluatedPolicy(_Record):
 
     name: str
     kind: Kind
-    knows: str = Field(description="Information that it may use.")
     wrappers: tuple[str, ...] = ()
     sha256: str | None = Field(None, description="Hash of its file, if any.")
 
 
 class PolicyRow(_Record):
-    """One policy on one task. Medians over successes are None without a success."""
+    """One policy on one problem. Medians over successes are None without a success."""
 
-    task: str
+    task: str = Field(description="The task or the task set.")
     policy: str
-    knows: str
-    episodes: int
+    knows: str = Field(description="Information that it may use.")
+    episodes: int = Field(description="0 if tests refused it on a set.")
     successes: int
-    rate: float
-    interval: Interval
+    rate: float | None
+    interval: Interval | None
+    scores: Scores | None
+    by_generator: dict[str, Scores] = Field(description="Empty on a task.")
     collided: int = Field(description="Episodes with a contact.")
     outcomes: dict[Outcome, int]
+    causes: dict[str, int] = Field(description="Failures by cause.")
     time_ratio: float | None = Field(
         description="Median over successes: time / shortest path's time at full speed."
     )
@@ -76,16 +79,21 @@ class PolicyRow(_Record):
     smoothness: float | None = Field(
         description="Median over successes: spectral arc length of the speed (SPARC)."
     )
-    clearance_min: float = Field(description="Smallest gap to the body; 0 if touched.")
-    clearance_mean: float = Field(description="Mean over the episodes' mean gaps.")
+    clearance_min: float | None = Field(
+        description="Smallest gap to the body; 0 if touched."
+    )
+    clearance_mean: float | None = Field(
+        description="Mean over the episodes' mean gaps."
+    )
     reasons: dict[str, int] = Field(description="Most frequent errors, counted.")
+    told: tuple[str, ...] = Field(description="Up to three failures.")
     controller_sha256: str | None = None
     sandbox: str = Field(description="Sandbox tier; none if it needs no sandbox.")
     note: str | None = None
 
 
 class PairedComparison(_Record):
-    """Two policies on the same seeds of a task: exact McNemar test, two-sided.
+    """Two policies in the same episodes: exact McNemar test, two-sided.
 
     Under the null hypothesis, either policy wins half of the episodes in which exactly
     one of them succeeds. The p-value is not corrected for multiple comparisons.
@@ -114,96 +122,118 @@ class Timing(_Record):
     p99_ms: float
 
 
-class Result(_Record):
-    """The episodes of one policy on one task, in the order of the seeds."""
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One policy on one problem, in the order of the episodes.
+
+    Attributes:
+        task: Name of the task or task set.
+        policy: Name of the policy.
+        knows: What it may use.
+        report: What it did.
+        note: What to say of it, if anything.
+    """
 
     task: str
     policy: str
     knows: str
-    episodes: tuple[Measured, ...]
-    sandbox: str
-    controller_sha256: str | None = None
+    report: EpisodeReport
     note: str | None = None
+
+    @property
+    def episodes(self) -> tuple[EpisodeRow, ...]:
+        """Its episodes."""
+        return self.report.episodes
 
 
 class Evaluation(_Record):
-    """Policies on the same tasks and seeds, by the same judge.
+    """Policies in the same episodes of the same problems, by the same judge.
 
     The JSON form depends on the arguments only, not on wall times.
     """
 
-    schema_version: Literal[1] = 1
-    variation: str
-    seed: int
-    episodes: int = Field(description="Episodes of each policy on each task.")
-    tasks: tuple[EvaluatedTask, ...]
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+    schema_version: Literal[2] = 2
+    variation: str | None = Field(description="Of the starts of tasks.")
+    seed: int | None = Field(description="Of the episodes of tasks.")
+    episodes: int = Field(description="Episodes of each policy on each problem.")
+    tasks: tuple[EvaluatedProblem, ...]
     policies: tuple[EvaluatedPolicy, ...]
     rows: tuple[PolicyRow, ...]
     comparisons: tuple[PairedComparison, ...]
     versions: dict[str, str]
-    results: tuple[Result, ...] = Field(exclude=True)
-    timings: tuple[Timing, ...] = Field(exclude=True)
+    results: tuple[Result, ...] = Field((), exclude=True)
+    timings: tuple[Timing, ...] = Field((), exclude=True)
 
     @property
     def all_crashed(self) -> bool:
         """Whether each policy failed with an error of its own in every episode."""
         return all(row.outcomes.get("error", 0) == row.episodes for row in self.rows)
 
+    def of(self, task: str) -> tuple[PolicyRow, ...]:
+        """The rows of a problem."""
+        return tuple(row for row in self.rows if row.task == task)
+
     def to_frame(self) -> pd.DataFrame:
         """Tidy data with a row for each episode; lengths in the unit of its task."""
         import pandas as pd
 
-        units = {task.name: task.unit for task in self.tasks}
-        return pd.DataFrame(
-            [
-                {
+        return pd.DataFrame(self._episodes()).dropna(axis="columns", how="all")
+
+    def _episodes(self) -> Iterator[dict[str, Any]]:
+        about = {each.name: each for each in self.tasks}
+        for result in self.results:
+            own = about[result.task]
+            for number, episode in enumerate(result.episodes):
+                yield {
                     "task": result.task,
+                    "split": own.split,
                     "policy": result.policy,
                     "knows": result.knows,
-                    "unit": units[result.task],
+                    "unit": own.unit,
                     "episode": number,
                     "success": episode.success,
-                    **episode.model_dump(),
+                    **episode.model_dump(exclude={"cpu_seconds"}),
                 }
-                for result in self.results
-                for number, episode in enumerate(result.episodes)
-            ]
-        )
 
     def timing_frame(self) -> pd.DataFrame:
-        """A row for each policy on each task: call times, ms."""
+        """A row for each policy on each problem: call times, ms."""
         import pandas as pd
 
         return pd.DataFrame([timing.model_dump() for timing in self.timings])
 
 
 def row_of(result: Result) -> PolicyRow:
-    """The row for one policy on one task."""
-    episodes = result.episodes
+    """The row for one policy on one problem."""
+    episodes, report = result.episodes, result.report
     successes = [episode for episode in episodes if episode.success]
     reasons = Counter(e.error for e in episodes if e.error is not None)
-    count = len(episodes)
+    spl = sum(1.0 / max(e.path_ratio or 1.0, 1.0) for e in successes)
+    gaps = [each.clearance_min for each in episodes if each.clearance_min is not None]
+    means = [e.clearance_mean for e in episodes if e.clearance_mean is not None]
     return PolicyRow(
         task=result.task,
         policy=result.policy,
         knows=result.knows,
-        episodes=count,
-        successes=len(successes),
-        rate=len(successes) / count,
-        interval=success_interval(len(successes), count),
-        collided=sum(episode.collisions > 0 for episode in episodes),
+        episodes=report.count,
+        successes=report.successes,
+        rate=report.rate,
+        interval=report.interval,
+        scores=report.scores,
+        by_generator=report.by_generator,
+        collided=sum(e.collisions > 0 or e.outcome == "collision" for e in episodes),
         outcomes=dict(Counter(e.outcome for e in episodes).most_common()),
+        causes=report.causes,
         time_ratio=_median(e.time_ratio for e in successes),
         path_ratio=_median(e.path_ratio for e in successes),
-        spl=round(
-            sum(1.0 / max(e.path_ratio or 1.0, 1.0) for e in successes) / count, 6
-        ),
+        spl=round(spl / max(1, report.count), _DIGITS),
         smoothness=_median(e.smoothness for e in successes),
-        clearance_min=min(e.clearance_min for e in episodes),
-        clearance_mean=round(fmean(e.clearance_mean for e in episodes), _DIGITS),
+        clearance_min=min(gaps, default=None),
+        clearance_mean=round(fmean(means), _DIGITS) if means else None,
         reasons=dict(reasons.most_common(MOST_REASONS)),
-        controller_sha256=result.controller_sha256,
-        sandbox=result.sandbox,
+        told=report.told,
+        controller_sha256=report.provenance.controller_sha256 or None,
+        sandbox=report.provenance.sandbox,
         note=result.note,
     )
 
@@ -214,11 +244,11 @@ def _median(values: Iterable[float | None]) -> float | None:
 
 
 def comparisons_of(results: Sequence[Result]) -> tuple[PairedComparison, ...]:
-    """Compares all pairs of policies on each task; those of equal information first."""
+    """Compares all pairs of policies that drove; those of equal information first."""
     pairs = [
         compare(one, other)
         for one, other in combinations(results, 2)
-        if one.task == other.task
+        if one.task == other.task and one.episodes and other.episodes
     ]
     return tuple(sorted(pairs, key=lambda pair: pair.equal_information is None))
 
@@ -227,10 +257,10 @@ def compare(one: Result, other: Result) -> PairedComparison:
     """Compares two policies.
 
     Raises:
-        ValueError: The results are not of the same task and seeds.
+        ValueError: The results are not of the same task and episodes.
     """
-    seeds = [[episode.seed for episode in r.episodes] for r in (one, other)]
-    if one.task != other.task or seeds[0] != seeds[1]:
+    numbers = [[episode.number for episode in r.episodes] for r in (one, other)]
+    if one.task != other.task or numbers[0] != numbers[1]:
         raise ValueError(f"{one.policy} and {other.policy} drove different episodes")
     ours = [episode.success for episode in one.episodes]
     theirs = [episode.success for episode in other.episodes]

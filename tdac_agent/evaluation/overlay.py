@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_agent.episodes.pictures import pictures_of
+from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.evaluation.evaluation_report import Result
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import write_png
-from tdac_agent.verification.judge.kept_episodes import KeptEpisode
 from tdac_envs.drawing.backdrop import discs_on
 from tdac_envs.drawing.canvas import (
     GREY,
@@ -51,23 +51,24 @@ class Overlay:
         label: Name of the policy, and number of successes.
         ways: Poses of each episode, shape (T + 1, 3).
         collided: Whether each episode had a contact.
-        movers: Moving obstacles at the end of the first episode; see `KeptEpisode`.
+        movers: Moving obstacles at the end of the first episode; `Trajectory.ghosts`.
     """
 
     label: str
-    ways: Sequence[NDArray[np.float32]]
+    ways: Sequence[NDArray[np.float64]]
     collided: Sequence[bool]
-    movers: NDArray[np.float32]
+    movers: Sequence[NDArray[np.float64]]
 
     @classmethod
-    def of(cls, result: Result, kept: Sequence[KeptEpisode]) -> Overlay:
-        """The overlay of a result."""
+    def of(cls, result: Result, driven: Sequence[Trajectory]) -> Overlay:
+        """The overlay of a result, with the trajectory of each episode."""
         reached = sum(episode.success for episode in result.episodes)
         label = f"{result.policy}: {reached} of {len(result.episodes)}"
         ascii_label = label.encode("ascii", "replace").decode()
         touched = [episode.collisions > 0 for episode in result.episodes]
-        ways = [episode.poses for episode in kept]
-        return cls(ascii_label, ways, touched, kept[0].movers)
+        ways = [each.poses for each in driven]
+        ghosts = driven[0].ghosts(driven[0].steps)
+        return cls(ascii_label, ways, touched, ghosts)
 
 
 def draw_overlay(task: Task, overlays: Sequence[Overlay], path: Path) -> None:
@@ -82,7 +83,7 @@ def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
     the end of the first policy's first episode.
     """
     chart = pictures_of(task.setting).backdrop().whole()
-    canvas, movers = chart.canvas, overlays[0].movers.astype(np.float64)
+    canvas, movers = chart.canvas, overlays[0].movers
     draw_movers(canvas, [discs_on(chart, discs) for discs in movers])
     for number, overlay in reversed(list(enumerate(overlays))):
         colour = COLOURS[number % len(COLOURS)]
@@ -93,7 +94,7 @@ def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
         _draw_paths(canvas.image, places, colour)
         _draw_contacts(canvas.image, places, overlay.collided, colour)
     others = [(GREY, "shortest path")]
-    if movers.size:
+    if movers:
         others.append((MOVER, "movers at the end (first episode)"))
     return np.vstack([canvas.image, _legend(overlays, others, canvas.image.shape[1])])
 

@@ -13,15 +13,15 @@ from typing import Any
 import jinja2
 
 from tdac_agent.errors import RunError
-from tdac_agent.evaluation.salt import SALT_BYTES
-from tdac_agent.evaluation.set_verify import limits_of, write_set
 from tdac_agent.harbor.judge import SALT_FILE, TASK_FOLDER, WORLDS_FILE
 from tdac_agent.harbor.wheel import pinned_versions, write_wheel
+from tdac_agent.problems.episodes import episodes_of, write_set
 from tdac_agent.problems.problem import LevelProblem, Problem, TaskProblem
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.tasks.task_file import SET_FILE
+from tdac_agent.verification.salt import SALT_BYTES
 from tdac_agent.verification.verify import DEADLINE_SECONDS, suite_sha256
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -86,7 +86,7 @@ def export_set(tasks: TaskSet, out: Path, worlds: int = WORLDS) -> Path:
     _check_empty(out)
     salt = secrets.token_bytes(SALT_BYTES)
     problem = LevelProblem(tasks, worlds)
-    longest = limits_of(tasks).cpu_seconds * worlds
+    longest = episodes_of(tasks).limits.cpu_seconds * worlds
     tests = _write_common(
         problem,
         out,

@@ -9,10 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import TypeAdapter, ValidationError
-
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.models.picture import MEDIA_TYPE
+from tdac_agent.runs.episode_pictures import failure_pictures
 from tdac_agent.runs.history import RunHistory
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.selection_record import (
@@ -21,11 +20,10 @@ from tdac_agent.runs.selection_record import (
     read_hidden,
     read_selection,
 )
-from tdac_agent.runs.world_pictures import failure_pictures
 from tdac_agent.tasks.task_file import SET_FILE
-from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.judge.episode_row import EpisodeRow
+from tdac_agent.verification.store import read_report
 from tdac_envs.core.errors import TdacError
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 MOST_DRAWN = 6
@@ -38,8 +36,7 @@ PURPOSES = {
     "comparison": "world of the comparison",
 }
 """Names of worlds by what a candidate drove there for, in this order."""
-_EPISODES = TypeAdapter(tuple[WorldEpisode, ...])
-_Driven = tuple[Path, list[tuple[str, WorldEpisode]]]
+_Driven = tuple[Path, list[tuple[str, EpisodeRow]]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +104,7 @@ def _driven(candidate: Path) -> Iterator[_Driven]:
     for purpose, name in PURPOSES.items():
         for folder in sorted(candidate.glob(f"{purpose}-*"), key=_number):
             named = []
-            for episode in _episodes(folder / "set.json"):
+            for episode in _episodes(folder):
                 counts[purpose] += 1
                 named.append((f"{name} {counts[purpose]}", episode))
             yield folder, named
@@ -118,13 +115,10 @@ def _number(folder: Path) -> int:
     return int(found.group()) if found else 0
 
 
-def _episodes(file: Path) -> tuple[WorldEpisode, ...]:
+def _episodes(folder: Path) -> tuple[EpisodeRow, ...]:
     """The episodes of a report; none if it cannot be read."""
-    try:
-        content = parse_json(read_file(file, RECORD_BYTES))
-        return _EPISODES.validate_python(content["episodes"])
-    except (OSError, ValueError, KeyError, TypeError, ValidationError):
-        return ()
+    report = read_report(folder)
+    return () if report is None else report.episodes
 
 
 def _drawn(tasks: TaskSet, driven: list[_Driven]) -> Iterator[DrawnFailure]:

@@ -11,9 +11,6 @@ from tdac_agent.environments.epuck import pictures as on_worlds
 from tdac_agent.environments.map2d import pictures as on_maps
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
-from tdac_agent.evaluation.kept_sets import TRAJECTORIES
-from tdac_agent.evaluation.robust_report import decision_text
-from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.mcp.answers import ChooseAnswer, EpisodeAnswer, Judged, Left, Refused
 from tdac_agent.mcp.judging import Submission
 from tdac_agent.prompting.prompt import FULL
@@ -26,7 +23,9 @@ from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
 from tdac_agent.set_synthesis.hidden import verify_hidden
 from tdac_agent.set_synthesis.trials import SET_REPORT, Candidate, Trials
 from tdac_agent.verification.diagnosis.figures import contact_of
-from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.episode_report import EpisodeReport, decision_text
+from tdac_agent.verification.judge.episode_row import EpisodeRow
+from tdac_agent.verification.store import TRAJECTORIES
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drawing.closeup import Event, run_picture
@@ -92,7 +91,7 @@ class OnSet:
     def recorded(self, number: int, folder: Path) -> Judged:
         """See `Judging`."""
         report = _report(folder / FEEDBACK / SET_REPORT)
-        self.trials.feedback_left -= report.worlds
+        self.trials.feedback_left -= report.count
         return _judged(number, report)
 
     def picture(self, submission: Submission, episode: str) -> bytes:
@@ -103,13 +102,13 @@ class OnSet:
         if figures is None:
             known = ", ".join(found) or "none: no episode was driven"
             raise Refused(f"there is no episode {episode[:80]!r}; those are {known}")
-        name = f"{figures.index}.npz"
+        name = f"{figures.number}.npz"
         try:
             place = submission.folder / FEEDBACK / TRAJECTORIES / name
             trajectory = Trajectory.load(place)
         except RunError as error:
-            raise Refused(f"there is no record of world {figures.index}") from error
-        task = self.trials.tasks.task("dev", figures.index)
+            raise Refused(f"there is no record of world {figures.number}") from error
+        task = self.trials.tasks.task("dev", figures.number)
         return png(_picture(task, trajectory, figures))
 
     def choose(self, submission: Submission) -> None:
@@ -128,7 +127,7 @@ class OnSet:
         """See `Judging`."""
         report = _report(self.recorder.run.folder / HIDDEN_FILE)
         parts = [
-            f"the goal reached in {report.successes} of {report.worlds} hidden worlds"
+            f"the goal reached in {report.successes} of {report.count} hidden worlds"
         ]
         if report.refused:
             parts = ["the static and contract tests refused the file"]
@@ -141,20 +140,20 @@ class OnSet:
             submission=number,
             verified=report.passed,
             summary="; ".join(parts),
-            worlds=report.worlds,
+            worlds=report.count,
             reached=report.successes,
         )
 
 
-def _report(path: Path) -> SetReport:
-    return SetReport.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+def _report(path: Path) -> EpisodeReport:
+    return EpisodeReport.model_validate(parse_json(read_file(path, RECORD_BYTES)))
 
 
-def _judged(number: int, report: SetReport) -> Judged:
+def _judged(number: int, report: EpisodeReport) -> Judged:
     summary = summary_of(report)
     if report.scores is not None:
         summary += f"; mean score {report.scores.time:.3f}"
-    all_reached = not report.refused and report.successes == report.worlds
+    all_reached = not report.refused and report.successes == report.count
     failures = f"nothing failed: {summary}; only choose({number}) can verify it"
     return Judged(
         False,
@@ -168,9 +167,9 @@ def _judged(number: int, report: SetReport) -> Judged:
     )
 
 
-def _picture(task: AnyTask, trajectory: Trajectory, figures: WorldEpisode) -> Image:
+def _picture(task: AnyTask, trajectory: Trajectory, figures: EpisodeRow) -> Image:
     """The world with the robot's path; for a failure, also a close-up of its end."""
-    name = f"world {figures.index}"
+    name = f"world {figures.number}"
     if figures.success:
         return _whole(task, trajectory, figures.outcome, name)
     text = (figures.text or figures.error or "").replace("°", " deg")

@@ -14,8 +14,6 @@ from typing import Any, ClassVar, Protocol
 
 from tdac_agent.builtin.level import controller_of
 from tdac_agent.errors import RunError
-from tdac_agent.evaluation.set_report import SetReport
-from tdac_agent.evaluation.set_verify import JUDGED, MOST_EPISODES, verify_on_set
 from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.prompt import FULL, generate_prompt
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
@@ -24,8 +22,11 @@ from tdac_agent.set_synthesis.feedback import set_feedback, summary_of
 from tdac_agent.set_synthesis.trials import BLOCKS
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task import Task, write_workdir
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.judge.set_files import level_params
 from tdac_agent.verification.verify import verify
+from tdac_agent.verification.verify_episodes import JUDGED, verify_episodes
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet, load_set
@@ -186,11 +187,11 @@ class LevelProblem:
 
     def judge(self, source: bytes, poll: Poll) -> Judged:
         """See `Problem`."""
-        report = verify_on_set(
+        report = verify_episodes(
             source,
             self.tasks,
-            self.split,
             self.worlds,
+            split=self.split,
             salt_file=self.salt_file,
             watch=lambda _done, _reached: poll(),
         )
@@ -198,11 +199,11 @@ class LevelProblem:
 
     def rehearse(self, source: bytes, turn: int, poll: Poll) -> Judged:
         """See `Problem`. Drives on other worlds in each turn, never on those judged."""
-        report = verify_on_set(
+        report = verify_episodes(
             source,
             self.tasks,
-            "dev",
             FEEDBACK_WORLDS,
+            split="dev",
             first=BLOCKS + turn * FEEDBACK_WORLDS,  # not the judged ones of `dev`
             watch=lambda _done, _reached: poll(),
         )
@@ -240,11 +241,11 @@ def unusable(problem: str) -> str:
     )
 
 
-def _driven(report: SetReport) -> Judged:
+def _driven(report: EpisodeReport) -> Judged:
     """The scores on worlds of a level; 0 if the tests refused the file."""
     about, scores = report.provenance, report.scores
-    failed = report.refused or report.successes < report.worlds
-    told = report.worlds == 0 or bool(report.told)
+    failed = report.refused or report.successes < report.count
+    told = report.count == 0 or bool(report.told)
     line = summary_of(report)
     return Judged(
         passed=not failed,
@@ -254,7 +255,7 @@ def _driven(report: SetReport) -> Judged:
         },
         feedback=set_feedback(report).text if failed and told else line,
         facts={
-            "set_sha256": about.set_sha256,
+            "set_sha256": about.sha256,
             "split": about.split,
             "salt_sha256": about.salt_sha256,
             "controller_sha256": about.controller_sha256,

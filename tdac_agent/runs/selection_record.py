@@ -7,6 +7,7 @@ from pathlib import Path
 from pydantic import ConfigDict, Field, ValidationError
 
 from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.verification.judge.episode_row import Scores
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 SELECTION_FILE = "report.json"
@@ -16,15 +17,6 @@ HIDDEN_FILE = "hidden.json"
 
 class _Record(PrintableRecord):
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Scores(_Record):
-    """Means over a fixed number of worlds, each in [0, 1]."""
-
-    success: float
-    time: float = Field(description="Success weighted by completion time, SCT.")
-    path: float = Field(description="Success weighted by path length, SPL.")
-    barn: float = Field(description="The metric of BARN, at most 0.5.")
 
 
 class CandidateFigures(_Record):

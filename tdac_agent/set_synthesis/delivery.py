@@ -94,7 +94,7 @@ def _figures(candidate: Candidate) -> CandidateFigures:
         k=candidate.k,
         j=candidate.j,
         controller_sha256=_sha256(candidate),
-        feedback_worlds=sum(report.worlds for report in drives),
+        feedback_worlds=sum(report.count for report in drives),
         feedback_reached=sum(report.successes for report in drives),
         validation_worlds=len(candidate.validation),
         validation_reached=sum(each.success for each in candidate.validation),

@@ -6,7 +6,6 @@ from dataclasses import astuple, dataclass
 from pathlib import Path
 from statistics import fmean
 
-from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.set_synthesis.feedback import set_feedback
 from tdac_agent.set_synthesis.pictures import world_picture
@@ -14,6 +13,7 @@ from tdac_agent.set_synthesis.trials import Candidate, Trials
 from tdac_agent.synthesis.archive import Archive, Member
 from tdac_agent.synthesis.improve import FOUNDERS, Explored
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
+from tdac_agent.verification.episode_report import EpisodeReport
 
 FINALISTS = 4
 """Most candidates that go on to the selection."""
@@ -39,7 +39,7 @@ class SetFigures:
     ranked = ("mean time score",)
 
     @classmethod
-    def of(cls, report: SetReport) -> SetFigures:
+    def of(cls, report: EpisodeReport) -> SetFigures:
         """The figures of a report with episodes."""
         episodes = report.episodes
         times = sorted(each.time_score for each in episodes)
@@ -116,13 +116,13 @@ class SetExplorer:
     def explore(self, candidate: Candidate) -> Explored:
         """See `Explorer`."""
         report = self.trials.explore(candidate)
-        if not report.worlds:
+        if not report.count:
             refused = set_feedback(report).line
             return Explored(None, refused, failed=tuple(report.told), drove=False)
         return Explored(
             SetFigures.of(report),
-            f"the goal reached in {report.successes} of {report.worlds} worlds",
-            passed=report.successes == report.worlds,
+            f"the goal reached in {report.successes} of {report.count} worlds",
+            passed=report.successes == report.count,
             failed=tuple(report.causes),
         )
 
@@ -131,7 +131,7 @@ class SetExplorer:
         report = _report(member.candidate)
         own = SetFigures.of(report)
         return [
-            f"On {report.worlds} worlds, the same for all controllers:",
+            f"On {report.count} worlds, the same for all controllers:",
             f"- mean time score (success weighted by time): {own.time:.3f}; the best "
             f"controller so far has {best.figures.time:.3f}",
             f"- on the worst quarter of the worlds: {own.worst:.3f}",
@@ -142,7 +142,7 @@ class SetExplorer:
     def feedback(self, candidate: Candidate) -> str | None:
         """See `Explorer`."""
         report = _report(candidate)
-        if report.successes == report.worlds:
+        if report.successes == report.count:
             return None
         return set_feedback(report).text
 
@@ -152,6 +152,6 @@ class SetExplorer:
         return world_picture(self.trials.tasks, _report(candidate), folder)
 
 
-def _report(candidate: Candidate) -> SetReport:
+def _report(candidate: Candidate) -> EpisodeReport:
     assert candidate.explored is not None
     return candidate.explored

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tdac_agent.evaluation.kept_sets import TRAJECTORIES
-from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.models.picture import LARGEST_SIDE
-from tdac_agent.runs.world_pictures import failure_pictures
+from tdac_agent.runs.episode_pictures import failure_pictures
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.store import TRAJECTORIES
 from tdac_envs.ladder.task_sets import TaskSet
 
 
 def world_picture(
-    tasks: TaskSet, report: SetReport, folder: Path
+    tasks: TaskSet, report: EpisodeReport, folder: Path
 ) -> FailurePicture | None:
     """The picture of the first failed episode of a report that has a diagnosis.
 

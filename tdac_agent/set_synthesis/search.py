@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.models.provider import is_fixed
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.python_source import same_code
@@ -17,6 +16,7 @@ from tdac_agent.set_synthesis.pictures import world_picture
 from tdac_agent.set_synthesis.trials import Candidate, Trials
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer, same_as
 from tdac_agent.synthesis.iterations import MOST_SPENT, given_up
+from tdac_agent.verification.episode_report import EpisodeReport
 
 if TYPE_CHECKING:
     from tdac_agent.verification.diagnosis.model_picture import FailurePicture
@@ -191,7 +191,7 @@ class _Search:
         fixed = is_fixed(dialogue.learner) and is_fixed(dialogue.optimizer)
         return fixed and not (self._is_given and first)
 
-    def _test(self, candidate: Candidate) -> SetReport | None:
+    def _test(self, candidate: Candidate) -> EpisodeReport | None:
         """The first report with a failure, if there is one.
 
         The last candidate has one test, since nobody uses what more of them tell.
@@ -227,16 +227,16 @@ class _Search:
         report = candidate.first_failure
         if report is None and goes_on:
             report = self._test(candidate)
-        drives = [each for each in candidate.feedback if each.worlds]
-        worlds = sum(each.worlds for each in drives)
+        drives = [each for each in candidate.feedback if each.count]
+        worlds = sum(each.count for each in drives)
         reached = sum(each.successes for each in drives)
         said = f"the goal reached in {reached} of {worlds} worlds"
         if not candidate.feedback:
             said = "not tested: no feedback episodes are left"
         if report is not None:
-            before = f"{worlds - report.worlds} worlds without a failure, then "
+            before = f"{worlds - report.count} worlds without a failure, then "
             said = summary_of(report)
-            said = before + said if worlds > report.worlds else said
+            said = before + said if worlds > report.count else said
         failure = None if report is None else set_feedback(report)
         self._recorder.attempted(
             Attempt(

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from tdac_agent.evaluation.set_report import scores_of
-from tdac_agent.runs.selection_record import Scores
 from tdac_agent.set_synthesis.trials import Candidate
+from tdac_agent.verification.judge.episode_row import Scores, scores_of
 
 
 def scores_of_selected(candidate: Candidate) -> Scores | None:

@@ -10,13 +10,13 @@ from statistics import fmean
 
 from pydantic import ValidationError
 
-from tdac_agent.evaluation.set_report import SetReport
-from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.synthesis.workload import Shares
 from tdac_agent.tasks.provenance import sha256_of, versions
-from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -25,7 +25,7 @@ BLOCKS = 2**30
 PURPOSES = ("feedback", "validation", "improve", "comparison")
 """What worlds are used for, in the order of their numbers."""
 MOST_EPISODES = 100_000
-SET_REPORT = "set.json"
+SET_REPORT = "episodes.json"
 
 
 @dataclass(slots=True)
@@ -46,14 +46,14 @@ class Candidate:
     j: int
     source: str
     folder: Path
-    feedback: list[SetReport] = field(default_factory=list)
-    validation: list[WorldEpisode] = field(default_factory=list)
-    explored: SetReport | None = None
+    feedback: list[EpisodeReport] = field(default_factory=list)
+    validation: list[EpisodeRow] = field(default_factory=list)
+    explored: EpisodeReport | None = None
 
     @property
     def drives(self) -> bool:
         """Whether it passed the static and contract tests, so that it drove."""
-        return any(report.worlds for report in self.feedback)
+        return any(report.count for report in self.feedback)
 
     @property
     def explored_score(self) -> float | None:
@@ -62,9 +62,9 @@ class Candidate:
         return _mean(report.episodes) if report and report.episodes else None
 
     @property
-    def first_failure(self) -> SetReport | None:
+    def first_failure(self) -> EpisodeReport | None:
         """The report that ended its tests; None if it has not failed so far."""
-        failed = (r for r in self.feedback if not r.worlds or r.successes < r.worlds)
+        failed = (r for r in self.feedback if not r.count or r.successes < r.count)
         return next(failed, None)
 
     @property
@@ -92,7 +92,7 @@ class Candidate:
         return _mean(self.validation)
 
 
-def _mean(episodes: Sequence[WorldEpisode]) -> float:
+def _mean(episodes: Sequence[EpisodeRow]) -> float:
     return fmean(each.time_score for each in episodes) if episodes else 0.0
 
 
@@ -149,7 +149,7 @@ class Trials:
         assert run.seed is not None
         return first_world(run.seed, run.index)
 
-    def test(self, candidate: Candidate) -> SetReport | None:
+    def test(self, candidate: Candidate) -> EpisodeReport | None:
         """The first report with a failure; None if the episodes end without one.
 
         A candidate that reaches all goals goes on with the next worlds.
@@ -169,18 +169,20 @@ class Trials:
             if self.feedback_left >= count:
                 self._give_feedback(candidate, first, count)
 
-    def drive_next(self, candidate: Candidate) -> SetReport:
+    def drive_next(self, candidate: Candidate) -> EpisodeReport:
         """Drives on the next block of feedback worlds; there must be some left."""
         count = min(self.block, self.feedback_left)
         first = self.first + self.feedback_used
         return self._give_feedback(candidate, first, count)
 
-    def _give_feedback(self, candidate: Candidate, first: int, count: int) -> SetReport:
+    def _give_feedback(
+        self, candidate: Candidate, first: int, count: int
+    ) -> EpisodeReport:
         out = candidate.feedback_folder(len(candidate.feedback) + 1)
         report = self._drive(candidate, first, count, out)
         candidate.feedback.append(report)
-        self.feedback_used += report.worlds
-        self.feedback_left -= report.worlds
+        self.feedback_used += report.count
+        self.feedback_left -= report.count
         return report
 
     def validate(self, candidate: Candidate, count: int) -> None:
@@ -190,24 +192,24 @@ class Trials:
         out = candidate.folder / f"validation-{done + 1}"
         report = self._drive(candidate, first, count, out)
         candidate.validation.extend(report.episodes)
-        self.validation_used += report.worlds
-        self.validation_left -= report.worlds
+        self.validation_used += report.count
+        self.validation_left -= report.count
 
-    def explore(self, candidate: Candidate) -> SetReport:
+    def explore(self, candidate: Candidate) -> EpisodeReport:
         """Drives on the worlds for variations, the same ones for each candidate."""
         first, count = self._first_for("improve"), self.shares.block
         report = self._drive(candidate, first, count, candidate.exploring_folder)
         candidate.explored = report
-        self.explore_used += report.worlds
-        self.explore_left -= report.worlds
+        self.explore_used += report.count
+        self.explore_left -= report.count
         return report
 
-    def compare(self, candidate: Candidate) -> SetReport:
+    def compare(self, candidate: Candidate) -> EpisodeReport:
         """Drives on the worlds of the comparison at the end, which decide nothing."""
         first, count = self._first_for("comparison"), self.shares.comparison
         out = candidate.folder / "comparison-1"
         report = self._drive(candidate, first, count, out)
-        self.comparison_used += report.worlds
+        self.comparison_used += report.count
         return report
 
     def _first_for(self, purpose: str) -> int:
@@ -216,7 +218,7 @@ class Trials:
 
     def _drive(
         self, candidate: Candidate, first: int, count: int, out: Path
-    ) -> SetReport:
+    ) -> EpisodeReport:
         """Drives on worlds of `dev`; a report on record is reused."""
         k, j = candidate.k, candidate.j
         about = {"k": k, "j": j, "what": out.name.partition("-")[0], "worlds": count}
@@ -227,11 +229,11 @@ class Trials:
         if self.recorder.run.mark:
             report = kept_report(out, self.tasks, source, first, count)
         if report is None:
-            report = verify_on_set(
+            report = verify_episodes(
                 source,
                 self.tasks,
-                "dev",
                 count,
+                split="dev",
                 first=first,
                 tier=self.tier,
                 out=out,
@@ -241,22 +243,22 @@ class Trials:
                 ),
             )
         self.recorder.event(
-            "drive.end", **about, reached=report.successes, driven=report.worlds
+            "drive.end", **about, reached=report.successes, driven=report.count
         )
         return report
 
 
 def kept_report(
     folder: Path, tasks: TaskSet, source: bytes, first: int, count: int
-) -> SetReport | None:
+) -> EpisodeReport | None:
     """The report in a folder if it is about this controller and these worlds."""
     try:
         content = parse_json(read_file(folder / SET_REPORT, RECORD_BYTES))
-        report = SetReport.model_validate(content)
+        report = EpisodeReport.model_validate(content)
     except (OSError, ValueError, ValidationError):
         return None
     about = report.provenance
-    facts = (about.set_sha256, about.split, about.controller_sha256, about.versions)
+    facts = (about.sha256, about.split, about.controller_sha256, about.versions)
     wanted = (tasks.sha256, "dev", sha256_of(source), versions())
     numbers = [episode.index for episode in report.episodes]
     # After a failed static test, there are no episodes.

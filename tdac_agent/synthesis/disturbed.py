@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +19,8 @@ from tdac_agent.synthesis.candidates import Tests
 from tdac_agent.synthesis.workload import Shares
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.provenance import sha256_of, versions
-from tdac_agent.verification.judge.seeded import ScoredEpisode
-from tdac_agent.verification.seeded_run import controller_job, run_seeds
+from tdac_agent.verification.judge.episode_row import EpisodeRow
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 PURPOSES = ("improve", "comparison")
@@ -34,7 +33,7 @@ MOST_EPISODES = 100_000
 MOST_TOLD = 3
 """Failures whose diagnosis is told."""
 EPISODES_FILE = "disturbed.json"
-FAILURES = "failures"
+FAILURES = "trajectories"
 """Folder with the trajectories of failed episodes."""
 
 
@@ -55,7 +54,7 @@ class DisturbedEpisodes(PrintableRecord):
     first_seed: int
     sandbox: str = Field(description="Sandbox tier.")
     versions: dict[str, str]
-    episodes: tuple[ScoredEpisode, ...]
+    episodes: tuple[EpisodeRow, ...]
 
     @property
     def reached(self) -> int:
@@ -91,9 +90,9 @@ class DisturbedEpisodes(PrintableRecord):
         if not causes:
             return None
         texts = [
-            each.diagnosis.text.replace(f"seed {each.seed}", named(number), 1)
+            each.text.replace(f"seed {each.seed}", named(number), 1)
             for number, each in enumerate(self.episodes, 1)
-            if each.diagnosis
+            if each.text
         ]
         parts = [f"{self.told[0].upper()}{self.told[1:]}; {', '.join(causes)}."]
         parts += [f"{n}. {cut(text)}" for n, text in enumerate(texts[:MOST_TOLD], 1)]
@@ -159,33 +158,27 @@ class DisturbedTrials:
         task = self.tests.task
         source = candidate.source.encode("utf-8", "surrogatepass")
         out.mkdir(exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix="tdac-improve-") as name:
-            job = controller_job(
-                Path(name),
-                source,
-                task,
-                Disturbance(),
-                seeds,
-                tier=self.tests.tier,
-                failures=(out / FAILURES).resolve(),
-            )
-            ended, ending = run_seeds(
-                job,
-                task.nominal,
-                ScoredEpisode,
-                self.tests.judge,
-                lambda done, reached: self.recorder.tell(
-                    {"event": "drive.step", **about, "done": done, "reached": reached}
-                ),
-            )
+        report = verify_episodes(
+            source,
+            task,
+            len(seeds),
+            first=seeds.start,
+            tier=self.tests.tier,
+            out=out,
+            trajectories=True,
+            judge=self.tests.judge,
+            watch=lambda done, reached: self.recorder.tell(
+                {"event": "drive.step", **about, "done": done, "reached": reached}
+            ),
+        )
         found = DisturbedEpisodes(
             task_sha256=task.sha256(),
             controller_sha256=sha256_of(source),
-            disturbance=job.disturbance,
+            disturbance=Disturbance(),
             first_seed=seeds.start,
-            sandbox=ending.tier,
+            sandbox=report.provenance.sandbox,
             versions=dict(versions()),
-            episodes=tuple(ended),
+            episodes=report.episodes,
         )
         write_atomic(out / EPISODES_FILE, found.model_dump_json(indent=2) + "\n")
         return found

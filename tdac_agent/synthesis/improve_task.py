@@ -7,12 +7,11 @@ from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from statistics import fmean
 
-from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.errors import RunError
 from tdac_agent.metrics.paired import paired_change
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.prompting.feedback import feedback_of
 from tdac_agent.prompting.python_source import same_code
+from tdac_agent.runs.episode_pictures import failure_pictures
 from tdac_agent.runs.improvement_record import (
     IMPROVEMENT_FILE,
     MemberFigures,
@@ -36,11 +35,9 @@ from tdac_agent.synthesis.improve import FOUNDERS, Explored, ImprovingSearch
 from tdac_agent.synthesis.workload import most_variations, task_shares
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.figures import EpisodeFigures
 from tdac_agent.verification.diagnosis.measures import least_steps
 from tdac_agent.verification.diagnosis.model_picture import (
     FailurePicture,
-    episode_picture,
 )
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.ladder.scores import time_score
@@ -81,7 +78,7 @@ class TaskFigures:
             fmean(driven.successes),
             fmean(driven.times),
             time_score(nominal.outcome == "reached", nominal.steps, least),
-            fmean(each.clearance for each in driven.episodes),
+            fmean(each.gap_left for each in driven.episodes),
         )
 
     @property
@@ -198,19 +195,10 @@ class TaskExplorer:
         """See `Explorer`."""
         assert candidate.driven is not None
         folder = candidate.folder / "improve" / FAILURES
-        for number, episode in enumerate(candidate.driven.episodes, 1):
-            if episode.success:
-                continue
-            try:
-                trajectory = Trajectory.load(folder / f"{episode.seed}.npz")
-            except RunError:  # it did not drive
-                continue
-            name = named(number)
-            figures = EpisodeFigures(name, episode.outcome, episode.d0, episode.d_min)
-            found = episode.diagnosis
-            task = self.trials.tests.task
-            return episode_picture(task, figures, found, trajectory, LARGEST_SIDE)
-        return None
+        episodes = enumerate(candidate.driven.episodes, 1)
+        each = ((named(number), episode) for number, episode in episodes)
+        found = failure_pictures(self.trials.tests.task, each, folder, LARGEST_SIDE)
+        return next((picture for _, picture in found), None)
 
 
 def improve_verified(

@@ -33,7 +33,7 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 EVERY_TASK = Path(__file__).parent / "suite" / "every_task.py"
 DEADLINE_SECONDS = 900.0
 MAX_FILE_BYTES = 64_000_000
-WRITTEN = "report.json", "robust.json", "trajectories"
+WRITTEN = "report.json", "episodes.json", "trajectories"
 
 
 def verify(
@@ -292,5 +292,5 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
         shown = in_units(report, task.setting.shown)
         draw_failures(task, shown, load_trajectories(folder), folder)
     # A robust report in this folder belongs to the controller verified earlier.
-    (out / "robust.json").unlink(missing_ok=True)
+    (out / "episodes.json").unlink(missing_ok=True)
     write_atomic(out / "report.json", report.model_dump_json(indent=2) + "\n")

@@ -13,10 +13,7 @@ from tdac_agent.bench.bench import RESULTS, SPLITS
 from tdac_agent.bench.page import PAGE
 from tdac_agent.bench.privileged import PRIVILEGED
 from tdac_agent.bench.rivals import rival_names
-from tdac_agent.evaluation.entrants import BUILTIN
-from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE, UNFINISHED
-from tdac_agent.evaluation.salt import SEALED
-from tdac_agent.evaluation.set_verify import MOST_EPISODES
+from tdac_agent.evaluation.policies import BUILTIN
 from tdac_agent.studio.folder import as_word, lines_in, within
 from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
@@ -31,6 +28,9 @@ from tdac_agent.studio.pages.layout import (
 )
 from tdac_agent.studio.pages.worlds import policies_in
 from tdac_agent.studio.sources import folders_with
+from tdac_agent.verification.judge.sequential import MOST_EPISODES
+from tdac_agent.verification.salt import SEALED
+from tdac_agent.verification.store import REPORT_FILE, ROWS_FILE, UNFINISHED
 from tdac_envs.ladder.set_file import shipped_names
 
 FOREIGN = (

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from nicegui import ui
 
-from tdac_agent.evaluation.robust_report import RobustReport
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.studio.folder import STATE, as_word, made_within
 from tdac_agent.studio.jobs import job_of, start
 from tdac_agent.studio.pages.films import show_film
+from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
@@ -52,20 +52,20 @@ class Robustness:
         self._go.set_enabled(not running)
         self._stop.visible = running
         self._now.text = f"measuring … {job.seconds:.0f} s" if job and running else ""
-        path = self._place / self._out / "robust.json"
+        path = self._place / self._out / "episodes.json"
         try:
             text = read_file(path, RECORD_BYTES).decode()
-            report = RobustReport.model_validate_json(text)
+            report = EpisodeReport.model_validate_json(text)
         except (OSError, ValueError):
             return
         if text != self._seen:
             self._seen = text
             self._show(report)
 
-    def _show(self, report: RobustReport) -> None:
+    def _show(self, report: EpisodeReport) -> None:
         self._found.clear()
         with self._found:
-            text = f"{report.successes} of {report.episodes} episodes reached the goal"
+            text = f"{report.successes} of {report.count} episodes reached the goal"
             if report.interval is not None:
                 low, high = report.interval.low, report.interval.high
                 text += f" (95 % interval {low:.3f} to {high:.3f})"
@@ -73,10 +73,10 @@ class Robustness:
             with ui.row().classes("items-center gap-2"):
                 ui.label("Failures first, then the slowest; click one to watch it:")
                 for episode in report.worst[:SHOWN]:
-                    name = f"episode {episode.seed - report.provenance.first_seed + 1}"
+                    name = f"episode {episode.number - report.provenance.first + 1}"
                     ui.button(
                         f"{name}: {episode.outcome}, {episode.steps} steps",
-                        on_click=partial(self._watch, episode.seed, name),
+                        on_click=partial(self._watch, episode.number, name),
                     ).props("outline no-caps dense")
 
     def _begin(self) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from nicegui import ui
 
 from tdac_agent.bench.rivals import rival_names
-from tdac_agent.evaluation.set_play import SHOWN
+from tdac_agent.evaluation.replay import SHOWN
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.set_synthesis.synthesize import EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES

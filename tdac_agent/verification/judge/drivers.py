@@ -20,7 +20,13 @@ from tdac_envs.learning.guidance import Route, route_to_goal
 from tdac_envs.learning.wrappers import Frame
 
 Kind = Literal[
-    "controller", "sb3", "reference", "random", "go-to-goal", "follow-guidance"
+    "controller",
+    "sb3",
+    "reference",
+    "random",
+    "go-to-goal",
+    "follow-guidance",
+    "privileged",
 ]
 # Duration of a random action, s: jittering wheels would not move the robot.
 HOLD = 1.0

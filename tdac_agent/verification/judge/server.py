@@ -49,7 +49,7 @@ DONE = b"done"
 # Imported when a job needs them, or earlier if there is time.
 LOADED_LATE = (
     "tdac_agent.verification.judge.findings",
-    "tdac_agent.verification.judge.seeded",
+    "tdac_agent.verification.judge.episode_job",
 )
 
 
@@ -240,15 +240,11 @@ def do_job(
     os.chdir(request.parent)
     if job["kind"] == SUITE:
         judge_suite(Job.model_validate(job), child_pool, worker_pool, later)
-    elif job["kind"] == "set":
-        from tdac_agent.verification.judge.set_job import SetJob, judge_set
-
-        judge_set(SetJob.model_validate(job), child_pool)
     else:
         # Imported late, since it loads policies of all kinds.
-        from tdac_agent.verification.judge.seeded import SeededJob, judge_seeds
+        from tdac_agent.verification.judge.episode_job import EpisodeJob, judge_episodes
 
-        judge_seeds(SeededJob.model_validate(job), child_pool)
+        judge_episodes(EpisodeJob.model_validate(job), child_pool)
 
 
 if __name__ == "__main__":

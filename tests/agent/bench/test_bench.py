@@ -21,9 +21,9 @@ from tdac_agent.bench.page import MOST_WORLDS
 from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, reveal
 from tdac_agent.errors import ControllerFileError, RunError
-from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.executors.choice import executor_of
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import BUILT_IN
@@ -65,8 +65,8 @@ def test_rows_are_what_verify_says(judge, tmp_path, files):
     out = tmp_path / "out"
     found = bench(["builtin", *files], ["known"], "dev", 2, out=out, judge=judge)
     own, still, ahead, broken = found.rows
-    alone = verify_on_set(
-        files[1].partition("=")[2], load_set("known"), "dev", 2, judge=judge
+    alone = verify_episodes(
+        files[1].partition("=")[2], load_set("known"), 2, split="dev", judge=judge
     )
     assert ahead.time.value == pytest.approx(alone.scores.time)
     assert ahead.path == pytest.approx(alone.scores.path)

@@ -14,7 +14,7 @@ from tdac_agent.bench.rivals import (
     source_of,
     with_values,
 )
-from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
@@ -29,7 +29,7 @@ def test_it_drives(name, level, warm):
     """It passes the tests, and no episode ends with an error of its own."""
     tasks = load_set(level)
     source = rival_on(name, tasks).source
-    report = verify_on_set(source, tasks, "dev", 1, judge=warm)
+    report = verify_episodes(source, tasks, 1, split="dev", judge=warm)
     assert not report.refused, report.told
     assert {each.outcome for each in report.episodes} <= {
         "reached", "collision", "out of time",
@@ -40,7 +40,9 @@ def test_it_drives(name, level, warm):
 def test_dwa_arrives(warm):
     """A planner with a map of what it has seen is no straw man."""
     tasks = load_set("unknown")
-    report = verify_on_set(rival_on("dwa", tasks).source, tasks, "dev", 6, judge=warm)
+    report = verify_episodes(
+        rival_on("dwa", tasks).source, tasks, 6, split="dev", judge=warm
+    )
     assert report.successes >= 4
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from tdac_agent.builtin.level import LEVELS
-from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 
 
@@ -11,5 +11,5 @@ from tdac_envs import load_set
 def test_noisy_ranges():
     """With noise on each ray, it still arrives on most worlds within its CPU budget."""
     controller = LEVELS / "unknown.py"
-    report = verify_on_set(controller, load_set("barn-slow"), "dev", 8)
+    report = verify_episodes(controller, load_set("barn-slow"), 8, split="dev")
     assert report.successes >= 5

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
+from tdac_agent.verification.verify_episodes import most_worlds, verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
@@ -37,7 +37,7 @@ def barn(tmp_path):
 @pytest.mark.slow
 def test_the_barn_score_takes_the_given_length(barn):
     """OT' is 5 s and 8 s; at a quarter of the speed, both drives take 18 s."""
-    report = verify_on_set(AHEAD, barn, "test", 2)
+    report = verify_episodes(AHEAD, barn, 2, split="test")
     assert report.successes == 2
     steps = [episode.steps for episode in report.episodes]
     assert steps == pytest.approx([180, 180], abs=1)
@@ -53,8 +53,8 @@ def test_the_unit_of_an_interval_is_a_world(tmp_path, barn):
     again = path.read_text().replace("[test]}", "[test], runs: 10}")
     path.write_text(f"{again}disturbances: {{wheel_slip: 0.01}}\n")
     tasks = load_set(path)
-    report = verify_on_set(AHEAD, tasks, "test", 20)
-    assert (report.worlds, report.successes) == (20, 20)
+    report = verify_episodes(AHEAD, tasks, 20, split="test")
+    assert (report.count, report.successes) == (20, 20)
     assert report.interval.low == pytest.approx(0.158, abs=0.001)
     assert most_worlds(tasks, "test") == 2
 
@@ -62,7 +62,7 @@ def test_the_unit_of_an_interval_is_a_world(tmp_path, barn):
 def test_more_worlds_than_there_are(barn):
     """One line says how many there are."""
     with pytest.raises(TaskError, match="worlds 3: set 'barn' has 2 worlds in its"):
-        verify_on_set(AHEAD, barn, "test", 3)
+        verify_episodes(AHEAD, barn, 3, split="test")
 
 
 @pytest.mark.slow
@@ -80,11 +80,11 @@ def test_a_folder_that_was_kept_back(tmp_path, monkeypatch):
     worlds = {"folder": "maps", "splits": ["test"]}
     path.write_text(yaml.safe_dump({"worlds": worlds}))
     tasks = load_set(path, tmp_path / "hidden")
-    report = verify_on_set(AHEAD, tasks, "hidden", 1)
+    report = verify_episodes(AHEAD, tasks, 1, split="hidden")
     assert (report.successes, report.episodes, report.told) == (1, (), ())
     assert report.provenance.salt_sha256 == tasks.files.hidden_sha256
     assert report.hidden.count == 1
-    again = verify_on_set(AHEAD, tasks, "hidden", 1)
+    again = verify_episodes(AHEAD, tasks, 1, split="hidden")
     assert again.hidden.recorded is not None
     with pytest.raises(TaskError, match="has no split 'hidden'"):
-        verify_on_set(AHEAD, load_set(path), "hidden", 1)
+        verify_episodes(AHEAD, load_set(path), 1, split="hidden")

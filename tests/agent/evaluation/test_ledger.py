@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from tdac_agent.evaluation.ledger import HiddenEvaluation, Ledger, user_ledger
-from tdac_agent.evaluation.set_report import SetProvenance, SetReport
+from tdac_agent.verification.episode_report import EpisodeProvenance, EpisodeReport
+from tdac_agent.verification.ledger import HiddenEvaluation, Ledger, user_ledger
 from tdac_envs.core.errors import TaskError
 
 
@@ -15,7 +15,7 @@ def evaluation(**values):
 
 
 def report(worlds=100, **values):
-    about = SetProvenance(
+    about = EpisodeProvenance(
         set="unknown",
         set_sha256="5" * 64,
         split="hidden",
@@ -28,7 +28,7 @@ def report(worlds=100, **values):
     given = {"worlds": worlds, "successes": 0, "interval": None, "scores": None}
     given |= {"by_generator": {}, "causes": {}, "told": (), "episodes": ()}
     given |= {"child_cpu_seconds": 1.0, "seconds": 2.0}
-    return SetReport(provenance=about, **given | values)
+    return EpisodeReport(provenance=about, **given | values)
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import gymnasium as gym
@@ -20,12 +19,16 @@ from small import QUICK
 
 from tdac_agent.cli.play import drive_disturbed
 from tdac_agent.errors import Fault
-from tdac_agent.evaluation.robust import verify_robust
-from tdac_agent.evaluation.robust_report import RobustReport, badness, success_interval
 from tdac_agent.sandbox import Limits
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.verification.judge.seeded import SeededEpisode, figures
+from tdac_agent.verification.episode_report import (
+    EpisodeReport,
+    badness,
+    success_interval,
+)
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.core.errors import TaskError
 
 # After the good controller: what it does is decided by the heading it starts with.
@@ -70,7 +73,7 @@ def expected_outcome(task, seed):
 @pytest.fixture(scope="module")
 def moody(small_task, good_source, warm):
     """The report of a controller that fails in each way."""
-    return verify_robust(good_source + MOODS, small_task, 16, first_seed=0, judge=warm)
+    return verify_episodes(good_source + MOODS, small_task, 16, first=0, judge=warm)
 
 
 def test_an_episode_is_what_the_environment_draws(
@@ -103,8 +106,8 @@ def test_play_replays_what_was_counted(small_task, good_source, moody):
     for episode in moody.worst[:: len(moody.worst) // 5]:
         seed, usual = episode.seed, Disturbance()
         driven = drive_disturbed(small_task, source, seed, usual, "auto")
-        driven = replace(driven, cpu_seconds=episode.cpu_seconds)
-        assert figures(driven, seed, small_task) == episode
+        spent = {"cpu_seconds": episode.cpu_seconds}
+        assert driven.row.model_copy(update=spent) == episode
 
 
 @pytest.mark.slow
@@ -112,9 +115,10 @@ def test_each_way_to_fail_is_counted(small_task, moody):
     """Outcomes, successes and failed seeds are those of the starts that were drawn."""
     wanted = {seed: expected_outcome(small_task, seed) for seed in range(16)}
     assert set(wanted.values()) == {"reached", "collision", "out of time", "error"}
-    assert moody.failed_seeds == tuple(s for s, o in wanted.items() if o != "reached")
+    failed = tuple(s for s, o in wanted.items() if o != "reached")
+    assert tuple(each.seed for each in moody.failures) == failed
     assert moody.successes == list(wanted.values()).count("reached")
-    assert moody.episodes == sum(moody.outcomes.values()) == 16
+    assert moody.count == sum(moody.outcomes.values()) == 16
     for outcome, count in moody.outcomes.items():
         assert count == list(wanted.values()).count(outcome)
     assert moody.rate == moody.successes / 16
@@ -140,7 +144,7 @@ def test_the_worst_come_first(moody):
 def test_a_seed_stands_for_itself(small_task, good_source, moody, warm):
     """An episode is the same whichever others are run with it."""
     source = good_source + MOODS
-    part = verify_robust(source, small_task, 5, first_seed=9, judge=warm)
+    part = verify_episodes(source, small_task, 5, first=9, judge=warm)
     whole = {e.seed: e for e in moody.worst}
     for episode in part.worst:
         assert (
@@ -178,34 +182,34 @@ def test_a_sequential_test_sees_the_seeds_in_order(
     test = SequentialTest(0.9, 16, margin=0.4)
     counts = [0, 0]
     for seed in range(16):
-        counts[seed in moody.failed_seeds] += 1
+        counts[seed in {each.seed for each in moody.failures}] += 1
         if test.decide(*counts) != "undecided":
             break
-    report = verify_robust(
+    report = verify_episodes(
         good_source + MOODS,
         small_task,
         16,
-        first_seed=0,
+        first=0,
         accept_at=0.9,
         margin=0.4,
         judge=warm,
     )
-    assert report.episodes == sum(counts) < 16
+    assert report.count == sum(counts) < 16
     assert report.successes == counts[0]
     assert report.sequential.decision == test.decide(*counts) == "rejected"
     assert report.sequential.at_refused_rate == test.characteristics(0.5)
     assert report.rate is report.interval is None
-    assert not report.accepted
+    assert not report.passed
 
 
 def test_a_good_controller_is_accepted(small_task, good_source, warm):
     """As soon as its successes suffice."""
-    report = verify_robust(
+    report = verify_episodes(
         good_source, small_task, 100, accept_at=0.9, margin=0.4, judge=warm
     )
-    assert report.accepted
-    assert report.episodes == report.successes
-    assert report.episodes == report.sequential.test.fewest_to_accept
+    assert report.passed
+    assert report.count == report.successes
+    assert report.count == report.sequential.test.fewest_to_accept
 
 
 FORGETS = """
@@ -230,7 +234,7 @@ def policy(obs):
 
 def test_no_episode_knows_of_another(small_task, warm):
     """Each has a fresh process and an empty scratch folder."""
-    report = verify_robust(FORGETS, small_task, 5, judge=warm)
+    report = verify_episodes(FORGETS, small_task, 5, judge=warm)
     assert report.outcomes == {"collision": 5}
 
 
@@ -253,11 +257,11 @@ def policy(obs):
 def test_cpu_time_is_limited_for_each_episode(small_task, warm):
     """All together may use more than that."""
     limits = Limits(cpu_seconds=2, reset_seconds=60)
-    report = verify_robust(BURNS, small_task, 5, limits=limits, judge=warm)
+    report = verify_episodes(BURNS, small_task, 5, limits=limits, judge=warm)
     assert report.outcomes == {"collision": 5}
     assert report.child_cpu_seconds > limits.cpu_seconds
     endless = BURNS.replace("0.6", "60.0")
-    report = verify_robust(endless, small_task, 1, limits=limits, judge=warm)
+    report = verify_episodes(endless, small_task, 1, limits=limits, judge=warm)
     assert report.worst[0].cause == "time-out"
     assert "CPU time" in report.worst[0].error
 
@@ -275,7 +279,7 @@ def test_cpu_time_is_limited_for_each_episode(small_task, warm):
 )
 def test_a_broken_controller_is_a_report(small_task, warm, source, reason):
     """Its episodes are failures, with the reason, and no exception."""
-    report = verify_robust(source, small_task, 2, limits=QUICK, judge=warm)
+    report = verify_episodes(source, small_task, 2, limits=QUICK, judge=warm)
     assert report.successes == 0
     assert report.outcomes == {"error": 2}
     assert all(re.search(reason, episode.error) for episode in report.worst)
@@ -286,13 +290,13 @@ def test_a_broken_controller_is_a_report(small_task, warm, source, reason):
 def test_a_broken_sandbox_is_a_fault(small_task, good_source, warm):
     """Neither a success nor a failure."""
     with pytest.raises(Fault, match="nosuch"):
-        verify_robust(good_source, small_task, 2, tier="nosuch", judge=warm)
+        verify_episodes(good_source, small_task, 2, tier="nosuch", judge=warm)
 
 
 def test_evidence_is_kept_and_watched(small_task, good_source, tmp_path, warm):
     """`robust.json` reads back as it was; who watches sees the numbers grow."""
     seen = []
-    report = verify_robust(
+    report = verify_episodes(
         good_source,
         small_task,
         6,
@@ -300,22 +304,22 @@ def test_evidence_is_kept_and_watched(small_task, good_source, tmp_path, warm):
         judge=warm,
         watch=lambda *counts: seen.append(counts),
     )
-    text = (tmp_path / "new" / "robust.json").read_text()
-    assert RobustReport.model_validate_json(text) == report
+    text = (tmp_path / "new" / "episodes.json").read_text()
+    assert EpisodeReport.model_validate_json(text) == report
     assert seen == sorted(seen)
     assert seen[-1] == (6, report.successes)
     assert report.provenance.disturbance == Disturbance()
-    assert report.provenance.task_sha256 == small_task.sha256()
+    assert report.provenance.sha256 == small_task.sha256()
 
 
 @pytest.mark.parametrize(
     ("episodes", "arguments"),
-    [(0, {}), (5, {"first_seed": -1}), (5, {"accept_at": 0.9}), (5.5, {})],
+    [(0, {}), (5, {"first": -1}), (5, {"accept_at": 0.9}), (5.5, {})],
 )
 def test_numbers_that_make_no_sense(small_task, warm, episodes, arguments):
     """Refused before anything is run."""
     with pytest.raises(TaskError, match=r"expected|at least"):
-        verify_robust("x = 1\n", small_task, episodes, judge=warm, **arguments)
+        verify_episodes("x = 1\n", small_task, episodes, judge=warm, **arguments)
 
 
 @pytest.mark.parametrize(
@@ -361,8 +365,8 @@ def test_the_interval_is_no_wider_than_needed():
 def test_a_contact_is_no_success():
     """Not even where the goal was reached as well; it is sorted as a failure."""
     figures_ = {"seed": 1, "steps": 9, "d0": 50.0, "d_min": 2.0, "cpu_seconds": 0.1}
-    clean = SeededEpisode(outcome="reached", collisions=0, **figures_)
-    touched = SeededEpisode(outcome="reached", collisions=1, **figures_)
+    clean = EpisodeRow(outcome="reached", collisions=0, **figures_)
+    touched = EpisodeRow(outcome="reached", collisions=1, **figures_)
     assert clean.success
     assert not touched.success
     assert badness(touched) < badness(clean)
@@ -371,8 +375,8 @@ def test_a_contact_is_no_success():
 @pytest.mark.slow
 def test_a_hundred_episodes(small_task, good_source, warm):
     """The built-in controller is not disturbed by what is usual."""
-    report = verify_robust(good_source, small_task, 100, first_seed=0, judge=warm)
-    assert report.episodes == 100
+    report = verify_episodes(good_source, small_task, 100, first=0, judge=warm)
+    assert report.count == 100
     assert report.successes >= 95
     assert report.interval.low < report.rate <= report.interval.high
     assert len(report.worst) == 20
@@ -415,11 +419,11 @@ def test_robust_json(tdac, good):
     content = json.loads(out)
     assert code == 0
     assert content["verdict"]["passed"]
-    report = RobustReport.model_validate(content["robust"])
-    assert report.provenance.first_seed == 40
+    report = EpisodeReport.model_validate(content["robust"])
+    assert report.provenance.first == 40
     assert sorted(episode.seed for episode in report.worst) == [40, 41, 42]
-    kept = Path("kept", "robust.json").read_text()
-    assert RobustReport.model_validate_json(kept) == report
+    kept = Path("kept", "episodes.json").read_text()
+    assert EpisodeReport.model_validate_json(kept) == report
     assert Path("kept", "report.json").is_file()
 
 
@@ -488,7 +492,7 @@ def test_an_interrupt_leaves_nothing(good, no_traces):
     """Ctrl-C between disturbed episodes: exit 130, no process, no file."""
     kept = good / "kept"
     kept.mkdir()
-    (kept / "robust.json").write_text("of an earlier controller")
+    (kept / "episodes.json").write_text("of an earlier controller")
     words = ["verify", str(good), "--profile", "policy", "--robust", "5000"]
     words += ["--out", str(kept)]
     process = subprocess.Popen(
@@ -509,7 +513,7 @@ def test_an_interrupt_leaves_nothing(good, no_traces):
         f"{kept} contains the report of the suite, but no robust.json" in out.decode()
     )
     assert (kept / "report.json").is_file()
-    assert not (kept / "robust.json").exists()
+    assert not (kept / "episodes.json").exists()
 
 
 def _begun(folder):

@@ -9,10 +9,9 @@ import yaml
 from tdac_agent.builtin.level import LEVELS
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
-from tdac_agent.evaluation.set_evaluate import evaluate_on_set
-from tdac_agent.evaluation.set_evaluation import SetEvaluation
-from tdac_agent.evaluation.set_verify import verify_on_set
+from tdac_agent.evaluation.evaluation_report import Evaluation
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
@@ -53,27 +52,28 @@ def files(tmp_path):
 def test_a_row_is_what_verify_says(judge, tmp_path, level, files):
     """Scores, generators and causes; a refused file has a row without figures."""
     tasks, out = load_set(level), tmp_path / "out"
-    found = evaluate_on_set(files, tasks, "dev", 4, judge=judge, out=out)
+    found = evaluate(files, [tasks], 4, split="dev", judge=judge, out=out)
     for file, row in zip(files[:2], found.rows, strict=False):
-        alone = verify_on_set(file, tasks, "dev", 4, judge=judge)
+        alone = verify_episodes(file, tasks, 4, split="dev", judge=judge)
         assert row.scores == alone.scores
         assert row.by_generator == alone.by_generator
         assert row.causes == alone.causes
         assert row.interval == alone.interval
-        assert row.hit + row.timeouts + row.errors == 4
+        assert sum(row.outcomes.values()) == 4
     still, ahead, broken = found.rows
-    assert (still.timeouts, still.hit) == (4, 0)
-    assert ahead.hit > 0
-    assert (broken.scores, broken.worlds) == (None, 0)
+    assert still.outcomes == {"out of time": 4}
+    assert ahead.collided > 0
+    assert (broken.scores, broken.episodes) == (None, 0)
     assert "two finite numbers" in broken.told[0]
     (pair,) = found.comparisons
     assert (pair.neither, pair.p) == (4, 1.0)
     assert len(found.to_frame()) == 8
     kept = json.loads((out / "evaluation.json").read_text())
-    assert SetEvaluation.model_validate({**kept, "reports": ()}).rows == found.rows
-    names = sorted(path.name for path in (out / "policies").iterdir())
+    assert Evaluation.model_validate(kept).rows == found.rows
+    folder = out / "policies" / "few"
+    names = sorted(path.name for path in folder.iterdir())
     assert [name.split("-")[0] for name in names] == ["ahead", "broken", "still"]
-    assert len(list((out / "policies" / names[0] / "trajectories").iterdir())) == 4
+    assert len(list((folder / names[0] / "trajectories").iterdir())) == 4
 
 
 @pytest.mark.slow
@@ -81,54 +81,54 @@ def test_finished_policies_are_not_driven_again(judge, tmp_path, level, files):
     """After an interruption, and of a finished evaluation; another one is refused."""
     tasks, out, driven = load_set(level), tmp_path / "out", []
 
-    def interrupt(policy, episodes, successes):
+    def interrupt(_task, policy, episodes, successes):
         if policy == files[1]:
             raise KeyboardInterrupt
 
-    def note(policy, episodes, successes):
-        driven.append(policy)
+    def note(_task, policy, episodes, successes):
+        if episodes:
+            driven.append(policy)
 
-    given = {"split": "dev", "worlds": 2, "judge": judge, "out": out}
+    given = {"split": "dev", "episodes": 2, "judge": judge, "out": out}
     with pytest.raises(KeyboardInterrupt):
-        evaluate_on_set(files[:2], tasks, watch=interrupt, **given)
-    first = evaluate_on_set(files[:2], tasks, watch=note, **given)
+        evaluate(files[:2], [tasks], watch=interrupt, **given)
+    first = evaluate(files[:2], [tasks], watch=note, **given)
     assert set(driven) == {files[1]}
     written = (out / "evaluation.json").read_bytes()
     driven.clear()
-    assert evaluate_on_set(files[:2], tasks, watch=note, **given) == first
+    assert evaluate(files[:2], [tasks], watch=note, **given) == first
     assert driven == []
     assert (out / "evaluation.json").read_bytes() == written
-    with pytest.raises(RunError, match="has another evaluation"):
-        evaluate_on_set(files[:1], tasks, **given)
+    with pytest.raises(RunError, match="it differs in policies"):
+        evaluate(files[:1], [tasks], **given)
 
 
 @pytest.mark.slow
 def test_builtin_is_the_controller_of_the_level(judge, level):
     """A set with the observations of `unknown` has that of `unknown`."""
-    known = evaluate_on_set(["builtin"], load_set("known"), "dev", 2, judge=judge)
-    (policy,), (row,) = known.policies, known.rows
-    assert (policy.knows, row.successes) == ("+ map", 2)
-    own = verify_on_set(LEVELS / "known.py", load_set("known"), "dev", 2, judge=judge)
+    given = {"split": "dev", "judge": judge}
+    (row,) = evaluate(["builtin"], [load_set("known")], 2, **given).rows
+    assert (row.knows, row.successes) == ("+ map", 2)
+    own = verify_episodes(
+        LEVELS / "known.py", load_set("known"), 2, split="dev", judge=judge
+    )
     assert row.scores == own.scores
-    (policy,) = evaluate_on_set(
-        ["builtin"], load_set(level), "dev", 1, judge=judge
-    ).policies
-    assert policy.knows == "sensors"
+    (row,) = evaluate(["builtin"], [load_set(level)], 1, **given).rows
+    assert row.knows == "sensors"
 
 
 @pytest.mark.parametrize(
     ("policies", "split", "message"),
     [
-        (["reference"], "test", "reference does not drive on a task set"),
-        (["random"], "test", "random does not drive on a task set"),
+        (["follow-guidance"], "test", "follow-guidance does not drive on a task set"),
         (["builtin"], "hidden", "tdac verify FILE --set few --split hidden"),
-        (["builtin"], "train", "expected split to be one of 'dev', 'test'"),
+        (["builtin"], "train", "expected split to be one of 'dev', 'test', 'hidden'"),
         ([], "test", "expected at least one policy"),
     ],
 )
 def test_what_is_refused(level, policies, split, message):
     with pytest.raises(TaskError, match=message):
-        evaluate_on_set(policies, load_set(level), split, 1)
+        evaluate(policies, [load_set(level)], 1, split=split)
 
 
 def test_a_level_without_a_controller_of_our_own(tmp_path):
@@ -139,9 +139,9 @@ def test_a_level_without_a_controller_of_our_own(tmp_path):
         )
     )
     with pytest.raises(TaskError, match="no built-in controller for the task set bli"):
-        evaluate_on_set(["builtin"], load_set(path), "dev", 1)
+        evaluate(["builtin"], [load_set(path)], 1)
     with pytest.raises(ControllerFileError, match=r"no policy 'no\.py'"):
-        evaluate_on_set(["no.py"], load_set(path), "dev", 1)
+        evaluate(["no.py"], [load_set(path)], 1)
 
 
 def test_the_command(tdac, level, files):

@@ -15,13 +15,13 @@ import yaml
 
 import tdac_agent
 from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.evaluation.ledger import user_ledger
-from tdac_agent.evaluation.set_report import SetReport, clock_dependence
-from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.verification.episode_report import EpisodeReport, clock_dependence
 from tdac_agent.verification.judge.set_checks import static_checks
 from tdac_agent.verification.judge.set_files import level_params, write_files
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.ledger import user_ledger
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.env import LadderEnv
@@ -58,8 +58,8 @@ def set_yaml(tmp_path):
 def test_a_good_controller(judge, tmp_path):
     """Its scores are those of its trajectories."""
     tasks = load_set("known")
-    report = verify_on_set(KNOWN, tasks, "dev", 5, judge=judge, out=tmp_path)
-    assert (report.worlds, report.successes) == (5, 5)
+    report = verify_episodes(KNOWN, tasks, 5, split="dev", judge=judge, out=tmp_path)
+    assert (report.count, report.successes) == (5, 5)
     assert report.told == ()
     assert set(report.by_generator) == {each.name for each in tasks.file.worlds}
     assert report.scores.success == 1.0
@@ -76,7 +76,7 @@ def test_a_good_controller(judge, tmp_path):
         assert episode.path_score == pytest.approx(
             min(world.difficulty.length / driven, 1.0)
         )
-    kept = SetReport.model_validate_json((tmp_path / "set.json").read_text())
+    kept = EpisodeReport.model_validate_json((tmp_path / "episodes.json").read_text())
     assert kept == report
 
 
@@ -93,7 +93,7 @@ def policy(obs):
     return 0.0, 0.0
 """
     tasks = set_yaml(observed=["goal", "odometry", "ranges", "wheel_speeds"])
-    report = verify_on_set(source, tasks, "dev", 2, judge=judge)
+    report = verify_episodes(source, tasks, 2, split="dev", judge=judge)
     assert [episode.error for episode in report.episodes] == [None, None]
     assert report.causes == {"standing still": 2} or sum(report.causes.values()) == 2
 
@@ -154,8 +154,8 @@ def test_folders_of_two_worlds_differ_by_the_map_alone(name, tmp_path):
 )
 def test_a_file_that_fails_the_tests_is_not_driven(judge, set_yaml, source, lines):
     """Each failed test is told once, also for hidden worlds, which it never saw."""
-    report = verify_on_set(source.encode(), set_yaml(), "dev", 3, judge=judge)
-    assert (report.worlds, report.episodes, report.scores) == (0, (), None)
+    report = verify_episodes(source.encode(), set_yaml(), 3, split="dev", judge=judge)
+    assert (report.count, report.episodes, report.scores) == (0, (), None)
     assert report.refused
     assert not report.passed
     assert len(report.told) == len(lines)
@@ -171,8 +171,8 @@ def test_a_refused_file_is_no_hidden_evaluation(judge, set_yaml, tmp_path):
     salt.write_bytes(b"a fifth salt of enough bytes")
     given = {"salt_file": salt, "judge": judge}
     tasks = set_yaml()
-    wrong = verify_on_set("import os\n" + STILL, tasks, "hidden", 2, **given)
-    assert (wrong.worlds, wrong.hidden) == (0, None)
+    wrong = verify_episodes("import os\n" + STILL, tasks, 2, split="hidden", **given)
+    assert (wrong.count, wrong.hidden) == (0, None)
     assert "import of 'os'" in wrong.told[0]
 
 
@@ -185,7 +185,7 @@ def policy(obs):
     return 1.0, 0.9
 """
     tasks = set_yaml()
-    report = verify_on_set(source, tasks, "dev", 2, judge=judge, out=tmp_path)
+    report = verify_episodes(source, tasks, 2, split="dev", judge=judge, out=tmp_path)
     for episode in report.episodes:
         run = Trajectory.load(tmp_path / "trajectories" / f"{episode.index}.npz")
         env = LadderEnv(tmp_path / "few.yaml", "dev")
@@ -203,7 +203,7 @@ def policy(obs):
 
 
 def test_failures_are_counted_and_three_are_told(judge, set_yaml):
-    report = verify_on_set(STILL, set_yaml(), "dev", 5, judge=judge)
+    report = verify_episodes(STILL, set_yaml(), 5, split="dev", judge=judge)
     assert (report.successes, len(report.told), len(report.episodes)) == (0, 3, 5)
     assert sum(report.causes.values()) == 5
     assert report.told[0].startswith("world 0: ")
@@ -220,8 +220,8 @@ def test_failures_are_counted_and_three_are_told(judge, set_yaml):
 def test_the_built_in_controllers_without_a_map(judge, level):
     """They pass the tests, and reach most goals within the CPU budget."""
     file = LEVELS / f"{level}.py"
-    report = verify_on_set(file, load_set(level), "dev", 10, judge=judge)
-    assert report.worlds == 10
+    report = verify_episodes(file, load_set(level), 10, split="dev", judge=judge)
+    assert report.count == 10
     assert report.successes >= 8
     assert report.scores.time > 0.4
 
@@ -238,13 +238,13 @@ def test_hidden_worlds_are_told_in_sums_alone(judge, set_yaml, tmp_path):
     salt.write_bytes(SALT)
     tasks = set_yaml()
     given = {"salt_file": salt, "judge": judge, "out": tmp_path / "out"}
-    report = verify_on_set(STILL, tasks, "hidden", 3, **given)
-    assert (report.worlds, report.successes) == (3, 0)
+    report = verify_episodes(STILL, tasks, 3, split="hidden", **given)
+    assert (report.count, report.successes) == (3, 0)
     assert report.episodes == ()
     assert report.told == ()
     files = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert files == ["sealed", "set.json"]
-    text = (tmp_path / "out" / "set.json").read_text()
+    assert files == ["episodes.json", "sealed"]
+    text = (tmp_path / "out" / "episodes.json").read_text()
     assert SALT.decode() not in text
     assert SALT.hex() not in text
 
@@ -254,14 +254,16 @@ def test_the_rows_of_hidden_worlds_are_sealed(judge, set_yaml, tmp_path):
     salt = tmp_path / "secret.salt"
     salt.write_bytes(b"another salt of enough bytes")
     out = tmp_path / "out"
-    verify_on_set(STILL, set_yaml(), "hidden", 2, salt_file=salt, judge=judge, out=out)
+    verify_episodes(
+        STILL, set_yaml(), 2, split="hidden", salt_file=salt, judge=judge, out=out
+    )
     (rows,) = (out / "sealed").iterdir()
     assert stat.S_IMODE((out / "sealed").stat().st_mode) == 0o700
     figures = [json.loads(line) for line in rows.read_text().splitlines()]
     assert [each["index"] for each in figures] == [0, 1]
     assert {each["text"] for each in figures} == {None}
     assert not {"sealed", "trajectories"} & set(
-        json.loads((out / "set.json").read_text())
+        json.loads((out / "episodes.json").read_text())
     )
 
 
@@ -276,20 +278,20 @@ def test_a_hidden_evaluation_is_driven_once(judge, set_yaml, tmp_path):
         driven.append(episodes)
 
     source = STILL + "# driven once\n"
-    first = verify_on_set(source, tasks, "hidden", 2, watch=watch, **given)
+    first = verify_episodes(source, tasks, 2, split="hidden", watch=watch, **given)
     assert (first.hidden.number, first.hidden.count) == (1, 1)
     assert first.hidden.recorded is None
     assert driven[-1] == 2
     driven.clear()
-    again = verify_on_set(source, tasks, "hidden", 2, watch=watch, **given)
+    again = verify_episodes(source, tasks, 2, split="hidden", watch=watch, **given)
     assert driven == []
     assert again.hidden.recorded is not None
     same = {"hidden": first.hidden}
     same_text = again.model_copy(update=same).model_dump_json()
     assert same_text == first.model_dump_json()
-    more = verify_on_set(source, tasks, "hidden", 3, **given)
-    assert (more.hidden.number, more.hidden.count, more.worlds) == (2, 2, 3)
-    other = verify_on_set(source + "# other\n", tasks, "hidden", 2, **given)
+    more = verify_episodes(source, tasks, 3, split="hidden", **given)
+    assert (more.hidden.number, more.hidden.count, more.count) == (2, 2, 3)
+    other = verify_episodes(source + "# other\n", tasks, 2, split="hidden", **given)
     assert (other.hidden.number, other.hidden.count) == (1, 1)
 
 
@@ -306,26 +308,28 @@ def test_the_ledger_is_written_before_hidden_worlds_are_driven(
 
     source = STILL + "# interrupted\n"
     with pytest.raises(KeyboardInterrupt):
-        verify_on_set(source, set_yaml(), "hidden", 2, watch=interrupt, **given)
+        verify_episodes(source, set_yaml(), 2, split="hidden", watch=interrupt, **given)
     last = json.loads(user_ledger().path.read_text().splitlines()[-1])
     assert last["event"] == "begun"
     assert last["about"]["worlds"] == 2
     assert last["about"]["salt_sha256"] == hashlib.sha256(salt.read_bytes()).hexdigest()
-    resumed = verify_on_set(source, set_yaml(), "hidden", 2, **given)
-    assert (resumed.worlds, resumed.hidden.count) == (2, 1)
+    resumed = verify_episodes(source, set_yaml(), 2, split="hidden", **given)
+    assert (resumed.count, resumed.hidden.count) == (2, 1)
 
 
 def test_a_salt_that_controllers_could_read_is_refused(set_yaml):
     salt = Path(json.__file__).with_name("scanner.py")
     with pytest.raises(TaskError, match="controllers can read this folder"):
-        verify_on_set(STILL, set_yaml(), "hidden", 1, salt_file=salt)
+        verify_episodes(STILL, set_yaml(), 1, split="hidden", salt_file=salt)
 
 
 def test_hidden_worlds_need_walls(set_yaml, tmp_path):
     salt = tmp_path / "secret.salt"
     salt.write_bytes(SALT)
     with pytest.raises(TaskError, match="'rlimits' cannot keep a controller from"):
-        verify_on_set(STILL, set_yaml(), "hidden", 1, salt_file=salt, tier="rlimits")
+        verify_episodes(
+            STILL, set_yaml(), 1, split="hidden", salt_file=salt, tier="rlimits"
+        )
 
 
 @pytest.mark.slow
@@ -339,19 +343,19 @@ def policy(obs):
     return 0.0, 0.0
 """
     tasks = set_yaml(cpu={"start": 5.0, "step": 0.01, "bank": 0.1})
-    report = verify_on_set(source, tasks, "dev", 1, judge=judge)
+    report = verify_episodes(source, tasks, 1, split="dev", judge=judge)
     (episode,) = report.episodes
     assert episode.outcome == "error"
     assert "s of CPU time for 10 steps; 0.20 s are allowed" in episode.error
     roomy = set_yaml(cpu={"start": 5.0, "step": 0.2, "bank": 0.1})
-    report = verify_on_set(source, roomy, "dev", 1, judge=judge)
+    report = verify_episodes(source, roomy, 1, split="dev", judge=judge)
     assert report.episodes[0].outcome == "out of time"
 
 
 def test_an_import_may_not_take_long(judge, set_yaml):
     source = "x = sum(i * i for i in range(8_000_000))\n" + STILL
     tasks = set_yaml(cpu={"start": 0.15, "step": 0.02, "bank": 1.0})
-    (episode,) = verify_on_set(source, tasks, "dev", 1, judge=judge).episodes
+    (episode,) = verify_episodes(source, tasks, 1, split="dev", judge=judge).episodes
     assert "of CPU time for import and reset; 0.15 s are allowed" in episode.error
 
 
@@ -360,7 +364,7 @@ def test_results_that_depend_on_the_clock_are_marked(judge, set_yaml):
     tasks = set_yaml()
     found = []
     for source in (STILL, "from time import monotonic\n" + STILL):
-        report = verify_on_set(source, tasks, "dev", 2, judge=judge)
+        report = verify_episodes(source, tasks, 2, split="dev", judge=judge)
         found.append(report.clock_dependent)
     assert found == [None, "it reads the clock"]
     slow, quick = report.episodes
@@ -382,7 +386,7 @@ def test_equal_beside_busy_loops(tmp_path):
     for loops in (0, 2 * (os.cpu_count() or 1)):
         beside = [subprocess.Popen(busy) for _ in range(loops)]
         try:
-            report = verify_on_set(KNOWN, load_set("known"), "dev", 4)
+            report = verify_episodes(KNOWN, load_set("known"), 4, split="dev")
         finally:
             for process in beside:
                 process.kill()
@@ -396,10 +400,10 @@ def test_equal_beside_busy_loops(tmp_path):
 
 
 def test_a_sequential_test_stops_early(judge, set_yaml):
-    report = verify_on_set(STILL, set_yaml(bar=0.9), "test", judge=judge)
+    report = verify_episodes(STILL, set_yaml(bar=0.9), split="test", judge=judge)
     assert report.sequential.decision == "rejected"
     assert not report.passed
-    assert report.worlds < 10
+    assert report.count < 10
     assert report.scores is None
     assert report.interval is None
     assert report.by_generator == {}
@@ -411,7 +415,7 @@ def test_equal_runs_are_equal(judge, tmp_path):
     runs = []
     for folder in (tmp_path / "a", tmp_path / "b"):
         tasks = load_set("lost")
-        verify_on_set(source, tasks, "dev", 3, judge=judge, out=folder)
+        verify_episodes(source, tasks, 3, split="dev", judge=judge, out=folder)
         files = sorted((folder / "trajectories").iterdir())
         runs.append([Trajectory.load(path) for path in files])
     for one, other in zip(*runs, strict=True):
@@ -424,12 +428,12 @@ def test_equal_runs_are_equal(judge, tmp_path):
     [
         (("train", 3), "split"),
         (("hidden", 3), "split 'hidden' needs a salt"),
-        (("dev", 0), "worlds"),
+        (("dev", 0), "episodes"),
     ],
 )
 def test_arguments_that_are_refused(set_yaml, arguments, message):
     with pytest.raises(TaskError, match=message):
-        verify_on_set(STILL, set_yaml(), *arguments)
+        verify_episodes(STILL, set_yaml(), arguments[1], split=arguments[0])
 
 
 @pytest.mark.slow
@@ -466,10 +470,10 @@ def test_few_hidden_worlds_of_a_generator_have_no_row(judge, tmp_path, monkeypat
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     salt = tmp_path / "my.salt"
     salt.write_bytes(b"a salt of some bytes, for rows")
-    report = verify_on_set(
-        STILL, load_set("unknown"), "hidden", 5, salt_file=salt, judge=judge
+    report = verify_episodes(
+        STILL, load_set("unknown"), 5, split="hidden", salt_file=salt, judge=judge
     )
-    assert (report.worlds, report.by_generator) == (5, {})
+    assert (report.count, report.by_generator) == (5, {})
 
 
 def test_the_command_tells_a_refused_file(tdac, tmp_path):
@@ -538,4 +542,4 @@ def test_a_set_without_a_feasible_world(tmp_path):
     level = {"worlds": [{"name": "aisles"}], "admission": {"gap": 10, "tries": 3}}
     path.write_text(yaml.safe_dump(level))
     with pytest.raises(TaskError, match="set 'mine', world 0: no feasible world from"):
-        verify_on_set(tmp_path / "own.py", load_set(path), "dev", 2)
+        verify_episodes(tmp_path / "own.py", load_set(path), 2, split="dev")

@@ -8,8 +8,8 @@ from few_worlds import write_set
 
 from benchmarks.gepa_search import PAIRS, Terms, by_gepa, by_ours, kept, main
 from benchmarks.in_process import Drives
-from tdac_agent.evaluation.set_verify import verify_on_set
-from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.judge.episode_row import EpisodeRow
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 
 START = "NEAR = 0.2\nWIDE = 4.0\n\n\ndef policy(obs):\n    return 1.0, 1.0\n"
@@ -28,7 +28,7 @@ class Ground:
         weight = index % 5 / 4
         errors = [abs(value - 1.0) / max(value, 1.0) for value in values]
         score = 1.0 - weight * errors[0] - (1.0 - weight) * errors[1]
-        return WorldEpisode(
+        return EpisodeRow(
             index=index,
             generator="mazes",
             outcome="reached",
@@ -95,7 +95,9 @@ def test_an_episode_here_is_that_of_the_judge(tmp_path, solver, warm):
     """Up to its CPU time; a controller that raises fails its episode, and no more."""
     path = write_set(tmp_path / "few.yaml")
     drive = Drives(str(path))
-    judged = verify_on_set(solver, load_set(path), "dev", 1, first=4, judge=warm)
+    judged = verify_episodes(
+        solver, load_set(path), 1, split="dev", first=4, judge=warm
+    )
     own = drive(solver, "dev", 4)
     same = {"cpu_seconds": 0.0}
     assert own.model_copy(update=same) == judged.episodes[0].model_copy(update=same)

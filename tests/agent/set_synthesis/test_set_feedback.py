@@ -2,15 +2,15 @@
 
 from few_worlds import write_set
 
-from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.set_synthesis.feedback import REFUSED, set_feedback, summary_of
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 def test_counts_and_three_diagnoses(few, warm):
-    report = verify_on_set(STILL, few, "dev", 5, first=70, judge=warm)
+    report = verify_episodes(STILL, few, 5, split="dev", first=70, judge=warm)
     assert [episode.index for episode in report.episodes] == [70, 71, 72, 73, 74]
     told = set_feedback(report)
     assert told.text.startswith(
@@ -26,7 +26,7 @@ def test_counts_and_three_diagnoses(few, warm):
 
 def test_a_file_that_may_not_drive(few, warm):
     """Each test that refused it is told."""
-    report = verify_on_set(STILL, few, "dev", 1, judge=warm)
+    report = verify_episodes(STILL, few, 1, split="dev", judge=warm)
     why = ("test_hygiene[sleep]: line 3", "test_imports: os")
     empty = {"worlds": 0, "episodes": (), "causes": {}, "scores": None, "told": why}
     told = set_feedback(report.model_copy(update=empty))
@@ -44,7 +44,7 @@ def policy(obs):
     STEPS.append(0)
     return obs["pose" if len(STEPS) < 20 else "posse"][0] * 0.0, 0.0
 """
-    report = verify_on_set(source, tasks, "dev", 2, judge=warm)
+    report = verify_episodes(source, tasks, 2, split="dev", judge=warm)
     text = set_feedback(report).text
     assert "KeyError" in text
     assert "posse" in text

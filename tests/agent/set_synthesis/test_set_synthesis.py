@@ -177,7 +177,7 @@ def test_a_broken_run_goes_on_where_it_was(write, solver, out):
     with pytest.raises(Fault, match="no access"):
         write(code(STILL), PermanentFault("no access"))
     assert load_run(out).status == "fault"
-    kept = out / "iterations" / "k01" / "j0" / "feedback-1" / "set.json"
+    kept = out / "iterations" / "k01" / "j0" / "feedback-1" / "episodes.json"
     before = kept.stat().st_mtime_ns
     model, run = write(code(solver))
     assert model.asked() == [("edit", 1, 1)]

@@ -10,13 +10,13 @@ from few_worlds import write_set
 from PIL import Image
 from script import NO_RULES, STILL, Script, code
 
-from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.html_report import make_page
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.set_synthesis.pictures import world_picture
 from tdac_agent.set_synthesis.resume import resume_set_arguments
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.drawing.canvas import MOVER
 
@@ -70,8 +70,8 @@ def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm
 
 
 def test_what_is_shown_is_what_was_diagnosed(crowded, tmp_path, warm):
-    report = verify_on_set(
-        BUMP.encode(), crowded, "dev", 3, out=tmp_path / "dev", judge=warm
+    report = verify_episodes(
+        BUMP.encode(), crowded, 3, split="dev", out=tmp_path / "dev", judge=warm
     )
     shown = world_picture(crowded, report, tmp_path / "dev")
     failed = next(each for each in report.episodes if not each.success)
@@ -85,7 +85,9 @@ def test_what_is_shown_is_what_was_diagnosed(crowded, tmp_path, warm):
 
 
 def test_worlds_of_other_splits_are_never_drawn(few, tmp_path, warm):
-    report = verify_on_set(BUMP.encode(), few, "test", 1, out=tmp_path, judge=warm)
+    report = verify_episodes(
+        BUMP.encode(), few, 1, split="test", out=tmp_path, judge=warm
+    )
     assert report.successes == 0
     with pytest.raises(ValueError, match="expected worlds of dev, got test"):
         world_picture(few, report, tmp_path)

@@ -3,17 +3,16 @@
 import os
 
 import pytest
+from tdac_agent.evaluation.unfinished import open_store
 
 from tdac_agent import load_task
 from tdac_agent.errors import RunError
-from tdac_agent.evaluation.robust import verify_robust
-from tdac_agent.evaluation.set_verify import verify_on_set
-from tdac_agent.evaluation.unfinished import open_store
 from tdac_agent.runs.run_record import JOURNAL
 from tdac_agent.storage.links import refuse_links
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.synthesis.setup import hold_folder
 from tdac_agent.verification.verify import verify
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.ladder.task_sets import load_set
 
 HOLDERS = {
@@ -70,7 +69,7 @@ def test_only_what_is_written_counts(place):
         refuse_links(place / "run", "*.png")
 
 
-@pytest.mark.parametrize("name", ["report.json", "robust.json", "trajectories"])
+@pytest.mark.parametrize("name", ["report.json", "episodes.json", "trajectories"])
 def test_verify_writes_through_no_link(place, name):
     """It ends before the controller is tested."""
     (place / "run" / name).symlink_to("../outside")
@@ -83,10 +82,10 @@ def test_verify_writes_through_no_link(place, name):
 def test_other_verifications_write_through_no_link(place):
     """The disturbed episodes, and the worlds of a set."""
     run = place / "run"
-    (run / "robust.json").symlink_to("../outside/kept")
+    (run / "episodes.json").symlink_to("../outside/kept")
     with pytest.raises(RunError, match=r"robust\.json is a link"):
-        verify_robust("def policy():\n", load_task("maze"), 1, out=run)
+        verify_episodes("def policy():\n", load_task("maze"), 1, out=run)
     (run / "sealed").symlink_to("../outside")
     with pytest.raises(RunError, match=r"sealed is a link"):
-        verify_on_set("def policy():\n", load_set("known"), out=run)
+        verify_episodes("def policy():\n", load_set("known"), out=run)
     assert os.listdir(place / "outside") == ["kept"]

@@ -14,9 +14,9 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 from studio_process import Studio
 
-from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.studio.jobs import STATE, jobs
+from tdac_agent.verification.verify_episodes import verify_episodes
 
 SECONDS = 60
 SIZES = {"desktop": (1440, 900), "laptop": (1180, 800), "phone": (390, 844)}
@@ -306,7 +306,7 @@ def test_a_bench_is_stopped_and_continued(page, studio):
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.running"))
     assert f"{len(before)} of 12 episodes driven" in text_of(page)
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
-    report = json.loads((rows.parent.parent / "set.json").read_text())
+    report = json.loads((rows.parent.parent / "episodes.json").read_text())
     # Its CPU time tells an episode from another one on the same world.
     assert report["episodes"][: len(before)] == before
 
@@ -523,7 +523,7 @@ def test_disturbed_episodes_have_short_names(page, studio, small_task, good, war
     shutil.copytree(DEMO, studio.place / "runs" / "robust")
     out = studio.place / STATE / "robust" / "runs-robust"
     source, first = good / "controller.py", 2873645123
-    verify_robust(source, small_task, 3, first_seed=first, out=out, judge=warm)
+    verify_episodes(source, small_task, 3, first=first, out=out, judge=warm)
     page.get(f"{studio.base}/run?at=runs/robust")
     says(page, "3 of 3 episodes reached the goal")
     shown = wait(page, lambda b: re.findall(r"episode \d+: reached", text_of(b)))

@@ -205,7 +205,7 @@ def test_a_bench_tells_how_far_it_is(tmp_path):
     job = Job(tmp_path, words, now, 2, "", "bench-1", ours=True)
     assert progress_of(job, tmp_path)[0] == 0.0
     for name, file in (
-        ("known/a", "set.json"),
+        ("known/a", "episodes.json"),
         ("known/b", "unfinished/episodes.jsonl"),
     ):
         path = tmp_path / "driven" / name / file

@@ -13,7 +13,6 @@ from small import write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.errors import RunError
-from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.html_report.page import make_page
 from tdac_agent.library.listing import row_of, variations_text
 from tdac_agent.metrics import frames_of
@@ -28,6 +27,7 @@ from tdac_agent.synthesis.workload import (
     task_shares,
 )
 from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.core.errors import TaskError
 
 FRAGILE = """
@@ -214,8 +214,8 @@ def test_without_a_better_one_the_first_stays(
     assert found.selected == found.first == (1, 0)
     assert (found.episodes, found.used, found.time) == (0, 8, None)
     assert found.told.endswith("none was better than k=1 j=0, which stays")
-    robust = verify_robust(
-        run.controller, task, 4, first_seed=found.first_seed, judge=warm
+    robust = verify_episodes(
+        run.controller, task, 4, first=found.first_seed, judge=warm
     )
     own = run.folder / "iterations/k01/j0/improve/disturbed.json"
     driven = DisturbedEpisodes.model_validate_json(own.read_text()).episodes

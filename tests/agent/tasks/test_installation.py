@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.installation import lasting_secret, seed_of
 from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 from tdac_agent.verification.verify import verify
+from tdac_agent.verification.verify_episodes import verify_episodes
 
 KEYED = "from tdac_agent.tasks.installation import keyed; print(keyed(b'x').hex())"
 LINE = "tdac: cannot store a secret ("
@@ -148,11 +148,11 @@ def test_another_installation_has_other_starts(good, tmp_path):
 
 def test_disturbed_episodes_begin_where_nobody_can_know(small_task, good_source, warm):
     """The seed of the first one is that of the controller, unless it is given."""
-    report = verify_robust(good_source, small_task, 1, judge=warm)
+    report = verify_episodes(good_source, small_task, 1, judge=warm)
     own = seed_of(good_source.encode(), small_task)
-    assert report.provenance.first_seed == own
-    given = verify_robust(good_source, small_task, 1, first_seed=0, judge=warm)
-    assert given.provenance.first_seed == 0
+    assert report.provenance.first == own
+    given = verify_episodes(good_source, small_task, 1, first=0, judge=warm)
+    assert given.provenance.first == 0
 
 
 def test_a_run_tells_the_seeds_and_not_the_secret(small_task, tmp_path, warm):

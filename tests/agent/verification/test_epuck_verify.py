@@ -16,7 +16,6 @@ from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.pictures import reaches
 from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.evaluation.policy import load_controller
-from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.disturbance import Disturbance
@@ -24,6 +23,7 @@ from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.suite.starts import spread_starts
 from tdac_agent.verification.verify import load_trajectories, verify
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.drawing.canvas import TRAIL
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.worlds.bundled import world_file
@@ -128,10 +128,10 @@ def test_frames_show_what_the_sensors_read(task, warm, tmp_path):
 @pytest.mark.slow
 def test_robust_episodes_are_what_the_environment_draws(task, source, warm):
     """Disturbed episodes: reproducible, in metres, and counted."""
-    report = verify_robust(source, task, 6, judge=warm)
+    report = verify_episodes(source, task, 6, judge=warm)
     assert report.provenance.unit == "m"
     assert report.successes + len(report.failed_seeds) == 6
-    again = verify_robust(source, task, 6, judge=warm)
+    again = verify_episodes(source, task, 6, judge=warm)
     figures = [e.model_dump(exclude={"cpu_seconds"}) for e in report.worst]
     assert figures == [e.model_dump(exclude={"cpu_seconds"}) for e in again.worst]
     for episode in report.worst:

@@ -10,9 +10,8 @@ import json
 
 import pytest
 
-from tdac_agent.evaluation.set_verify import limits_of
+from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_agent.verification.judge.child_pool import ChildPool
-from tdac_agent.verification.judge.set_job import SetJob, SetRun, supply
 from tdac_envs import load_set
 from tdac_envs.ladder.set_file import set_names
 
@@ -87,25 +86,14 @@ def watched(name, folder, child_pool, index):
     """
     tasks = load_set(name)
     (folder / "a.salt").write_bytes(SALT)
-    job = SetJob(
-        set_file=folder / "set.yaml",
-        split="hidden",
-        salt_file=folder / "a.salt",
-        worlds=WORLDS,
-        controller=folder / "controller.py",
-        test=None,
-        per_world=False,
-        tier="auto",
-        limits=limits_of(tasks),
-        out=folder / "results",
-    )
-    job.set_file.write_text(tasks.file.model_dump_json(by_alias=True))
-    run = SetRun(job, SPY, child_pool)
-    child = child_pool.take(job.tier, job.limits)
+    episodes = episodes_of(tasks)
+    part = Part(WORLDS, "hidden", folder / "a.salt")
+    worlds = episodes.worlds(part, folder).opened()
+    child = child_pool.take("auto", episodes.limits)
     with contextlib.closing(child):
-        supply(child, run, run.env.setup.source.task(index))
-        driver = run.budgeted(child)
-        seen, _ = run.env.reset(options={"index": index})
+        worlds.supply(child, index, SPY)
+        driver = worlds.load(child)
+        seen, _ = worlds.env.reset(options={"index": index})
         driver.reset(seen)
         driver.policy(seen)
         around, texts = child.call("around"), set(child.call("reached"))

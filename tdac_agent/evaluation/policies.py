@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from tdac_agent.builtin.level import controller_of
 from tdac_agent.episodes.learned import check_kind
 from tdac_agent.episodes.sb3_file import (
     MOST_BYTES,
@@ -18,6 +19,8 @@ from tdac_agent.episodes.sb3_file import (
 )
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.controller_file import check_controller
+from tdac_agent.problems.episodes import episodes_of, write_set
+from tdac_agent.sandbox import ControllerFault
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
@@ -26,6 +29,8 @@ from tdac_agent.verification.judge.drivers import Kind, PolicySpec
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import read_file
+from tdac_envs.ladder.env import make
+from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.learning.wrappers import WRAPPERS, check_wrappers
 
 OURS: tuple[Kind, ...] = ("reference", "random", "go-to-goal", "follow-guidance")
@@ -178,6 +183,97 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
         content += json.dumps(names).encode()
     sha256 = sha256_of(content)
     return Entrant(name, PolicySpec("sb3", file.resolve(), names), sha256, saved=saved)
+
+
+def fitted(entrant: Entrant, problem: Task | TaskSet) -> Entrant:
+    """An entrant as it drives on a problem; on a set, `builtin` gets its file.
+
+    Raises:
+        TaskError: It does not drive there, or was written for something else.
+        ControllerFileError: It was trained elsewhere.
+    """
+    episodes_of(problem).check(entrant.policy)
+    if isinstance(problem, TaskSet):
+        if entrant.saved is not None:
+            _check_training(entrant.name, entrant.saved, problem)
+        if entrant.policy.kind == "sb3":
+            _check_observations(entrant, problem)
+        return _builtin_on(entrant, problem) if entrant.is_builtin else entrant
+    if entrant.set_file is not None:
+        raise TaskError(
+            f"{entrant.name} was written for a task set, not for tasks: evaluate it "
+            f"with --set {entrant.set_file}"
+        )
+    if entrant.saved is not None and entrant.saved.set is not None:
+        raise TaskError(
+            f"{entrant.name} was trained on the task set {entrant.saved.set!r}, not on "
+            "tasks: evaluate it with --set"
+        )
+    if entrant.env not in (None, problem.spec.env):
+        raise TaskError(
+            f"{entrant.name} was written for {entrant.env}; the task "
+            f"{problem.name!r} is of {problem.spec.env}"
+        )
+    return entrant
+
+
+def knowledge(policy: PolicySpec, problem: Task | TaskSet) -> str:
+    """What a policy may use: `sensors` include the goal, and the pose if observed."""
+    if isinstance(problem, Task) or policy.kind not in ("controller", "sb3"):
+        return policy.knows
+    mapped = policy.kind == "controller" and problem.file.map
+    return "+ map" if mapped or "map-view" in policy.wrappers else "sensors"
+
+
+def _builtin_on(entrant: Entrant, tasks: TaskSet) -> Entrant:
+    """The controller of the level.
+
+    Raises:
+        TaskError: There is none.
+    """
+    file = controller_of(tasks, "leave out builtin")
+    policy = replace(entrant.policy, file=file)
+    return replace(entrant, policy=policy, sha256=sha256_of(file.read_bytes()))
+
+
+def _check_observations(entrant: Entrant, tasks: TaskSet) -> None:
+    """Refuses a policy that does not fit what a set observes.
+
+    Raises:
+        ControllerFileError: It does not.
+    """
+    from tdac_agent.episodes.learned import Learned
+
+    assert entrant.policy.file is not None
+    split = next(each for each in ("dev", "test", "train") if tasks.count(each) != 0)
+    with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
+        env = make(write_set(tasks, Path(name) / "set.yaml"), split=split)
+    try:
+        Learned(entrant.policy.file, entrant.policy.wrappers, env)
+    except ControllerFault as fault:
+        raise ControllerFileError(f"{entrant.name}: {fault}") from fault
+
+
+def _check_training(name: str, saved: SavedPolicy, tasks: TaskSet) -> None:
+    """Refuses a policy that was not trained on this set.
+
+    Raises:
+        ControllerFileError: It was not.
+    """
+    if saved.set is None and not saved.tasks:
+        return
+    if saved.set is None:
+        where = f"on {', '.join(saved.tasks)}, not on a task set"
+    elif saved.set != tasks.name:
+        where = f"on the task set {saved.set!r}, not on {tasks.name!r}"
+    elif saved.set_sha256 != tasks.sha256:
+        where = (
+            f"on another version of the task set {tasks.name!r}, "
+            f"{(saved.set_sha256 or '?')[:8]}, not on {tasks.sha256[:8]}"
+        )
+    else:
+        return
+    raise ControllerFileError(f"{name} was trained {where}")
 
 
 def write_builtin(task: Task, tier: str = "auto") -> tuple[bytes, bool]:

@@ -18,9 +18,9 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from tdac_agent.evaluation.set_report import HiddenCount, SetReport
 from tdac_agent.storage.journal import append_record, read_records, repair_end
 from tdac_agent.storage.locks import wait_for
+from tdac_agent.verification.episode_report import EpisodeReport, HiddenCount
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.trusted_folders import user_state
 
@@ -69,7 +69,7 @@ class Ledger:
 
     path: Path
 
-    def recorded(self, about: HiddenEvaluation) -> SetReport | None:
+    def recorded(self, about: HiddenEvaluation) -> EpisodeReport | None:
         """The report of an evaluation that has ended, with its count; None without.
 
         Raises:
@@ -81,7 +81,7 @@ class Ledger:
             if line.about == about and end is not None:
                 count = _count(begun, about, end.time)
                 try:
-                    report = SetReport.model_validate_json(end.report)
+                    report = EpisodeReport.model_validate_json(end.report)
                     return report.model_copy(update={"hidden": count})
                 except ValidationError:
                     raise TaskError(
@@ -104,14 +104,16 @@ class Ledger:
         self._append(_Begun(id=number, time=_now(), about=about, lineage=lineage))
         return number
 
-    def end(self, number: str, about: HiddenEvaluation, report: SetReport) -> SetReport:
+    def end(
+        self, number: str, about: HiddenEvaluation, report: EpisodeReport
+    ) -> EpisodeReport:
         """Records the report of an evaluation; returns it with its count.
 
         Raises:
             TaskError: The ledger cannot be written.
         """
         text = report.model_dump_json(exclude={"hidden"})
-        self._append(_Ended(id=number, time=_now(), worlds=report.worlds, report=text))
+        self._append(_Ended(id=number, time=_now(), worlds=report.count, report=text))
         if report.refused:
             return report
         count = _count(self._lines()[0], about, None)
@@ -162,8 +164,8 @@ def user_ledger() -> Ledger:
 
 
 def on_record(
-    about: HiddenEvaluation, lineage: str | None, drive: Callable[[], SetReport]
-) -> SetReport:
+    about: HiddenEvaluation, lineage: str | None, drive: Callable[[], EpisodeReport]
+) -> EpisodeReport:
     """The report of a hidden evaluation, which is recorded before it is driven.
 
     Args:

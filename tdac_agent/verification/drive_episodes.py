@@ -1,0 +1,208 @@
+"""Drives a policy of any kind in episodes of a problem, and reports on them."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from tdac_agent.problems.episodes import Episodes, Part
+from tdac_agent.sandbox import CONFINING, Limits
+from tdac_agent.sandbox.exposure import exposure
+from tdac_agent.storage.links import refuse_links
+from tdac_agent.tasks.provenance import versions
+from tdac_agent.verification.episode_report import (
+    EpisodeProvenance,
+    EpisodeReport,
+    clock_dependence,
+    summarise,
+)
+from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.episode_job import EpisodeJob
+from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.ledger import SEQUENTIAL, HiddenEvaluation, on_record
+from tdac_agent.verification.run_episodes import Watch, run_episodes
+from tdac_agent.verification.store import (
+    ROWS_FILE,
+    TRAJECTORIES,
+    WRITTEN,
+    keep_report,
+    keep_sealed,
+    keep_trajectories,
+    unfinished,
+)
+from tdac_envs.core.errors import TaskError
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A policy, and the episodes in which it drives.
+
+    Attributes:
+        policy: The policy.
+        sha256: Hash of its file.
+        episodes: The task or the task set.
+        part: Which of its episodes.
+        test: A sequential test that ends them early; then there are no scores.
+        lineage: Id of the run that wrote a controller, if one did.
+        patience: Time-outs after which the rest is skipped; None for never.
+        tier: Sandbox tier; `auto` for the best one on this machine.
+        limits: Limits of a controller's process; those of the problem by default.
+        trajectories: Whether the trajectories of public episodes are kept.
+    """
+
+    policy: PolicySpec
+    sha256: str
+    episodes: Episodes
+    part: Part
+    test: SequentialTest | None = None
+    lineage: str | None = None
+    patience: int | None = None
+    tier: str = "auto"
+    limits: Limits | None = None
+    trajectories: bool = False
+
+
+def drive(
+    request: Request,
+    out: Path | None = None,
+    judge: WarmJudge | None = None,
+    watch: Watch | None = None,
+) -> EpisodeReport:
+    """Has the judge drive a policy, and reports on its episodes.
+
+    A controller has a fresh sandboxed process in each episode, which is told neither
+    split nor number. Before hidden worlds are driven, that is recorded in the user's
+    ledger; what is recorded there is answered from it.
+
+    Args:
+        request: Who drives, and where.
+        out: Folder for `episodes.json` and `trajectories/`; of hidden worlds, for
+            `episodes.json` and `sealed/`, which only this user can read. Without a
+            sequential test, an interrupted call leaves its episodes there, and the
+            same call goes on.
+        judge: A warm judge; None starts one for this call.
+        watch: Called repeatedly with the numbers of episodes and successes so far.
+
+    Raises:
+        TaskError: The policy does not drive there, or the ledger cannot be used.
+        Fault: The sandbox is broken; the controller neither passes nor fails.
+        RunError: A link leads out of `out`, where the results are written.
+    """
+    if out is not None:
+        refuse_links(out, *WRITTEN)
+    policy, own, part = request.policy, request.episodes, request.part
+    own.check(policy)
+    secret = own.secret(part)
+    if secret is None or policy.kind == "privileged":
+        return _driven(request, out, judge, watch)
+    if policy.kind == "controller":
+        _check_hiding(request)
+    about = HiddenEvaluation(
+        entrant=request.sha256,
+        set=own.name,
+        set_sha256=own.sha256,
+        worlds=SEQUENTIAL if request.test else len(part.numbers),
+        salt_sha256=secret,
+    )
+    report = on_record(
+        about, request.lineage, lambda: _driven(request, out, judge, watch)
+    )
+    if out is not None:
+        keep_report(report, out)
+    return report
+
+
+def _check_hiding(request: Request) -> None:
+    """Refuses hidden worlds that a controller could find.
+
+    Raises:
+        TaskError: The sandbox does not hide files, or the salt or the folder lies
+            where it shows them.
+    """
+    if request.tier not in ("auto", *(each.name for each in CONFINING)):
+        raise TaskError(
+            f"the sandbox tier {request.tier!r} cannot keep a controller from reading "
+            "files, including hidden worlds; leave out --tier"
+        )
+    salt_file, seen = request.part.salt_file, exposure()
+    place = salt_file or request.episodes.hidden_folder
+    assert place is not None
+    shown = (*seen.system, *seen.packages)
+    if any(place.resolve().is_relative_to(folder) for folder in shown):
+        what = "salt file" if salt_file else "hidden folder"
+        raise TaskError(
+            f"{what} {place}: controllers can read this folder, which belongs to "
+            f"Python or its packages; move it"
+        )
+
+
+def _driven(
+    request: Request,
+    out: Path | None,
+    judge: WarmJudge | None,
+    watch: Watch | None,
+) -> EpisodeReport:
+    """Has the judge test and drive the policy, and keeps what it found."""
+    began = time.monotonic()
+    own, part, policy = request.episodes, request.part, request.policy
+    told, is_file = not part.is_hidden, policy.kind == "controller"
+    limits = request.limits or own.limits
+    own.compile()
+    about = {
+        "policy": [policy.kind, policy.wrappers, request.sha256],
+        "problem": own.sha256,
+        "part": [part.split, list(part.numbers), part.variation, str(part.disturbance)],
+        "secret": own.secret(part),
+        "sandbox": [request.tier, asdict(limits), request.patience],
+        "versions": dict(versions()),
+    }
+    with (
+        tempfile.TemporaryDirectory(prefix="tdac-drive-") as name,
+        unfinished(None if request.test else out, about) as kept,
+    ):
+        folder = Path(name)
+        lasting = (kept or folder).resolve()
+        keeps = request.trajectories and told and out is not None
+        job = EpisodeJob(
+            worlds=own.worlds(part, folder),
+            policy=policy,
+            numbers=tuple(part.numbers),
+            checks=own.checks and is_file,
+            test=request.test,
+            told=told,
+            patience=request.patience,
+            tier=request.tier,
+            limits=limits,
+            out=folder / "results",
+            rows=None if kept is None else lasting / ROWS_FILE,
+            trajectories=lasting / TRAJECTORIES if keeps else None,
+        )
+        rows, ending = run_episodes(job, own.longest, judge, watch)
+        facts = own.provenance(part, folder, request.sha256, ending.tier, limits)
+        checks, clock = None, None
+        if job.checks:
+            content = (job.out / CHECKS_FILE).read_bytes()
+            checks = Checks.model_validate_json(content)
+        if own.cpu is not None and is_file:
+            assert policy.file is not None
+            clock = clock_dependence(policy.file.read_bytes(), rows, own.cpu)
+        report = summarise(
+            EpisodeProvenance.model_validate(facts),
+            rows,
+            request.test,
+            time.monotonic() - began,
+            told=told,
+            different=own.different(part),
+            checks=checks,
+            clock_dependent=clock,
+        )
+        if out is not None and told:
+            keep_report(report, out)
+            keep_trajectories(job.trajectories, out)
+        elif out is not None:
+            keep_sealed(rows, out)
+    return report

@@ -1,0 +1,357 @@
+"""`episodes.json`: how a policy does in many episodes of a task or a task set."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import AliasChoices, ConfigDict, Field, model_validator
+
+from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
+from tdac_agent.metrics.rates import rate_of_runs
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.units import Place
+from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores, scores_of
+from tdac_agent.verification.judge.sequential import (
+    Characteristics,
+    Decision,
+    SequentialTest,
+)
+from tdac_agent.verification.judge.set_checks import Checks
+from tdac_agent.verification.suite.contract import (
+    ParseError,
+    parse_source,
+    reads_clock,
+)
+from tdac_envs.ladder.set_file import CpuSpec
+
+LEAST_GROUP = 5
+"""Least number of hidden worlds of a generator whose scores reveal no single world."""
+MOST_TOLD = 3
+"""Failures whose diagnosis is reported."""
+WORST = 20
+TOUCHED = {
+    "wall": "with a wall",
+    "mover": "with a mover",
+    "mover_standing": "with a mover while the robot stood",
+}
+"""How the failures of each contact are told apart."""
+
+
+class _Record(PrintableRecord):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class EpisodeProvenance(_Record):
+    """What the results apply to; with a number, it determines an episode."""
+
+    name: str = Field(
+        validation_alias=AliasChoices("name", "set", "task"),
+        description="Name of the task or the task set.",
+    )
+    sha256: str = Field(
+        validation_alias=AliasChoices("sha256", "set_sha256", "task_sha256"),
+        description="Its hash.",
+    )
+    split: str | None = Field(None, description="Split of the worlds of a set.")
+    salt_sha256: str | None = Field(
+        None,
+        description="None for a public salt. For a hidden folder, the hash of its "
+        "worlds.",
+    )
+    first: int = Field(
+        0,
+        validation_alias=AliasChoices("first", "first_seed"),
+        description="Number of the first episode: a seed, or that of a world.",
+    )
+    disturbance: Disturbance | None = Field(
+        None, description="Of a task; a set has its own."
+    )
+    variation: str | None = Field(None, description="Of start and goal of a task.")
+    unit: Place = Field("px", description="Unit of positions and lengths.")
+    left_out: tuple[str, ...] = Field(
+        (), description="Nodes of the world that may be solid and were ignored."
+    )
+    map_sha256: str = Field("", description="Hash of the map or world of a task.")
+    params_sha256: str = ""
+    sensors_sha256: str = ""
+    controller_sha256: str
+    sandbox: str = Field(description="Sandbox tier; `none` without foreign code.")
+    limits: dict[str, float] = Field(description="Limits of each episode.")
+    warnings: tuple[str, ...] = ()
+    versions: dict[str, str]
+
+
+class Interval(_Record):
+    """A confidence interval for the success rate.
+
+    Exact (Clopper and Pearson 1934): its coverage is at least `confidence` at any rate.
+    Where a world is driven several times, worlds are resampled.
+    """
+
+    low: float
+    high: float
+    confidence: float
+    method: Literal["Clopper-Pearson", "bootstrap over worlds"] = "Clopper-Pearson"
+
+
+class SequentialResult(_Record):
+    """The decision of a sequential test, and its error rates."""
+
+    decision: Decision
+    test: SequentialTest
+    refuse_at: float = Field(description="Success rate that the test should reject.")
+    at_refused_rate: Characteristics
+    at_accepted_rate: Characteristics
+
+
+class HiddenCount(_Record):
+    """What the ledger says about a hidden evaluation."""
+
+    number: int = Field(description="Its number among those of this controller, set.")
+    count: int = Field(description="How many there are so far.")
+    lineage: int | None = Field(
+        None,
+        description="How many there are so far of controllers that the same run wrote; "
+        "None if no run wrote this one.",
+    )
+    recorded: str | None = Field(
+        None, description="When it was driven, if it was not driven anew (UTC)."
+    )
+
+
+class EpisodeReport(_Record):
+    """Independent episodes of a task, by seed, or on worlds of a set, by index."""
+
+    schema_version: int = 2
+    provenance: EpisodeProvenance
+    tests: dict[str, str] = Field(
+        default_factory=dict,
+        description="Static and contract tests on a set: `passed` or `failed`. If one "
+        "failed, no episode was driven, and `told` has a line for each that failed.",
+    )
+    count: int = Field(
+        validation_alias=AliasChoices("count", "worlds"),
+        description="Number of episodes; with a test, up to its decision.",
+    )
+    successes: int = Field(description="Goal reached, no contact, no error.")
+    interval: Interval | None = Field(
+        None, description="Of the success rate; None with a test: it is biased."
+    )
+    scores: Scores | None = Field(None, description="None with a test, likewise.")
+    by_generator: dict[str, Scores] = Field(
+        default_factory=dict, description="On a set; empty with a test."
+    )
+    causes: dict[str, int] = Field(
+        default_factory=dict, description="Failures by cause."
+    )
+    told: tuple[str, ...] = Field(
+        (),
+        description="Diagnoses, in the frame that the controller observes; none of "
+        "hidden worlds.",
+    )
+    episodes: tuple[EpisodeRow, ...] = Field((), description="Empty for hidden worlds.")
+    sequential: SequentialResult | None = None
+    child_cpu_seconds: float
+    seconds: float
+    clock_dependent: str | None = Field(
+        None,
+        description="Why a slower or busier machine may give other results; None for "
+        "a controller that reads no clock and used at most half of its CPU budget.",
+    )
+    hidden: HiddenCount | None = Field(None, description="Only of hidden worlds.")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_version_1(cls, values: Any) -> Any:
+        """Reads `robust.json` of version 1, which had the worst episodes alone."""
+        if not isinstance(values, dict) or "failed_seeds" not in values:
+            return values
+        gone = {"rate", "outcomes", "time_outs", "failed_seeds", "worst", "episodes"}
+        kept = {name: each for name, each in values.items() if name not in gone}
+        worst = sorted(values["worst"], key=lambda each: each["seed"])
+        return {**kept, "count": values["episodes"], "episodes": worst}
+
+    @property
+    def refused(self) -> bool:
+        """Whether a static or contract test failed, so that nothing was driven."""
+        return "failed" in self.tests.values()
+
+    @property
+    def passed(self) -> bool:
+        """Whether the tests and the sequential test accept; True if there was none."""
+        if self.refused:
+            return False
+        return self.sequential is None or self.sequential.decision == "accepted"
+
+    @property
+    def rate(self) -> float | None:
+        """The success rate; None with a sequential test: it would be biased."""
+        return None if self.scores is None else self.scores.success
+
+    @property
+    def failures(self) -> tuple[EpisodeRow, ...]:
+        """The episodes that failed."""
+        return tuple(each for each in self.episodes if not each.success)
+
+    @property
+    def outcomes(self) -> dict[str, int]:
+        """Number of episodes by outcome."""
+        return dict(Counter(each.outcome for each in self.episodes).most_common())
+
+    @property
+    def time_outs(self) -> int:
+        """Failures by time-out, which a busy machine may cause."""
+        return self.causes.get("time-out", 0)
+
+    @property
+    def worst(self) -> tuple[EpisodeRow, ...]:
+        """The worst episodes, the worst first."""
+        return tuple(sorted(self.episodes, key=badness)[:WORST])
+
+
+def summarise(
+    provenance: EpisodeProvenance,
+    episodes: Sequence[EpisodeRow],
+    test: SequentialTest | None,
+    seconds: float,
+    *,
+    told: bool = True,
+    different: int | None = None,
+    checks: Checks | None = None,
+    clock_dependent: str | None = None,
+) -> EpisodeReport:
+    """Summarises episodes.
+
+    Args:
+        provenance: What they apply to.
+        episodes: The episodes, in the order of their numbers.
+        test: The sequential test that may have stopped them.
+        seconds: Wall time, s.
+        told: Whether single episodes may be reported.
+        different: Number of different worlds, if each is driven several times.
+        checks: The static and contract tests. If one failed, there are no episodes.
+        clock_dependent: See `clock_dependence`.
+    """
+    checks = checks or Checks(results={})
+    if checks.failures:
+        test = None
+    failed = [episode for episode in episodes if not episode.success]
+    successes = len(episodes) - len(failed)
+    groups: dict[str, list[EpisodeRow]] = {}
+    for episode in episodes:
+        if episode.generator is not None:
+            groups.setdefault(episode.generator, []).append(episode)
+    if not told:
+        groups = {name: own for name, own in groups.items() if len(own) >= LEAST_GROUP}
+    scored = test is None and bool(episodes)
+    texts = [each.text or f"{named(each)}: {each.error}" for each in failed]
+    return EpisodeReport(
+        provenance=provenance,
+        tests=checks.outcomes,
+        count=len(episodes),
+        successes=successes,
+        interval=_interval(episodes, different) if scored else None,
+        scores=scores_of(episodes) if scored else None,
+        by_generator=(
+            {name: scores_of(group) for name, group in groups.items()} if scored else {}
+        ),
+        causes=dict(Counter(cause_of(episode) for episode in failed).most_common()),
+        told=checks.failures or (tuple(texts[:MOST_TOLD]) if told else ()),
+        episodes=tuple(episodes) if told else (),
+        sequential=None if test is None else result_of(test, successes, len(failed)),
+        child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),
+        seconds=round(seconds, 3),
+        clock_dependent=clock_dependent,
+    )
+
+
+def named(episode: EpisodeRow) -> str:
+    """Name of an episode in texts."""
+    if episode.seed is not None:
+        return f"seed {episode.seed}"
+    return f"world {episode.index}"
+
+
+def _interval(episodes: Sequence[EpisodeRow], different: int | None) -> Interval | None:
+    """The interval of the success rate; its unit is the world."""
+    successes = sum(episode.success for episode in episodes)
+    if different is None or len(episodes) <= different:
+        return success_interval(successes, len(episodes))
+    passed, tried = np.zeros(different, int), np.zeros(different, int)
+    for episode in episodes:
+        passed[episode.number % different] += episode.success
+        tried[episode.number % different] += 1
+    if ((passed == 0) | (passed == tried)).all():
+        return success_interval(int((passed > 0).sum()), different)
+    rate = rate_of_runs(passed, tried)
+    if math.isnan(rate.low):
+        return None
+    ends = {"low": rate.low, "high": rate.high, "confidence": CONFIDENCE}
+    return Interval(**ends, method="bootstrap over worlds")
+
+
+def success_interval(successes: int, episodes: int) -> Interval:
+    """The exact interval of a success rate."""
+    low, high = exact_interval(successes, episodes)
+    return Interval(low=low, high=high, confidence=CONFIDENCE)
+
+
+def badness(episode: EpisodeRow) -> tuple[bool, float, int]:
+    """Sort key, worst first: failures by share of path left, then slow successes."""
+    if episode.success or not episode.d0:
+        return episode.success, -episode.steps, episode.number
+    return False, -(episode.d_min or 0.0) / episode.d0, episode.number
+
+
+def cause_of(episode: EpisodeRow) -> str:
+    """Why an episode failed, with what the robot touched."""
+    cause = str(episode.cause or episode.outcome)
+    return f"{cause} {TOUCHED[episode.contact]}" if episode.contact else cause
+
+
+def clock_dependence(
+    source: bytes, episodes: Sequence[EpisodeRow], budget: CpuSpec
+) -> str | None:
+    """Why a slower or busier machine may give other results; None if it may not."""
+    with contextlib.suppress(ParseError):
+        if reads_clock(parse_source(source)):
+            return "it reads the clock"
+    used = [e.cpu_seconds / (budget.start + budget.of_steps(e.steps)) for e in episodes]
+    over = sum(share > 0.5 for share in used)
+    if over == 0:
+        return None
+    return f"in {over} of {len(used)} episodes it used over half of its CPU budget"
+
+
+def result_of(test: SequentialTest, successes: int, failures: int) -> SequentialResult:
+    """The decision of a test, with its error rates."""
+    return SequentialResult(
+        decision=test.decide(successes, failures),
+        test=test,
+        refuse_at=test.refuse_at,
+        at_refused_rate=test.characteristics(test.refuse_at),
+        at_accepted_rate=test.characteristics(test.accept_at),
+    )
+
+
+def decision_text(result: SequentialResult) -> str:
+    """What a sequential test decided."""
+    if result.decision == "accepted":
+        return f"accepted at {percent(result.test.accept_at)}"
+    if result.decision == "rejected":
+        return f"rejected at {percent(result.test.accept_at)}"
+    return "undecided, therefore not accepted,"
+
+
+def percent(share: float) -> str:
+    """A percentage with one decimal; with three if it would round to 0 or 100 %."""
+    rounded = f"{100 * share:.1f}"
+    if rounded in ("0.0", "100.0") and 0.0 < share < 1.0:
+        rounded = f"{100 * share:.3f}"
+    return f"{rounded} %"

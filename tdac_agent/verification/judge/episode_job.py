@@ -1,0 +1,323 @@
+"""Drives a policy in many episodes in the judge's process, and stores the results."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Generator, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from tdac_agent.episodes.episode import Driver, not_driven, run_policy
+from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.sandbox import Child, ControllerFault, Limits, SandboxError
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.tasks.setting import JudgedEnv
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.drivers import PolicySpec, driver_of
+from tdac_agent.verification.judge.episode_row import EpisodeRow, driven_row
+from tdac_agent.verification.judge.in_order import in_order
+from tdac_agent.verification.judge.sequential import SequentialTest
+from tdac_agent.verification.judge.set_checks import (
+    CHECKED_STEPS,
+    CHECKS_FILE,
+    STABLE,
+    Checks,
+    static_checks,
+)
+from tdac_agent.verification.judge.worlds import (
+    FOREVER,
+    SetEpisodes,
+    SetWorlds,
+    TaskEpisodes,
+    TaskWorld,
+)
+from tdac_envs.core.errors import TaskError
+from tdac_envs.core.intake import RECORD_BYTES, read_file
+
+EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
+MOST_ROW_BYTES = 512 << 20
+UNSANDBOXED = "none"
+"""Reported as the tier of policies that run without a sandbox."""
+
+
+class EpisodeJob(BaseModel):
+    """Episodes to drive; all paths are absolute.
+
+    Attributes:
+        worlds: Where they take place.
+        policy: Who drives.
+        numbers: Their numbers, in order.
+        checks: Whether static and contract tests come first; without a pass, nothing is
+            driven.
+        test: Stops early, once it has decided.
+        told: Whether more may be told of a failure than its cause.
+        patience: Time-outs after which the rest is skipped; None for never.
+        tier: Sandbox tier.
+        limits: Limits of each episode's process.
+        out: Folder of the results.
+        rows: File in which an interrupted job finds what it has driven already.
+        trajectories: Folder for the trajectory of each episode, `NUMBER.npz`.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["episodes"] = "episodes"
+    worlds: TaskWorld | SetWorlds = Field(discriminator="kind")
+    policy: PolicySpec
+    numbers: tuple[int, ...]
+    checks: bool = False
+    test: SequentialTest | None = None
+    told: bool = True
+    patience: int | None = None
+    tier: str
+    limits: Limits
+    out: Path
+    rows: Path | None = None
+    trajectories: Path | None = None
+
+
+class JobEnding(PrintableRecord):
+    """What the judge's process found in addition to the episodes.
+
+    `fault` is why the sandbox failed, `problem` what is wrong with the task.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    tier: str
+    fault: str | None = None
+    problem: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeSummary:
+    """What is kept of an episode; see `in_order.Timed`."""
+
+    row: EpisodeRow
+    tier: str
+    late: bool
+    is_retryable: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Driven:
+    """An episode as it was driven.
+
+    Attributes:
+        rollout: The judged episode.
+        row: Its row.
+        tier: Sandbox tier.
+    """
+
+    rollout: Rollout
+    row: EpisodeRow
+    tier: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EpisodeRun:
+    """Everything that the episodes of a job share.
+
+    Attributes:
+        job: The job.
+        child_pool: The child pool.
+        worlds: Where they take place.
+        source: Bytes of the controller; empty without one.
+    """
+
+    job: EpisodeJob
+    child_pool: ChildPool
+    worlds: TaskEpisodes | SetEpisodes
+    source: bytes
+
+    @classmethod
+    def of(cls, job: EpisodeJob, child_pool: ChildPool) -> EpisodeRun:
+        """Opens the worlds, and reads the controller."""
+        file = job.policy.file if job.policy.kind == "controller" else None
+        source = b"" if file is None else read_file(file, RECORD_BYTES)
+        return cls(job, child_pool, job.worlds.opened(), source)
+
+
+def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
+    """Drives the episodes of a job, and writes a row for each in their order.
+
+    A sequential test gets them in the same order, so that its decision does not depend
+    on timing. Episodes after its decision are dropped.
+    """
+    job.out.mkdir(exist_ok=True)
+    counts, tier, fault, problem = [0, 0], job.tier, None, None
+    before = kept_rows(job.rows, job.numbers)
+    with ExitStack() as stack:
+        paths = [job.out / EPISODES_FILE, *([job.rows] if job.rows else [])]
+        files = [
+            stack.enter_context(path.open("a", encoding="utf-8")) for path in paths
+        ]
+        files[0].writelines(f"{each.model_dump_json()}\n" for each in before)
+        files[0].flush()
+        try:
+            run = EpisodeRun.of(job, child_pool)
+            numbers = job.numbers[len(before) :]
+            if job.checks:
+                checks, tier = _checked(run)
+                write_atomic(job.out / CHECKS_FILE, checks.model_dump_json())
+                numbers = () if checks.failures else numbers
+            late = sum(each.cause == "time-out" for each in before)
+            for done in _in_order(run, numbers, late):
+                tier = done.tier or tier
+                for file in files:
+                    file.write(done.row.model_dump_json() + "\n")
+                    file.flush()
+                counts[not done.row.success] += 1
+                if job.test and job.test.decide(*counts) != "undecided":
+                    break
+        except SandboxError as error:
+            fault = error.fault
+        except TaskError as error:  # there is no feasible world
+            problem = str(error)
+    ending = JobEnding(tier=tier, fault=fault, problem=problem)
+    write_atomic(job.out / ENDING_FILE, ending.model_dump_json())
+
+
+def kept_rows(path: Path | None, numbers: tuple[int, ...]) -> list[EpisodeRow]:
+    """The first of these episodes that an interrupted job has kept.
+
+    A line that was not written completely ends them. The file is cut off before it.
+
+    Args:
+        path: The file; None for none.
+        numbers: Numbers of the episodes, in their order.
+    """
+    found: list[EpisodeRow] = []
+    if path is None or not path.is_file():
+        return found
+    text = read_file(path, MOST_ROW_BYTES)
+    size = 0
+    for line in text.splitlines(keepends=True):
+        if len(found) == len(numbers) or not line.endswith(b"\n"):
+            break
+        row = EpisodeRow.model_validate_json(line)
+        if row.number != numbers[len(found)]:
+            break
+        found.append(row)
+        size += len(line)
+    if size < len(text):
+        write_atomic(path, text[:size])
+    return found
+
+
+def drive_number(run: EpisodeRun, number: int) -> Driven:
+    """Drives an episode; a controller runs in a fresh child, told nothing of it."""
+    rollout, env, cpu_seconds, tier = _drive(run, number)
+    return Driven(rollout, _row(run, number, rollout, env, cpu_seconds), tier)
+
+
+def _checked(run: EpisodeRun) -> tuple[Checks, str]:
+    """The static tests, and the first steps on a public world; also the tier."""
+    results, job, worlds = static_checks(run.source), run.job, run.worlds
+    if len(results) == 1:  # it does not parse
+        return Checks(results=results), job.tier
+    assert isinstance(worlds, SetEpisodes)
+    # A public world, so that a failure tells nothing of hidden ones.
+    public, own = ("dev", "test", "train"), worlds.worlds
+    split = next((s for s in public if worlds.tasks.count(s) != 0), own.split)
+    shown = own.model_copy(update={"split": split, "salt_file": None})
+    # Here and not in a worker pool, so that its processes share what this loads.
+    drive = partial(_drive, replace(run, worlds=shown.opened()), 0, CHECKED_STEPS)
+    rollout, _, _, tier = drive()
+    if rollout.is_retryable:
+        rollout, _, _, tier = drive()
+    return Checks(results={**results, STABLE: rollout.error}), tier
+
+
+def _in_order(
+    run: EpisodeRun, numbers: Sequence[int], late: int
+) -> Generator[EpisodeSummary]:
+    if numbers:
+        work, end = partial(_work, run), run.child_pool.close
+        with closing(in_order(work, end, numbers, late, run.job.patience)) as episodes:
+            yield from episodes
+
+
+def _work(run: EpisodeRun, number: int, skip: bool) -> EpisodeSummary:
+    """Drives or skips an episode, and returns what is kept of it."""
+    job = run.job
+    if job.policy.kind == "privileged":
+        assert isinstance(run.worlds, SetEpisodes)
+        row = run.worlds.planned(number)
+        return EpisodeSummary(row, UNSANDBOXED, late=False, is_retryable=False)
+    driven = _skipped(run, number) if skip else drive_number(run, number)
+    rollout = driven.rollout
+    if job.trajectories is not None:
+        job.trajectories.mkdir(parents=True, exist_ok=True)
+        rollout.trajectory.save(job.trajectories / f"{number}.npz", rollout.calls)
+    late = rollout.outcome == "error" and rollout.timed_out
+    return EpisodeSummary(driven.row, driven.tier, late, rollout.is_retryable)
+
+
+def _skipped(run: EpisodeRun, number: int) -> Driven:
+    reason = f"not driven, because {run.job.patience} earlier episodes timed out"
+    record = run.worlds.record(number)
+    fault = ControllerFault(reason, "policy")
+    rollout = not_driven(record, run.worlds.name(number), fault)
+    return Driven(rollout, _row(run, number, rollout, record.env, 0.0), "")
+
+
+def _drive(
+    run: EpisodeRun, number: int, most: int = FOREVER
+) -> tuple[Rollout, JudgedEnv, float, str]:
+    """Drives at most `most` steps; fewer than an episode are not budgeted.
+
+    Returns:
+        The episode, its environment, the CPU time of the policy, s, and the tier.
+    """
+    worlds, policy = run.worlds, run.job.policy
+    record, name = worlds.record(number, most), worlds.name(number)
+    # Single calls and their mean time are limited instead of the episode.
+    drive = partial(
+        run_policy, record=record, name=name, held_out=False, deadline=math.inf
+    )
+    if policy.kind != "controller":
+        began = time.process_time()
+        try:
+            rollout = drive(driver_of(policy, record.env, number))
+        except ControllerFault as fault:
+            rollout = not_driven(record, name, fault)
+        return rollout, record.env, time.process_time() - began, UNSANDBOXED
+    record.seen = worlds.seen
+    child = run.child_pool.take(run.job.tier, run.job.limits)
+    try:
+        worlds.supply(child, number, run.source)
+        rollout = drive(worlds.load(child) if most == FOREVER else _loaded(child))
+    except ControllerFault as fault:
+        rollout = not_driven(record, name, fault)
+    finally:
+        usage = child.close()
+    rollout = replace(rollout, printed=usage.printed)
+    return rollout, record.env, usage.cpu_seconds, child.tier
+
+
+def _loaded(child: Child) -> Driver:
+    child.load()
+    return child
+
+
+def _row(
+    run: EpisodeRun, number: int, rollout: Rollout, env: JudgedEnv, cpu_seconds: float
+) -> EpisodeRow:
+    task, shown = run.worlds.diagnosed(env)
+    return driven_row(
+        rollout,
+        task,
+        run.worlds.facts(env, number),
+        units=run.worlds.units,
+        shown=shown,
+        told=run.job.told,
+        cpu_seconds=cpu_seconds,
+    )
