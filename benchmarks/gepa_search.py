@@ -50,9 +50,13 @@ from rich.table import Table
 from benchmarks.in_process import Drives
 from benchmarks.timing import whole_from_one
 from benchmarks.tune_planners import drawn
-from tdac_agent.bench.rivals import ranges_of, source_of, with_values
+from tdac_agent.planners.planner import ranges_of, source_of, with_values
 from tdac_agent.builtin.variation import varied
-from tdac_agent.verification.episode_report import EpisodeProvenance, EpisodeReport, summarise
+from tdac_agent.verification.episode_report import (
+    EpisodeProvenance,
+    EpisodeReport,
+    summarise,
+)
 from tdac_agent.metrics.paired import bootstrap
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import Run

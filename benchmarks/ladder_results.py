@@ -33,7 +33,7 @@ from scipy import stats
 from tdac_agent.bench.bench import WORLD_TABLE, bench
 from tdac_agent.bench.figures import draw_figures, frame_of
 from tdac_agent.bench.record import Bench, BenchRow, Interval
-from tdac_agent.bench.rivals import levels_of, rival_names
+from tdac_agent.planners.planner import levels_of, planner_names
 from tdac_agent.bench.shown import merged, reveal
 from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_agent.prompting.extract import extract_source
@@ -51,7 +51,7 @@ SIGNIFICANT = 0.05
 def entrants(kind: str, level: str, out: Path) -> list[str]:
     """The words of `tdac bench` for the entrants of a kind."""
     if kind == "programs":
-        rivals = [name for name in rival_names() if level in levels_of(name)]
+        rivals = [name for name in planner_names() if level in levels_of(name)]
         return ["builtin", *rivals]
     if kind == "answers":
         files = [str(file) for file in _answers(level, out / "answers" / level)]

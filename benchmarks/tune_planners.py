@@ -6,7 +6,7 @@
 64. The first setting is that of the file, the others are drawn from the ranges in
 `rivals.yaml`: evenly in the logarithm where the lower bound is positive, else evenly.
 The best mean time score wins; of equals, the earlier setting. Without PLANNER LEVEL,
-all are tuned. `OUT/tuned.json` is what `tdac_agent/bench/planners` has, and
+all are tuned. `OUT/tuned.json` is what `tdac_agent/planners/files` has, and
 `OUT/tuning.json` has all figures. After an interruption, the same command goes on.
 """
 
@@ -25,11 +25,11 @@ from typing import Any
 
 import numpy as np
 
-from tdac_agent.bench.rivals import (
+from tdac_agent.planners.planner import (
     TUNED,
     levels_of,
     ranges_of,
-    rival_names,
+    planner_names,
     source_of,
     with_values,
 )
@@ -155,7 +155,7 @@ def main() -> None:
     words = options.pairs
     pairs = list(zip(words[::2], words[1::2], strict=True)) or [
         (name, level)
-        for name in rival_names()
+        for name in planner_names()
         if ranges_of(name)
         for level in levels_of(name)
     ]

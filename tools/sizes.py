@@ -27,7 +27,7 @@ from scipy.sparse.csgraph import connected_components
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("tdac_envs", "tdac_agent")
 OTHERS = ("tests", "benchmarks", "tools")
-CONTROLLERS = ("tdac_agent/builtin/levels/", "tdac_agent/bench/planners/")
+CONTROLLERS = ("tdac_agent/builtin/levels/", "tdac_agent/planners/files/")
 """Folders of controllers, which are single files by contract; so is `sensors.py`."""
 DATA = ("tests/agent/zoo/*/attacks/*", "tests/agent/webots/controllers/*")
 """Controllers that tests give to the judge; some of them are no Python."""

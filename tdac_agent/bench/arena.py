@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.bench.compared import Driven, Episodes, figures_of
-from tdac_agent.bench.entrants import Member, Named, Worlds, drive, knows, member_of
+from tdac_agent.bench.entrants import Named, Worlds, drive, knows, member_of, steps_of
 from tdac_agent.bench.page import MOST_WORLDS, Replay
 from tdac_agent.bench.record import BenchFile, BenchRow
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import ControllerFileError, RunError
+from tdac_agent.evaluation.policies import Entrant
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
@@ -42,7 +43,7 @@ class Part:
 
     tasks: TaskSet
     entrant: Named
-    members: tuple[Member, ...] = ()
+    members: tuple[Entrant, ...] = ()
     problem: str | None = None
 
 
@@ -92,7 +93,7 @@ def part_of(entrant: Named, tasks: TaskSet) -> Part:
         members = tuple(member_of(word, tasks) for word in entrant.words)
     except (TaskError, ControllerFileError) as error:
         return Part(tasks, entrant, problem=str(error))
-    kinds = dict.fromkeys(m.saved.algo if m.saved else m.kind for m in members)
+    kinds = dict.fromkeys(m.saved.algo if m.saved else str(m.kind) for m in members)
     if len(kinds) > 1:
         problem = f"its files are not seeds of one training: {', '.join(kinds)}"
         return Part(tasks, entrant, problem=problem)
@@ -128,9 +129,9 @@ def row_of(arena: Arena, part: Part) -> BenchRow:
     return row.model_copy(update={**more, **figures_of(found, episodes)})
 
 
-def _about(members: Sequence[Member], tasks: TaskSet) -> dict[str, Any]:
+def _about(members: Sequence[Entrant], tasks: TaskSet) -> dict[str, Any]:
     """What `BenchRow` says of the files of an entrant."""
-    steps = [member.steps for member in members]
+    steps = [steps_of(member) for member in members]
     return {
         "kind": members[0].kind,
         "knows": knows(members[0], tasks),
@@ -155,18 +156,18 @@ def folder_of(place: Path, name: str, sha256: str) -> Path:
     return place / name / sha256[:16]
 
 
-def place_of(arena: Arena, tasks: TaskSet, member: Member) -> Path:
+def place_of(arena: Arena, tasks: TaskSet, member: Entrant) -> Path:
     """Folder of what a file does on a set in this arena."""
     place = SEALED if arena.split == "hidden" else DRIVEN
     return folder_of(arena.out / place, tasks.name, member.sha256)
 
 
-def is_driven(arena: Arena, tasks: TaskSet, member: Member) -> bool:
+def is_driven(arena: Arena, tasks: TaskSet, member: Entrant) -> bool:
     """Whether a file has driven on all worlds of a set."""
     return _kept(arena, tasks, member) is not None
 
 
-def _kept(arena: Arena, tasks: TaskSet, member: Member) -> EpisodeReport | None:
+def _kept(arena: Arena, tasks: TaskSet, member: Entrant) -> EpisodeReport | None:
     wanted = {
         "controller_sha256": member.sha256,
         "sha256": tasks.sha256,
@@ -178,7 +179,7 @@ def _kept(arena: Arena, tasks: TaskSet, member: Member) -> EpisodeReport | None:
 
 
 def _report(
-    arena: Arena, part: Part, member: Member
+    arena: Arena, part: Part, member: Entrant
 ) -> tuple[EpisodeReport, tuple[EpisodeRow, ...]]:
     """The report of a file, and its episodes."""
     tasks, folder = part.tasks, place_of(arena, part.tasks, member)

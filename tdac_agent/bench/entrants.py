@@ -2,33 +2,28 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-from tdac_agent.bench.privileged import PRIVILEGED, check_movers, planner_sha256
-from tdac_agent.bench.record import Kind
-from tdac_agent.bench.rivals import rival_names, rival_on
-from tdac_agent.episodes.sb3_file import POLICY, SavedPolicy
+from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.policies import (
     BUILTIN,
-    entrants_of,
+    PRIVILEGED,
+    Entrant,
+    entrant_of,
     fitted,
     is_training,
     knowledge,
     not_found,
 )
+from tdac_agent.planners.planner import planner_names
 from tdac_agent.problems.episodes import Part, episodes_of
-from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.drive_episodes import Request
 from tdac_agent.verification.drive_episodes import drive as drive_request
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.verify_episodes import written_by
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -68,35 +63,6 @@ class Named:
     words: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Member:
-    """A file that drives on a set.
-
-    Attributes:
-        kind: `builtin`, a classical `planner`, any other `controller`, `learned` with
-            stable-baselines3, or `privileged`, a planner that knows the true world.
-        sha256: Its hash.
-        policy: The policy; that of a planner has no file yet.
-        source: Source of a planner.
-        lineage: Id of the run that wrote the program, if one did.
-        saved: What a policy records about its training, if anything.
-        tuned: Whether its constants were tuned for the set; None if it has none.
-    """
-
-    kind: Kind
-    sha256: str
-    policy: PolicySpec
-    source: bytes | None = None
-    lineage: str | None = None
-    saved: SavedPolicy | None = None
-    tuned: bool | None = None
-
-    @property
-    def steps(self) -> int | None:
-        """Steps of its training, if they are known."""
-        return None if self.saved is None else self.saved.steps
-
-
 def named(words: Sequence[str]) -> tuple[Named, ...]:
     """The entrants for words such as `builtin`, `dwa`, `mine.py`, `ppo=a.zip,b.zip`.
 
@@ -117,7 +83,7 @@ def named(words: Sequence[str]) -> tuple[Named, ...]:
         if not each.name or not each.words:
             raise TaskError(f"expected NAME=FILE, got {each.name!r} and {each.words}")
         for word in each.words:
-            if word not in (*rival_names(), PRIVILEGED):
+            if word not in (*planner_names(), PRIVILEGED):
                 _check(word)
     return found
 
@@ -148,41 +114,31 @@ def _check(word: str) -> None:
             f"no entrant in the folder {word}: it has neither controller.py nor a "
             f"{POLICY} of tdac train"
         )
-    raise ControllerFileError(not_found("entrant", word, (BUILTIN, *rival_names())))
+    raise ControllerFileError(not_found("entrant", word, (BUILTIN, *planner_names())))
 
 
-def member_of(word: str, tasks: TaskSet) -> Member:
-    """The file that drives for a word on a set.
+def member_of(word: str, tasks: TaskSet) -> Entrant:
+    """The policy that drives for a word on a set.
 
     Raises:
         TaskError: There is none for this set.
         ControllerFileError: It is broken, or was trained elsewhere.
     """
-    if word == PRIVILEGED:
-        check_movers(tasks)
-        return Member("privileged", planner_sha256(), PolicySpec("privileged"))
-    if word in rival_names():
-        rival = rival_on(word, tasks)
-        source, spec = rival.source.encode(), PolicySpec("controller")
-        return Member("planner", sha256_of(source), spec, source, tuned=rival.tuned)
-    (named,) = entrants_of((word,))
-    entrant = fitted(named, tasks)
-    policy, sha256 = entrant.policy, entrant.sha256
-    assert policy.file is not None
-    assert sha256 is not None
-    if policy.kind == "sb3":
-        return Member("learned", sha256, policy, saved=entrant.saved)
-    kind: Kind = "builtin" if word == BUILTIN else "controller"
-    return Member(kind, sha256, policy, lineage=written_by(policy.file))
+    return fitted(entrant_of(word, ours=()), tasks)
+
+
+def steps_of(member: Entrant) -> int | None:
+    """Steps of the training of a policy, if they are known."""
+    return None if member.saved is None else member.saved.steps
 
 
 def drive(
-    member: Member, worlds: Worlds, folder: Path, judge: WarmJudge, watch: Watch
+    member: Entrant, worlds: Worlds, folder: Path, judge: WarmJudge, watch: Watch
 ) -> EpisodeReport:
-    """Drives a file on worlds.
+    """Drives a policy on worlds.
 
     Args:
-        member: The file.
+        member: The policy.
         worlds: The worlds.
         folder: Folder for the report, and for the episodes.
         judge: A warm judge.
@@ -192,26 +148,21 @@ def drive(
         TaskError: The ledger of hidden evaluations cannot be used.
         Fault: The sandbox is broken.
     """
-    with tempfile.TemporaryDirectory(prefix="tdac-bench-") as name:
-        policy = member.policy
-        if member.source is not None:
-            file = Path(name) / "controller.py"
-            write_atomic(file, member.source)
-            policy = replace(policy, file=file)
-        request = Request(
-            policy,
-            member.sha256,
-            episodes_of(worlds.tasks),
-            Part(range(worlds.count), worlds.split, worlds.salt_file),
-            lineage=member.lineage,
-            tier=worlds.tier,
-            trajectories=True,
-        )
-        return drive_request(request, folder, judge, watch)
+    request = Request(
+        member.policy,
+        member.sha256,
+        episodes_of(worlds.tasks),
+        Part(range(worlds.count), worlds.split, worlds.salt_file),
+        member.source,
+        lineage=member.lineage,
+        tier=worlds.tier,
+        trajectories=True,
+    )
+    return drive_request(request, folder, judge, watch)
 
 
-def knows(member: Member, tasks: TaskSet) -> str:
-    """What a file may use."""
-    if member.kind == "privileged":
+def knows(member: Entrant, tasks: TaskSet) -> str:
+    """What a policy may use."""
+    if member.kind == PRIVILEGED:
         return "all"
     return knowledge(member.policy, tasks)

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-from tdac_agent.bench.rivals import rival_names, rival_on
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.play import check_video, show
 from tdac_agent.environments.epuck import pictures as on_worlds
@@ -15,6 +14,7 @@ from tdac_agent.environments.map2d import pictures as on_maps
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.evaluation.policies import entrants_of, fitted
 from tdac_agent.evaluation.replay import check_shown, drive_episode
+from tdac_agent.planners.planner import planner_names, planner_on
 from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet, load_set
@@ -47,10 +47,10 @@ def run(
 
 def _file_of(controller: str, tasks: TaskSet, folder: str) -> str:
     """A file with a classical planner of that name; else the word itself."""
-    if controller not in rival_names() or Path(controller).exists():
+    if controller not in planner_names() or Path(controller).exists():
         return controller
     path = Path(folder) / f"{controller}.py"
-    path.write_text(rival_on(controller, tasks).source, encoding="utf-8")
+    path.write_text(planner_on(controller, tasks).source, encoding="utf-8")
     return str(path)
 
 

@@ -29,7 +29,7 @@ from tdac_agent.evaluation.policies import (
     entrants_of,
     fitted,
     knowledge,
-    write_builtin,
+    written_for,
 )
 from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_agent.runs.ownership import load_task
@@ -242,18 +242,16 @@ def _compete(entrant: Entrant, problem: Problem, part: Part, terms: _Terms) -> D
     watch(0, 0)
     folder, note = terms.place / POLICIES / problem.name, None
     folder.mkdir(parents=True, exist_ok=True)
-    if entrant.is_builtin and isinstance(problem, Task):
-        source, verified = write_builtin(problem, terms.tier)
-        file = folder / "builtin.py"
-        write_atomic(file, source)
-        policy = replace(entrant.policy, file=file)
-        entrant = replace(entrant, policy=policy, sha256=sha256_of(source))
+    if entrant.kind == "builtin" and isinstance(problem, Task):
+        source, verified = written_for(problem, terms.tier)
+        entrant = replace(entrant, source=source, sha256=sha256_of(source))
         note = None if verified else NOT_VERIFIED
     request = Request(
         entrant.policy,
-        entrant.sha256 or "",
+        entrant.sha256,
         episodes_of(problem),
         part,
+        source=entrant.source,
         patience=MOST_LATE if isinstance(problem, Task) else None,
         tier=terms.tier,
         limits=terms.limits,
@@ -312,7 +310,7 @@ def _about_policy(entrant: Entrant) -> EvaluatedPolicy:
         name=entrant.name,
         kind=policy.kind,
         wrappers=policy.wrappers,
-        sha256=entrant.sha256,
+        sha256=entrant.sha256 or None,
     )
 
 

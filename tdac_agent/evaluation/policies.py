@@ -7,9 +7,10 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from tdac_agent.builtin.level import controller_of
-from tdac_agent.episodes.learned import check_kind
+from tdac_agent.episodes.learned import Learned, check_kind
 from tdac_agent.episodes.sb3_file import (
     MOST_BYTES,
     POLICY,
@@ -19,7 +20,8 @@ from tdac_agent.episodes.sb3_file import (
 )
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.controller_file import check_controller
-from tdac_agent.problems.episodes import episodes_of, write_set
+from tdac_agent.planners.planner import planner_names, planner_on
+from tdac_agent.problems.episodes import episodes_of, planner_sha256, write_set
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.provenance import sha256_of
@@ -27,6 +29,7 @@ from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file
 from tdac_agent.verification.judge.drivers import Kind, PolicySpec
 from tdac_agent.verification.verify import read_source
+from tdac_agent.verification.verify_episodes import written_by
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import read_file
 from tdac_envs.ladder.env import make
@@ -34,7 +37,9 @@ from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.learning.wrappers import WRAPPERS, check_wrappers
 
 OURS: tuple[Kind, ...] = ("reference", "random", "go-to-goal", "follow-guidance")
-BUILTIN = "builtin"
+BUILTIN, PRIVILEGED = "builtin", "privileged"
+EntrantKind = Literal["builtin", "planner", "controller", "learned", "privileged"]
+"""What an entrant is; baselines of ours have none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,25 +48,32 @@ class Entrant:
 
     Attributes:
         name: Name in tables and files.
-        policy: The policy for the judge; for `builtin`, whose file is written for
-            each task, a controller without a file.
-        sha256: Hash of its file.
+        policy: The policy for the judge; that of a planner, and of `builtin`, has a
+            file or a source only once it is fitted to a problem.
+        sha256: Hash of its file; empty without one.
+        kind: What it is; None for a baseline of ours.
         env: Environment of its run folder, if it has one.
         set_file: Task set of its run folder, if it was written for one.
         saved: What a learned policy records about its training, if anything.
+        source: Source of a program without a file.
+        tuned: Whether its constants were tuned for the problem; None if it has none.
     """
 
     name: str
     policy: PolicySpec
-    sha256: str | None = None
+    sha256: str = ""
+    kind: EntrantKind | None = None
     env: str | None = None
     set_file: Path | None = None
     saved: SavedPolicy | None = None
+    source: bytes | None = None
+    tuned: bool | None = None
 
     @property
-    def is_builtin(self) -> bool:
-        """Whether a controller is written for each task."""
-        return self.policy.kind == "controller" and self.policy.file is None
+    def lineage(self) -> str | None:
+        """Id of the run that wrote it, if one did."""
+        is_file = self.kind == "controller" and self.policy.file is not None
+        return written_by(self.policy.file) if is_file and self.policy.file else None
 
 
 def entrants_of(
@@ -71,8 +83,8 @@ def entrants_of(
 
     Args:
         policies: `reference`, `builtin`, `random`, `go-to-goal`, `follow-guidance`,
-            controller files, folders of runs and trainings, policies saved by
-            stable-baselines3.
+            names of planners, controller files, folders of runs and trainings,
+            policies saved by stable-baselines3.
         wrappers: Wrappers of saved policies that do not record their own.
 
     Raises:
@@ -83,7 +95,7 @@ def entrants_of(
         if name not in WRAPPERS:
             known = ", ".join(WRAPPERS)
             raise TaskError(f"unknown wrapper {name!r}; expected some of {known}")
-    found = tuple(_entrant(str(policy), wrappers) for policy in policies)
+    found = tuple(entrant_of(str(policy), wrappers) for policy in policies)
     if not found:
         raise TaskError("expected at least one policy to evaluate")
     names = [entrant.name for entrant in found]
@@ -93,27 +105,49 @@ def entrants_of(
     return found
 
 
-def _entrant(given: str, wrappers: Sequence[str] | None) -> Entrant:
-    if given in OURS:
-        return Entrant(given, PolicySpec(given))
-    if given == BUILTIN:
-        return Entrant(given, PolicySpec("controller"))
-    path = Path(given)
+def entrant_of(
+    word: str, wrappers: Sequence[str] | None = None, ours: Sequence[str] = OURS
+) -> Entrant:
+    """The entrant of a word.
+
+    Args:
+        word: See `entrants_of`.
+        wrappers: See there.
+        ours: Names of baselines, which come before planners of the same name.
+
+    Raises:
+        ControllerFileError: A file is missing or is not a policy.
+    """
+    if word in ours:
+        return Entrant(word, PolicySpec(word))  # type: ignore[arg-type]
+    if word == BUILTIN:
+        return Entrant(word, PolicySpec("controller"), kind="builtin")
+    if word in planner_names():
+        return Entrant(word, PolicySpec("controller"), kind="planner")
+    if word == PRIVILEGED:
+        spec = PolicySpec("privileged")
+        return Entrant(word, spec, planner_sha256(), "privileged")
+    return _of_path(word, wrappers)
+
+
+def _of_path(word: str, wrappers: Sequence[str] | None) -> Entrant:
+    path = Path(word)
     if is_training(path):
-        return _learned(given, path / POLICY, wrappers)
+        return _learned(word, path / POLICY, wrappers)
     if path.is_dir():
-        found = _controller(given, path / "controller.py")
+        found = _controller(word, path / "controller.py")
         return replace(found, env=_env_of(path), set_file=_set_of(path))
     if not path.is_file():
-        raise ControllerFileError(not_found("policy", given, sorted((*OURS, BUILTIN))))
+        names = sorted((*OURS, BUILTIN, *planner_names()))
+        raise ControllerFileError(not_found("policy", word, names))
     if path.suffix == ".zip":
-        return _learned(given, path, wrappers)
+        return _learned(word, path, wrappers)
     if path.suffix != ".py":
         raise ControllerFileError(
-            f"{given!r} is not a controller: expected a .py (or a run folder, or a "
+            f"{word!r} is not a controller: expected a .py (or a run folder, or a "
             ".zip of stable-baselines3)"
         )
-    return _controller(given, path)
+    return _controller(word, path)
 
 
 def is_training(path: Path) -> bool:
@@ -121,20 +155,20 @@ def is_training(path: Path) -> bool:
     return (path / POLICY).is_file() and not (path / "controller.py").exists()
 
 
-def not_found(what: str, given: str, names: Sequence[str]) -> str:
+def not_found(what: str, word: str, names: Sequence[str]) -> str:
     """The message that there is no such file or program of ours.
 
     Args:
         what: What it should be.
-        given: The word of the user.
+        word: The word of the user.
         names: Our programs.
     """
-    if any(mark in given for mark in "/."):
-        return f"no {what} {given!r}: there is no such file or folder"
+    if any(mark in word for mark in "/."):
+        return f"no {what} {word!r}: there is no such file or folder"
     return (
-        f"no {what} {given!r}: expected a controller.py, the folder of a run or "
+        f"no {what} {word!r}: expected a controller.py, the folder of a run or "
         f"training, a .zip of stable-baselines3, or one of {', '.join(names)}"
-        f"{hint(given, names)}"
+        f"{hint(word, names)}"
     )
 
 
@@ -143,7 +177,8 @@ def _controller(name: str, file: Path) -> Entrant:
         raise ControllerFileError(f"no controller.py in {name!r}")
     source = read_source(file)
     check_controller(name, source)
-    return Entrant(name, PolicySpec("controller", file.resolve()), sha256_of(source))
+    policy = PolicySpec("controller", file.resolve())
+    return Entrant(name, policy, sha256_of(source), "controller")
 
 
 def _env_of(run_folder: Path) -> str | None:
@@ -181,8 +216,8 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     if not found.complete:
         # The same network with other observations is another policy.
         content += json.dumps(names).encode()
-    sha256 = sha256_of(content)
-    return Entrant(name, PolicySpec("sb3", file.resolve(), names), sha256, saved=saved)
+    policy = PolicySpec("sb3", file.resolve(), names)
+    return Entrant(name, policy, sha256_of(content), "learned", saved=saved)
 
 
 def fitted(entrant: Entrant, problem: Task | TaskSet) -> Entrant:
@@ -192,13 +227,19 @@ def fitted(entrant: Entrant, problem: Task | TaskSet) -> Entrant:
         TaskError: It does not drive there, or was written for something else.
         ControllerFileError: It was trained elsewhere.
     """
+    if entrant.kind == "planner":
+        planner = planner_on(entrant.name, problem)
+        source, spec = planner.source.encode(), PolicySpec("controller", on_level=True)
+        return replace(
+            entrant,
+            policy=spec,
+            sha256=sha256_of(source),
+            source=source,
+            tuned=planner.tuned,
+        )
     episodes_of(problem).check(entrant.policy)
     if isinstance(problem, TaskSet):
-        if entrant.saved is not None:
-            _check_training(entrant.name, entrant.saved, problem)
-        if entrant.policy.kind == "sb3":
-            _check_observations(entrant, problem)
-        return _builtin_on(entrant, problem) if entrant.is_builtin else entrant
+        return _fitted_to_set(entrant, problem)
     if entrant.set_file is not None:
         raise TaskError(
             f"{entrant.name} was written for a task set, not for tasks: evaluate it "
@@ -217,6 +258,18 @@ def fitted(entrant: Entrant, problem: Task | TaskSet) -> Entrant:
     return entrant
 
 
+def _fitted_to_set(entrant: Entrant, tasks: TaskSet) -> Entrant:
+    if entrant.kind == "builtin":
+        file = controller_of(tasks, "leave out builtin")
+        policy = replace(entrant.policy, file=file)
+        return replace(entrant, policy=policy, sha256=sha256_of(file.read_bytes()))
+    if entrant.saved is not None:
+        _check_training(entrant.name, entrant.saved, tasks)
+    if entrant.kind == "learned":
+        _check_observations(entrant, tasks)
+    return entrant
+
+
 def knowledge(policy: PolicySpec, problem: Task | TaskSet) -> str:
     """What a policy may use: `sensors` include the goal, and the pose if observed."""
     if isinstance(problem, Task) or policy.kind not in ("controller", "sb3"):
@@ -225,25 +278,12 @@ def knowledge(policy: PolicySpec, problem: Task | TaskSet) -> str:
     return "+ map" if mapped or "map-view" in policy.wrappers else "sensors"
 
 
-def _builtin_on(entrant: Entrant, tasks: TaskSet) -> Entrant:
-    """The controller of the level.
-
-    Raises:
-        TaskError: There is none.
-    """
-    file = controller_of(tasks, "leave out builtin")
-    policy = replace(entrant.policy, file=file)
-    return replace(entrant, policy=policy, sha256=sha256_of(file.read_bytes()))
-
-
 def _check_observations(entrant: Entrant, tasks: TaskSet) -> None:
     """Refuses a policy that does not fit what a set observes.
 
     Raises:
         ControllerFileError: It does not.
     """
-    from tdac_agent.episodes.learned import Learned
-
     assert entrant.policy.file is not None
     split = next(each for each in ("dev", "test", "train") if tasks.count(each) != 0)
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
@@ -276,7 +316,7 @@ def _check_training(name: str, saved: SavedPolicy, tasks: TaskSet) -> None:
     raise ControllerFileError(f"{name} was trained {where}")
 
 
-def write_builtin(task: Task, tier: str = "auto") -> tuple[bytes, bool]:
+def written_for(task: Task, tier: str = "auto") -> tuple[bytes, bool]:
     """Writes a controller without a model; returns it and whether it is verified.
 
     If no candidate is verified, the controller is the last one.

@@ -45,7 +45,7 @@ def drive_episode(
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as name:
         folder, child_pool = Path(name), ChildPool(ahead=False)
         job = EpisodeJob(
-            worlds=own.worlds(part, folder),
+            worlds=own.worlds(part, folder, entrant.policy),
             policy=entrant.policy,
             numbers=(part.first,),
             tier=tier,

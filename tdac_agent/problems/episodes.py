@@ -19,6 +19,7 @@ from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.worlds import SetWorlds, TaskWorld
 from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.ladder import orca_driver, space_time
 from tdac_envs.ladder.set_file import CpuSpec
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet
@@ -104,7 +105,9 @@ class Episodes(Protocol):
     def different(self, part: Part) -> int | None:
         """Number of different worlds, if each may be driven several times."""
 
-    def worlds(self, part: Part, folder: Path) -> TaskWorld | SetWorlds:
+    def worlds(
+        self, part: Part, folder: Path, policy: PolicySpec
+    ) -> TaskWorld | SetWorlds:
         """Lays out in a folder what the judge needs."""
 
     def provenance(
@@ -173,9 +176,10 @@ class OfTask:
         del part
         return None
 
-    def worlds(self, part: Part, folder: Path) -> TaskWorld:
+    def worlds(self, part: Part, folder: Path, policy: PolicySpec) -> TaskWorld:
         """See `Episodes`."""
         return TaskWorld(
+            on_level=policy.on_level,
             task=lay_out(self.task, folder / "work"),
             disturbance=part.disturbance or Disturbance(),
             variation=part.variation,
@@ -249,6 +253,11 @@ class OfSet:
                 "run folders, .zip files of stable-baselines3, builtin, reference, "
                 "go-to-goal or random"
             )
+        if policy.kind == "privileged" and not self.tasks.file.movers:
+            raise TaskError(
+                "without movers, a planner that knows the world takes the least "
+                "possible time: its time score is 1 by definition"
+            )
         if policy.kind == "go-to-goal" and "pose" not in self.tasks.file.observed:
             raise TaskError(
                 f"go-to-goal needs a pose, and {self.name} does not observe one"
@@ -267,8 +276,9 @@ class OfSet:
         """See `Episodes`."""
         return self.tasks.different(part.split)
 
-    def worlds(self, part: Part, folder: Path) -> SetWorlds:
+    def worlds(self, part: Part, folder: Path, policy: PolicySpec) -> SetWorlds:
         """See `Episodes`."""
+        del policy
         salt = part.salt_file
         return SetWorlds(
             set_file=write_set(self.tasks, folder / "set.yaml"),
@@ -294,6 +304,12 @@ class OfSet:
             "limits": asdict(limits),
             "versions": dict(versions()),
         }
+
+
+def planner_sha256() -> str:
+    """Hash of the source code of the planners that know the world in advance."""
+    files = (space_time.__file__, orca_driver.__file__)
+    return sha256_of(b"".join(Path(file).read_bytes() for file in files))
 
 
 def write_set(tasks: TaskSet, path: Path) -> Path:

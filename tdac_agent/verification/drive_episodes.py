@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import tempfile
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from tdac_agent.problems.episodes import Episodes, Part
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
+from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.episode_report import (
@@ -46,6 +47,7 @@ class Request:
         sha256: Hash of its file.
         episodes: The task or the task set.
         part: Which of its episodes.
+        source: Source of a controller without a file.
         test: A sequential test that ends them early; then there are no scores.
         lineage: Id of the run that wrote a controller, if one did.
         patience: Time-outs after which the rest is skipped; None for never.
@@ -58,6 +60,7 @@ class Request:
     sha256: str
     episodes: Episodes
     part: Part
+    source: bytes | None = None
     test: SequentialTest | None = None
     lineage: str | None = None
     patience: int | None = None
@@ -165,10 +168,13 @@ def _driven(
         unfinished(None if request.test else out, about) as kept,
     ):
         folder = Path(name)
+        if request.source is not None:
+            policy = replace(policy, file=folder / "controller.py")
+            write_atomic(folder / "controller.py", request.source)
         lasting = (kept or folder).resolve()
         keeps = request.trajectories and told and out is not None
         job = EpisodeJob(
-            worlds=own.worlds(part, folder),
+            worlds=own.worlds(part, folder, policy),
             policy=policy,
             numbers=tuple(part.numbers),
             checks=own.checks and is_file,

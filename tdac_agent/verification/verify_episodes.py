@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import tempfile
 from pathlib import Path
 
 from tdac_agent.errors import RunError
 from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.sandbox import Limits
-from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.provenance import sha256_of
@@ -118,23 +116,20 @@ def verify_episodes(
         begin = seed_of(source, problem) if first is None else first
         part = Part(range(begin, begin + count), disturbance=disturbance)
         test = None if accept_at is None else SequentialTest(accept_at, count, margin)
-    with tempfile.TemporaryDirectory(prefix="tdac-verify-") as name:
-        file = Path(name) / "controller.py"
-        write_atomic(file, source)
-        request = Request(
-            PolicySpec("controller", file),
-            sha256_of(source),
-            episodes_of(problem),
-            part,
-            test,
-            lineage or written_by(controller),
-            tier=tier,
-            limits=limits,
-            trajectories=(
-                isinstance(problem, TaskSet) if trajectories is None else trajectories
-            ),
-        )
-        return drive(request, out, judge, watch)
+    keeps = isinstance(problem, TaskSet) if trajectories is None else trajectories
+    request = Request(
+        PolicySpec("controller"),
+        sha256_of(source),
+        episodes_of(problem),
+        part,
+        source,
+        test,
+        lineage or written_by(controller),
+        tier=tier,
+        limits=limits,
+        trajectories=keeps,
+    )
+    return drive(request, out, judge, watch)
 
 
 def part_of_set(

@@ -11,9 +11,8 @@ from nicegui import ui
 from tdac_agent.bench.arena import DRIVEN
 from tdac_agent.bench.bench import RESULTS, SPLITS
 from tdac_agent.bench.page import PAGE
-from tdac_agent.bench.privileged import PRIVILEGED
-from tdac_agent.bench.rivals import rival_names
-from tdac_agent.evaluation.policies import BUILTIN
+from tdac_agent.evaluation.policies import BUILTIN, PRIVILEGED
+from tdac_agent.planners.planner import planner_names
 from tdac_agent.studio.folder import as_word, lines_in, within
 from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
@@ -86,7 +85,7 @@ class Starting:
             "Controllers, classical planners and learned policies drive on the same "
             "worlds, and are compared."
         ).classes("note")
-        options = [BUILTIN, *rival_names(), PRIVILEGED, *policies_in(self._place)]
+        options = [BUILTIN, *planner_names(), PRIVILEGED, *policies_in(self._place)]
         with ui.row().classes("w-full items-end gap-4"):
             self._entrants = _choice(options, [BUILTIN, "follow-the-gap"], "entrants")
             self._sets = _choice(list(shipped_names()), ["unknown"], "task sets")

@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from nicegui import ui
 
-from tdac_agent.bench.rivals import rival_names
 from tdac_agent.evaluation.replay import SHOWN
 from tdac_agent.html_report.scene import data_address
+from tdac_agent.planners.planner import planner_names
 from tdac_agent.set_synthesis.synthesize import EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.studio.driving import Drive
@@ -108,7 +108,7 @@ class Looking:
 
     def _build_watching(self) -> None:
         ui.label("Watch two policies on this world").classes("text-lg font-bold")
-        options = ["builtin", *rival_names(), *policies_in(self._place)]
+        options = ["builtin", *planner_names(), *policies_in(self._place)]
         with ui.row().classes("items-end gap-3"):
             self._one = ui.select(options, value="builtin", label="left").classes(
                 "w-64"

@@ -43,11 +43,13 @@ class PolicySpec:
         kind: Kind of policy.
         file: File of a controller, or of a policy of stable-baselines3.
         wrappers: Names of the observation wrappers of such a policy.
+        on_level: Whether a controller reads the files of a task set on a task, too.
     """
 
     kind: Kind
     file: Path | None = None
     wrappers: tuple[str, ...] = ()
+    on_level: bool = False
 
     @property
     def knows(self) -> str:

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from tdac_agent.tasks.task import Task
+from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.robots import EPuckParams
-from tdac_envs.ladder.set_file import SetFile
+from tdac_envs.ladder.set_file import CpuSpec, DisturbanceSpec, SetFile
 from tdac_envs.ladder.task_sets import AnyTask
 from tdac_envs.map2d.task import Map2DTask
 
@@ -31,6 +33,31 @@ def write_files(folder: Path, file: SetFile, task: AnyTask) -> None:
         np.save(written[-1], task.terrain.grid.cells)
     for path in written:
         os.utime(path, (0, 0))
+
+
+def write_as_level(folder: Path, task: Task) -> None:
+    """Writes what a controller for a task set reads, for a task on a map.
+
+    Raises:
+        TaskError: The task is not on a map.
+    """
+    nominal = task.nominal
+    if not isinstance(nominal, Map2DTask):
+        raise TaskError(f"the task {task.name!r} is not on a map")
+    facts = {
+        "schema_version": 1,
+        "robot": nominal.robot.model_dump(),
+        "dt": nominal.dt,
+        "goal_tolerance": nominal.goal_tolerance,
+        "observed": ["pose", "goal", "wheel_speeds", "ranges"],
+        "frame": "map",
+        "map": True,
+        "disturbances": DisturbanceSpec().model_dump(),
+        "cpu": CpuSpec().model_dump(),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "params.json").write_text(json.dumps(facts, indent=2) + "\n")
+    np.save(folder / "occupancy.npy", nominal.terrain.grid.cells)
 
 
 def level_params(file: SetFile) -> dict[str, Any]:

@@ -25,8 +25,7 @@ from tdac_agent.verification.diagnosis.measures import (
 )
 from tdac_agent.verification.judge.cpu_budget import Budgeted
 from tdac_agent.verification.judge.episode_row import EpisodeRow, plan_facts
-from tdac_agent.verification.judge.set_files import write_files
-from tdac_envs.core.errors import TaskError
+from tdac_agent.verification.judge.set_files import write_as_level, write_files
 from tdac_envs.drive.env import Observation
 from tdac_envs.ladder.env import OnSet, make
 from tdac_envs.ladder.orca_driver import Drive, drive_by_orca
@@ -84,6 +83,7 @@ class TaskWorld(BaseModel):
         task: Its folder.
         disturbance: Disturbance of the environment.
         variation: Variation of start and goal.
+        on_level: Whether controllers read the files of a task set.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -92,6 +92,7 @@ class TaskWorld(BaseModel):
     task: Path
     disturbance: Disturbance
     variation: str = "jitter"
+    on_level: bool = False
 
     def opened(self) -> TaskEpisodes:
         """Reads the task."""
@@ -156,7 +157,12 @@ class TaskEpisodes:
 
     def supply(self, child: Child, number: int, source: bytes) -> None:  # noqa: ARG002
         """See `Worlds`."""
-        child.copy_files(self.worlds.task, source)
+        if not self.worlds.on_level:
+            child.copy_files(self.worlds.task, source)
+            return
+        with tempfile.TemporaryDirectory() as name:
+            write_as_level(Path(name), self.task)
+            child.copy_files(Path(name), source)
 
     def seen(self, observation: Observation) -> Observation:
         """See `Worlds`."""
@@ -251,17 +257,10 @@ class SetEpisodes:
 
         Among discs that bounce, it is the earliest arrival on a lattice in space and
         time, with turns that take no time; among people, a driver by ORCA.
-
-        Raises:
-            TaskError: The world has no movers.
         """
         began, facts = time.process_time(), self._facts(number)
         task = self.env.setup.source.task(number)
-        if not isinstance(task, Map2DTask) or not self.file.movers:
-            raise TaskError(
-                "without movers, a planner that knows the world takes the least "
-                "possible time: its time score is 1 by definition"
-            )
+        assert isinstance(task, Map2DTask)
         found = self._plan(task, number)
         reached = found is not None
         steps = found.steps if found else task.horizon

@@ -3,7 +3,6 @@
 import os
 
 import pytest
-from tdac_agent.evaluation.unfinished import open_store
 
 from tdac_agent import load_task
 from tdac_agent.errors import RunError
@@ -18,7 +17,6 @@ from tdac_envs.ladder.task_sets import load_set
 HOLDERS = {
     "run": hold_folder,
     "evaluation": lambda out: own_folder(out, "*"),
-    "store": lambda out: open_store(out, "*"),
 }
 
 

@@ -1,4 +1,4 @@
-"""Classical local planners as rivals: a controller file for each task set."""
+"""Classical local planners: a controller file for each problem."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.builtin.level import level_of
+from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, parse_yaml, read_file
 from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.map2d.task import Map2DTask
 
-FOLDER = Path(__file__).with_name("planners")
+FOLDER = Path(__file__).with_name("files")
 """Folder of their files."""
-RIVALS, TUNED = "rivals.yaml", "tuned.json"
+PLANNERS, TUNED = "planners.yaml", "tuned.json"
 
 
-class _Rival(BaseModel):
+class _Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     title: str
@@ -32,54 +34,63 @@ class _Rival(BaseModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Rival:
-    """A planner as it drives on a set.
+class Planner:
+    """A planner as it drives on a problem.
 
     Attributes:
         source: Its file, with the values that were chosen for the level.
-        tuned: Whether values were chosen for this set; None if it has none.
+        tuned: Whether values were chosen for this problem; None if it has none.
     """
 
     source: str
     tuned: bool | None
 
 
-def rival_names() -> tuple[str, ...]:
-    """The names of all rivals."""
+def planner_names() -> tuple[str, ...]:
+    """The names of all planners."""
     return tuple(_known())
 
 
-def rival_on(name: str, tasks: TaskSet) -> Rival:
-    """A rival as it drives on a set.
+def planner_on(name: str, problem: Task | TaskSet) -> Planner:
+    """A planner as it drives on a set, or on a task on a map.
 
     Raises:
         TaskError: It does not drive by what is observed there.
     """
-    rival, level = _known()[name], level_of(tasks)
-    if level not in rival.levels:
-        known = ", ".join(rival.levels)
+    entry, level = _known()[name], _level_of(problem)
+    if level not in entry.levels:
+        known = ", ".join(entry.levels)
         raise TaskError(f"{name} needs what is observed in {known}")
     assert level is not None
     # Some sets with the observations of a level have values of their own; on the
     # others, those of the level are used.
     own = _tuned().get(name, {})
-    values = own.get(tasks.name, own.get(level, {}))
-    tuned = tasks.name in own if rival.ranges else None
-    return Rival(with_values(source_of(name), values), tuned)
+    values = own.get(problem.name, own.get(level, {}))
+    tuned = problem.name in own if entry.ranges else None
+    return Planner(with_values(source_of(name), values), tuned)
+
+
+def _level_of(problem: Task | TaskSet) -> str | None:
+    """The level whose observations a problem has; None if there is none."""
+    if isinstance(problem, TaskSet):
+        return level_of(problem)
+    if problem.spec.env != Map2DTask.env_id or problem.spec.frame != "pixels":
+        return None
+    return "crowd" if problem.spec.movers else "known"
 
 
 def levels_of(name: str) -> tuple[str, ...]:
-    """The levels on which a rival drives."""
+    """The levels on which a planner drives."""
     return _known()[name].levels
 
 
 def ranges_of(name: str) -> dict[str, tuple[float, float]]:
-    """The constants of a rival that are tuned, with their bounds."""
+    """The constants of a planner that are tuned, with their bounds."""
     return _known()[name].ranges
 
 
 def source_of(name: str) -> str:
-    """The file of a rival with its own values, after the parts that it shares."""
+    """The file of a planner with its own values, after the parts that it shares."""
     parts = [FOLDER / "parts" / f"{part}.py" for part in _known()[name].parts]
     files = [*parts, FOLDER / f"{name.replace('-', '_')}.py"]
     return "\n\n".join(file.read_text(encoding="utf-8") for file in files)
@@ -100,14 +111,14 @@ def with_values(source: str, values: dict[str, float]) -> str:
 
 
 @cache
-def _known() -> dict[str, _Rival]:
-    data = parse_yaml(read_file(FOLDER / RIVALS, TEXT_BYTES))
-    return {name: _Rival.model_validate(each) for name, each in data.items()}
+def _known() -> dict[str, _Entry]:
+    data = parse_yaml(read_file(FOLDER / PLANNERS, TEXT_BYTES))
+    return {name: _Entry.model_validate(each) for name, each in data.items()}
 
 
 @cache
 def _tuned() -> dict[str, dict[str, dict[str, float]]]:
-    """The chosen values, by rival and level; elsewhere, those of the file hold."""
+    """The chosen values, by planner and level; elsewhere, those of the file hold."""
     found: dict[str, dict[str, dict[str, float]]]
     found = parse_json(read_file(FOLDER / TUNED, TEXT_BYTES))
     return found

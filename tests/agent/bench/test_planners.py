@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from tdac_agent.bench.rivals import (
+from tdac_agent.planners.planner import (
     FOLDER,
     TUNED,
     levels_of,
     ranges_of,
-    rival_names,
-    rival_on,
+    planner_names,
+    planner_on,
     source_of,
     with_values,
 )
@@ -18,8 +18,8 @@ from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
-FIRST = [(name, levels_of(name)[0]) for name in rival_names()]
-ALL = [(name, level) for name in rival_names() for level in levels_of(name)]
+FIRST = [(name, levels_of(name)[0]) for name in planner_names()]
+ALL = [(name, level) for name in planner_names() for level in levels_of(name)]
 PAIRS = [*FIRST, *(pair for pair in ALL if pair not in FIRST)]
 
 
@@ -28,7 +28,7 @@ PAIRS = [*FIRST, *(pair for pair in ALL if pair not in FIRST)]
 def test_it_drives(name, level, warm):
     """It passes the tests, and no episode ends with an error of its own."""
     tasks = load_set(level)
-    source = rival_on(name, tasks).source
+    source = planner_on(name, tasks).source
     report = verify_episodes(source, tasks, 1, split="dev", judge=warm)
     assert not report.refused, report.told
     assert {each.outcome for each in report.episodes} <= {
@@ -41,7 +41,7 @@ def test_dwa_arrives(warm):
     """A planner with a map of what it has seen is no straw man."""
     tasks = load_set("unknown")
     report = verify_episodes(
-        rival_on("dwa", tasks).source, tasks, 6, split="dev", judge=warm
+        planner_on("dwa", tasks).source, tasks, 6, split="dev", judge=warm
     )
     assert report.successes >= 4
 
@@ -54,29 +54,29 @@ def test_values_on_record_are_of_this_file():
         assert set(levels) <= {*levels_of(name), "barn", "barn-slow"}
         for level, values in levels.items():
             assert set(values) == set(ranges_of(name))
-            rival = rival_on(name, load_set(level))
-            assert rival.tuned
+            planner = planner_on(name, load_set(level))
+            assert planner.tuned
             for constant, value in values.items():
                 low, high = ranges_of(name)[constant]
                 assert low <= value <= high
-                assert f"\n{constant} = {value!r}\n" in rival.source
+                assert f"\n{constant} = {value!r}\n" in planner.source
 
 
 def test_files_have_the_constants_that_are_tuned():
-    for name in rival_names():
+    for name in planner_names():
         with_values(source_of(name), dict.fromkeys(ranges_of(name), 1.0))
 
 
 def test_what_is_not_tuned_is_said():
-    assert rival_on("go-to-goal", load_set("known")).tuned is None
-    assert rival_on("mppi", load_set("unknown")).tuned
-    on_barn = rival_on("mppi", load_set("barn-slow"))
+    assert planner_on("go-to-goal", load_set("known")).tuned is None
+    assert planner_on("mppi", load_set("unknown")).tuned
+    on_barn = planner_on("mppi", load_set("barn-slow"))
     assert on_barn.tuned is False
-    assert on_barn.source == rival_on("mppi", load_set("unknown")).source
+    assert on_barn.source == planner_on("mppi", load_set("unknown")).source
     with pytest.raises(ValueError, match="expected one line 'NO = "):
         with_values(source_of("dwa"), {"NO": 1.0})
 
 
 def test_a_level_that_it_cannot_drive():
     with pytest.raises(TaskError, match="orca needs what is observed in moving, c"):
-        rival_on("orca", load_set("known"))
+        planner_on("orca", load_set("known"))

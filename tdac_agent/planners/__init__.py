@@ -1,0 +1,1 @@
+"""Classical local planners as controllers: their files, and their values."""
