@@ -14,7 +14,11 @@ if TYPE_CHECKING:
     from tdac_agent.tasks.task import Task
     from tdac_agent.verification.diagnosis.report import Report
     from tdac_agent.verification.verify import verify
-    from tdac_agent.verification.verify_episodes import verify_episodes
+    from tdac_agent.verification.verify_episodes import (
+        verify_episodes,
+        verify_on_set,
+        verify_robust,
+    )
 
 __all__ = [
     "Disturbance",
@@ -32,6 +36,8 @@ __all__ = [
     "synthesize",
     "verify",
     "verify_episodes",
+    "verify_on_set",
+    "verify_robust",
 ]
 
 _MODULE_OF = {
@@ -50,6 +56,8 @@ _MODULE_OF = {
     "synthesize": "synthesis.loop",
     "verify": "verification.verify",
     "verify_episodes": "verification.verify_episodes",
+    "verify_on_set": "verification.verify_episodes",
+    "verify_robust": "verification.verify_episodes",
 }
 
 

@@ -1,4 +1,4 @@
-"""Drives the entrants of a bench, each on each set."""
+"""Drives the entrants of a bench, each on each task or task set."""
 
 from __future__ import annotations
 
@@ -7,44 +7,47 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.bench.compared import Driven, Episodes, figures_of
-from tdac_agent.bench.entrants import Named, Worlds, drive, knows, member_of, steps_of
+from tdac_agent.bench.compared import Driven, Rows, figures_of
+from tdac_agent.bench.entrants import Named, knows, member_of, request_of, steps_of
 from tdac_agent.bench.page import MOST_WORLDS, Replay
 from tdac_agent.bench.record import BenchFile, BenchRow
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import ControllerFileError, RunError
+from tdac_agent.evaluation.evaluate import part_of
 from tdac_agent.evaluation.policies import Entrant
-from tdac_agent.tasks.provenance import sha256_of
-from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.drive_episodes import drive
+from tdac_agent.verification.episode_report import EpisodeReport, named
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.salt import SEALED
 from tdac_agent.verification.store import ROWS_FILE, TRAJECTORIES, kept_report
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
-from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 
 DRIVEN = "driven"
 """Folder with what each file did on each set; of hidden worlds, it is in `sealed`."""
+Problem = Task | TaskSet
 Watch = Callable[[str, str, int, int], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
-    """An entrant on a set.
+class Entry:
+    """An entrant on a task or a task set.
 
     Attributes:
-        tasks: The set.
+        problem: The task or the task set.
         entrant: The entrant.
         members: Its files; empty if it cannot drive.
-        problem: Why it cannot.
+        reason: Why it cannot.
     """
 
-    tasks: TaskSet
+    problem: Problem
     entrant: Named
     members: tuple[Entrant, ...] = ()
-    problem: str | None = None
+    reason: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +55,8 @@ class Arena:
     """What all entrants share, and what they did.
 
     Attributes:
-        split: Split of the worlds.
-        count: Number of worlds of each set.
+        split: Split of the worlds of sets.
+        count: Number of episodes of each task or set.
         salt_file: File with the salt of hidden worlds.
         tier: Sandbox tier.
         out: Folder of the results.
@@ -77,48 +80,62 @@ class Arena:
     timing: list[dict[str, Any]] = field(default_factory=list)
     replays: dict[str, list[Replay]] = field(default_factory=dict)
 
-    @property
-    def salt_sha256(self) -> str | None:
-        """Hash of the salt of hidden worlds."""
-        return None if self.salt_file is None else sha256_of(read_salt(self.salt_file))
+    def part(self, problem: Problem) -> Part:
+        """The episodes of a problem."""
+        return part_of(problem, self.count, split=self.split, salt_file=self.salt_file)
+
+    def folder(self, problem: Problem, member: Entrant) -> Path:
+        """Folder of what a file does on a problem."""
+        place = SEALED if self.split == "hidden" else DRIVEN
+        return folder_of(self.out / place, problem.name, member.sha256)
+
+    def kept(self, problem: Problem, member: Entrant) -> EpisodeReport | None:
+        """The report of a file, if it has driven in all episodes of a problem."""
+        own, part = episodes_of(problem), self.part(problem)
+        wanted = {
+            "controller_sha256": member.sha256,
+            "sha256": own.sha256,
+            "split": part.split or None,
+            "salt_sha256": own.secret(part),
+        }
+        return kept_report(self.folder(problem, member), wanted, part.numbers)
 
 
 class DrivenElsewhere(RunError):
     """The ledger has the result of a file, but its episodes are in another folder."""
 
 
-def part_of(entrant: Named, tasks: TaskSet) -> Part:
-    """The files of an entrant for a set, or why there are none."""
+def entry_of(entrant: Named, problem: Problem) -> Entry:
+    """The files of an entrant for a problem, or why there are none."""
     try:
-        members = tuple(member_of(word, tasks) for word in entrant.words)
+        members = tuple(member_of(word, problem) for word in entrant.words)
     except (TaskError, ControllerFileError) as error:
-        return Part(tasks, entrant, problem=str(error))
+        return Entry(problem, entrant, reason=str(error))
     kinds = dict.fromkeys(m.saved.algo if m.saved else str(m.kind) for m in members)
     if len(kinds) > 1:
-        problem = f"its files are not seeds of one training: {', '.join(kinds)}"
-        return Part(tasks, entrant, problem=problem)
+        reason = f"its files are not seeds of one training: {', '.join(kinds)}"
+        return Entry(problem, entrant, reason=reason)
     if len({member.sha256 for member in members}) < len(members):
-        return Part(tasks, entrant, problem="two of its files are the same")
-    return Part(tasks, entrant, members)
+        return Entry(problem, entrant, reason="two of its files are the same")
+    return Entry(problem, entrant, members)
 
 
-def row_of(arena: Arena, part: Part) -> BenchRow:
-    """Drives an entrant on a set, unless it has been driven already."""
-    members, tasks = part.members, part.tasks
-    row = BenchRow(set=tasks.name, entrant=part.entrant.name, problem=part.problem)
+def row_of(arena: Arena, entry: Entry) -> BenchRow:
+    """Drives an entrant on a problem, unless it has been driven already."""
+    members, problem, name = entry.members, entry.problem, entry.entrant.name
+    row = BenchRow(set=problem.name, entrant=name, problem=entry.reason)
     if not members:
         return row
-    row = row.model_copy(update=_about(members, tasks))
+    row = row.model_copy(update=_about(members, problem))
     try:
-        reports = [_report(arena, part, member) for member in members]
+        reports = [_report(arena, entry, member) for member in members]
     except (ControllerFileError, DrivenElsewhere) as error:
         return row.model_copy(update={"problem": str(error)})
     if refused := next((report for report, _ in reports if report.refused), None):
         return row.model_copy(update={"problem": "; ".join(refused.told)})
-    episodes = [driven for _, driven in reports]
-    runs = tasks.runs(arena.split, arena.count)
-    found = Driven.of(part.entrant.name, episodes, runs)
-    _note(arena, part, found, episodes)
+    rows = [driven for _, driven in reports]
+    found = Driven.of(name, rows, runs_of(problem, arena))
+    _note(arena, entry, found, rows)
     counts = [each.hidden.count if each.hidden else None for each, _ in reports]
     clocks = [each.clock_dependent for each, _ in reports]
     files = (
@@ -126,74 +143,61 @@ def row_of(arena: Arena, part: Part) -> BenchRow:
         for file, count in zip(row.files, counts, strict=True)
     )
     more = {"files": tuple(files), "clock_dependent": next(filter(None, clocks), None)}
-    return row.model_copy(update={**more, **figures_of(found, episodes)})
+    return row.model_copy(update={**more, **figures_of(found, rows)})
 
 
-def _about(members: Sequence[Entrant], tasks: TaskSet) -> dict[str, Any]:
+def runs_of(problem: Problem, arena: Arena) -> int:
+    """How often each different world of a problem is driven.
+
+    Raises:
+        TaskError: Some of them are driven more often than others.
+    """
+    return problem.runs(arena.split, arena.count) if isinstance(problem, TaskSet) else 1
+
+
+def _about(members: Sequence[Entrant], problem: Problem) -> dict[str, Any]:
     """What `BenchRow` says of the files of an entrant."""
     steps = [steps_of(member) for member in members]
     return {
         "kind": members[0].kind,
-        "knows": knows(members[0], tasks),
+        "knows": knows(members[0], problem),
         "tuned": members[0].tuned,
         "steps": None if None in steps else sum(filter(None, steps)),
         "files": tuple(BenchFile(sha256=each.sha256) for each in members),
     }
 
 
-def _note(arena: Arena, part: Part, found: Driven, episodes: Episodes) -> None:
+def _note(arena: Arena, entry: Entry, found: Driven, rows: Rows) -> None:
     """Keeps what an entrant did for tables, figures and the page."""
-    name, entrant = part.tasks.name, part.entrant.name
-    if part.members[0].kind != "privileged":
+    name, entrant = entry.problem.name, entry.entrant.name
+    if entry.members[0].kind != "privileged":
         arena.driven.setdefault(name, []).append(found)
-    arena.rows.extend(world_rows(name, entrant, episodes))
-    arena.replays.setdefault(name, []).extend(_replays(arena, part, episodes))
-    arena.timing.append(_timing(name, entrant, episodes))
+    arena.rows.extend(world_rows(name, entrant, rows))
+    arena.replays.setdefault(name, []).extend(_replays(arena, entry, rows))
+    arena.timing.append(_timing(name, entrant, rows))
 
 
 def folder_of(place: Path, name: str, sha256: str) -> Path:
-    """Folder of what a file did on a set."""
+    """Folder of what a file did on a problem."""
     return place / name / sha256[:16]
 
 
-def place_of(arena: Arena, tasks: TaskSet, member: Entrant) -> Path:
-    """Folder of what a file does on a set in this arena."""
-    place = SEALED if arena.split == "hidden" else DRIVEN
-    return folder_of(arena.out / place, tasks.name, member.sha256)
-
-
-def is_driven(arena: Arena, tasks: TaskSet, member: Entrant) -> bool:
-    """Whether a file has driven on all worlds of a set."""
-    return _kept(arena, tasks, member) is not None
-
-
-def _kept(arena: Arena, tasks: TaskSet, member: Entrant) -> EpisodeReport | None:
-    wanted = {
-        "controller_sha256": member.sha256,
-        "sha256": tasks.sha256,
-        "split": arena.split,
-        "salt_sha256": arena.salt_sha256,
-    }
-    folder = place_of(arena, tasks, member)
-    return kept_report(folder, wanted, range(arena.count))
-
-
 def _report(
-    arena: Arena, part: Part, member: Entrant
+    arena: Arena, entry: Entry, member: Entrant
 ) -> tuple[EpisodeReport, tuple[EpisodeRow, ...]]:
     """The report of a file, and its episodes."""
-    tasks, folder = part.tasks, place_of(arena, part.tasks, member)
-    report = _kept(arena, tasks, member)
+    problem, folder = entry.problem, arena.folder(entry.problem, member)
+    report = arena.kept(problem, member)
     if report is None:
 
         def watch(episodes: int, successes: int) -> None:
             if arena.watch is not None:
-                arena.watch(tasks.name, part.entrant.name, episodes, successes)
+                arena.watch(problem.name, entry.entrant.name, episodes, successes)
 
         watch(0, 0)
         folder.mkdir(parents=True, exist_ok=True)
-        own = tasks, arena.split, arena.count, arena.salt_file, arena.tier
-        report = drive(member, Worlds(*own), folder, arena.judge, watch)
+        request = request_of(member, problem, arena.part(problem), arena.tier)
+        report = drive(request, folder, arena.judge, watch)
     if report.episodes or report.refused:
         return report, report.episodes
     return report, sealed_episodes(folder, member.sha256)
@@ -220,31 +224,34 @@ def sealed_episodes(folder: Path, sha256: str) -> tuple[EpisodeRow, ...]:
     return tuple(map(EpisodeRow.model_validate_json, lines))
 
 
-def first_tasks(arena: Arena, tasks: TaskSet) -> dict[int, AnyTask]:
-    """The tasks of the worlds whose episodes are shown."""
-    if not arena.replays.get(tasks.name):
+def first_tasks(arena: Arena, problem: Problem) -> dict[int, AnyTask]:
+    """The tasks of the episodes that are shown, by number."""
+    if not arena.replays.get(problem.name):
         return {}
-    count = min(arena.count, MOST_WORLDS)
-    return {index: tasks.task(arena.split, index) for index in range(count)}
+    numbers = arena.part(problem).numbers[:MOST_WORLDS]
+    if isinstance(problem, Task):
+        nominal: Any = problem.nominal
+        return dict.fromkeys(numbers, nominal)
+    return {index: problem.task(arena.split, index) for index in numbers}
 
 
-def _replays(arena: Arena, part: Part, episodes: Episodes) -> Iterator[Replay]:
+def _replays(arena: Arena, entry: Entry, rows: Rows) -> Iterator[Replay]:
     """The first episodes of an entrant's first file, if they may be shown."""
     if arena.split == "hidden":
         return
-    folder = folder_of(arena.out / DRIVEN, part.tasks.name, part.members[0].sha256)
-    for episode in episodes[0][:MOST_WORLDS]:
-        path = folder / TRAJECTORIES / f"{episode.index}.npz"
+    folder = arena.folder(entry.problem, entry.members[0])
+    for row in rows[0][:MOST_WORLDS]:
+        path = folder / TRAJECTORIES / f"{row.number}.npz"
         if path.is_file():
             trajectory = Trajectory.load(path)
-            name, outcome = part.entrant.name, episode.outcome
-            yield Replay(name, episode.number, outcome, trajectory)
+            name, number = entry.entrant.name, row.number
+            yield Replay(name, number, named(row), row.outcome, trajectory)
 
 
-def _timing(name: str, entrant: str, episodes: Episodes) -> dict[str, Any]:
+def _timing(name: str, entrant: str, rows: Rows) -> dict[str, Any]:
     """The row of `timing.csv`, which differs from one machine to another."""
-    steps = sum(each.steps for part in episodes for each in part)
-    seconds = sum(each.cpu_seconds for part in episodes for each in part)
+    steps = sum(each.steps for part in rows for each in part)
+    seconds = sum(each.cpu_seconds for part in rows for each in part)
     return {
         "set": name,
         "entrant": entrant,
@@ -254,16 +261,17 @@ def _timing(name: str, entrant: str, episodes: Episodes) -> dict[str, Any]:
     }
 
 
-def world_rows(name: str, entrant: str, episodes: Episodes) -> list[dict[str, Any]]:
-    """The rows of `worlds.csv`."""
+def world_rows(name: str, entrant: str, rows: Rows) -> list[dict[str, Any]]:
+    """The rows of `worlds.csv`; on a task, `index` is the seed."""
     return [
         {
             "set": name,
             "entrant": entrant,
             "file": number,
-            "success": episode.success,
-            **episode.model_dump(exclude={"text", "cpu_seconds"}),
+            "success": row.success,
+            **row.model_dump(exclude={"text", "cpu_seconds", "seed"}),
+            "index": row.number,
         }
-        for number, own in enumerate(episodes)
-        for episode in own
+        for number, own in enumerate(rows)
+        for row in own
     ]

@@ -13,11 +13,13 @@ import pandas as pd
 from tdac_agent.bench.arena import (
     DRIVEN,
     Arena,
-    Part,
+    Entry,
+    Problem,
     Watch,
+    entry_of,
     first_tasks,
-    part_of,
     row_of,
+    runs_of,
 )
 from tdac_agent.bench.compared import overall_of, pairs_of
 from tdac_agent.bench.entrants import named
@@ -27,6 +29,8 @@ from tdac_agent.bench.page import PAGE, write_page
 from tdac_agent.bench.record import Bench, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import Executor
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.runs.ownership import load_task
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.provenance import versions
@@ -53,11 +57,12 @@ SPLITS = "dev", "test", "hidden"
 
 def bench(
     entrants: Sequence[str],
-    sets: Sequence[str | Path],
+    sets: Sequence[str | Path] = (),
     split: str = "test",
     worlds: int = WORLDS,
     *,
     out: Path,
+    tasks: Sequence[str | Path] = (),
     salt_file: Path | None = None,
     tier: str = "auto",
     judge: WarmJudge | None = None,
@@ -65,7 +70,7 @@ def bench(
     executor: Executor[Reached, Drive] | None = None,
     workers: int = 1,
 ) -> Bench:
-    """Drives entrants on the first worlds of a split of each set.
+    """Drives entrants on the first worlds of a split of each set, and on tasks.
 
     An entrant that cannot drive on a set is a row with the reason. After an
     interruption, the same call goes on.
@@ -74,7 +79,9 @@ def bench(
         entrants: Words as for `entrants.named`.
         sets: Names of task sets, or paths of set files.
         split: `dev`, `test` or `hidden`.
-        worlds: Number of worlds of each set.
+        worlds: Number of worlds of each set, and of episodes of each task, which have
+            jittered starts.
+        tasks: Names or paths of tasks.
         out: Folder for `bench.json`, `timing.csv`, `worlds.csv`, figures and
             `driven/`. Of hidden worlds, single episodes are in `sealed/`, which only
             this user can read.
@@ -100,30 +107,35 @@ def bench(
         raise TaskError("a salt file needs the split hidden")
     if salt_file is not None:
         read_salt(salt_file)  # fails here, before there is a folder
-    wanted, tasks = named(entrants), [load_set(name) for name in sets]
-    _check_sets(tasks, split, worlds)
-    parts = [part_of(each, own) for own in tasks for each in wanted]
+    if tasks and split == "hidden":
+        raise TaskError("tasks have no hidden worlds: leave them out")
+    wanted, words = named(entrants), [*sets, *tasks]
+    problems: list[Problem] = [*map(load_set, sets), *map(load_task, tasks)]
+    _check_problems(problems, split, worlds)
+    entries = [entry_of(each, own) for own in problems for each in wanted]
     with contextlib.ExitStack() as stack:
         stack.enter_context(own_folder(out, *WRITTEN, who="bench"))
         drawn = split == "hidden" and salt_file is None
         if drawn:
-            _record(out, parts, worlds)
+            _record(out, entries, worlds)
             salt_file = drawn_salt(out / SEALED, reuse=True)
         if split == "hidden":
             (out / SEALED).mkdir(0o700, exist_ok=True)
         warm = judge or stack.enter_context(WarmJudge())
         arena = Arena(split, worlds, salt_file, tier, out, warm, watch)
+        for own in problems:
+            runs_of(own, arena)  # fails before anything is driven
         if executor is not None:
-            given = [name for name in sets for _ in wanted]
-            drives = drives_of(arena, list(zip(given, parts, strict=True)))
+            given = [word for word in words for _ in wanted]
+            drives = drives_of(arena, list(zip(given, entries, strict=True)))
             drive_all(arena, drives, executor, workers)
-        rows = [row_of(arena, part) for part in parts]
+        rows = [row_of(arena, entry) for entry in entries]
         found = Bench(
             versions=dict(versions()),
-            sets=tuple(_set_of(arena, each) for each in tasks),
+            sets=tuple(_set_of(arena, each) for each in problems),
             entrants=tuple(each.name for each in wanted),
             rows=tuple(rows),
-            overall=overall_of(arena.driven) if len(tasks) > 1 else (),
+            overall=overall_of(arena.driven) if len(problems) > 1 else (),
             pairs=pairs_of(arena.driven),
         )
         public = split != "hidden" or drawn
@@ -132,7 +144,7 @@ def bench(
         write_atomic(out / TIMING, pd.DataFrame(arena.timing).to_csv(index=False))
         table = pd.DataFrame(arena.rows) if public else None
         figures = draw_figures(found, table, out)
-        tasks_of = {own.name: first_tasks(arena, own) for own in tasks}
+        tasks_of = {own.name: first_tasks(arena, own) for own in problems}
         write_page(found, arena.replays, tasks_of, figures, out)
         write_atomic(out / RESULTS, found.model_dump_json(indent=2) + "\n")
     return found
@@ -145,23 +157,23 @@ def publish(out: Path, rows: Sequence[dict[str, Any]], salt_file: Path | None) -
         write_atomic(out / SALT, f"{read_salt(salt_file).hex()}\n")
 
 
-def _record(out: Path, parts: Sequence[Part], worlds: int) -> None:
+def _record(out: Path, entries: Sequence[Entry], worlds: int) -> None:
     """Writes down what will drive, before a salt is drawn for it.
 
     Raises:
         RunError: A salt has been drawn for something else.
     """
-    entries = [
+    facts = [
         {
-            "set": part.tasks.name,
-            "set_sha256": part.tasks.sha256,
+            "set": entry.problem.name,
+            "set_sha256": episodes_of(entry.problem).sha256,
             "worlds": worlds,
-            "entrant": part.entrant.name,
-            "files": [member.sha256 for member in part.members],
+            "entrant": entry.entrant.name,
+            "files": [member.sha256 for member in entry.members],
         }
-        for part in parts
+        for entry in entries
     ]
-    text = json.dumps(entries, indent=2) + "\n"
+    text = json.dumps(facts, indent=2) + "\n"
     path = out / ENTRANTS
     if path.is_file() and read_file(path, RECORD_BYTES) != text.encode():
         raise RunError(
@@ -171,23 +183,24 @@ def _record(out: Path, parts: Sequence[Part], worlds: int) -> None:
     write_atomic(path, text)
 
 
-def _check_sets(tasks: Sequence[TaskSet], split: str, worlds: int) -> None:
-    names = [each.name for each in tasks]
+def _check_problems(problems: Sequence[Problem], split: str, worlds: int) -> None:
+    names = [each.name for each in problems]
     for name in names:
         if names.count(name) > 1:
-            raise TaskError(f"the task set {name!r} is given twice")
-    if not tasks:
-        raise TaskError("expected at least one task set")
-    for each in tasks:
-        each.check_count(split, worlds, "worlds")
-        each.runs(split, worlds)
+            raise TaskError(f"{name!r} is given twice")
+    if not problems:
+        raise TaskError("expected at least one task set or task")
+    for each in problems:
+        if isinstance(each, TaskSet):
+            each.check_count(split, worlds, "worlds")
 
 
-def _set_of(arena: Arena, tasks: TaskSet) -> BenchSet:
+def _set_of(arena: Arena, problem: Problem) -> BenchSet:
+    own, part = episodes_of(problem), arena.part(problem)
     return BenchSet(
-        name=tasks.name,
-        sha256=tasks.sha256,
-        split=arena.split,
+        name=problem.name,
+        sha256=own.sha256,
+        split=part.split or part.variation,
         worlds=arena.count,
-        salt_sha256=arena.salt_sha256,
+        salt_sha256=own.secret(part),
     )

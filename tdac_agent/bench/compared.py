@@ -26,7 +26,7 @@ from tdac_agent.verification.episode_report import cause_of
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 
 Array = NDArray[np.float64]
-Episodes = Sequence[Sequence[EpisodeRow]]
+Rows = Sequence[Sequence[EpisodeRow]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +44,7 @@ class Driven:
     success: Array
 
     @classmethod
-    def of(cls, entrant: str, episodes: Episodes, runs: int = 1) -> Driven:
+    def of(cls, entrant: str, episodes: Rows, runs: int = 1) -> Driven:
         """What it reached in episodes.
 
         Args:
@@ -62,7 +62,7 @@ class Driven:
         )
 
 
-def figures_of(driven: Driven, parts: Episodes) -> dict[str, Any]:
+def figures_of(driven: Driven, parts: Rows) -> dict[str, Any]:
     """The figures of `BenchRow`.
 
     Args:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,36 +17,14 @@ from tdac_agent.evaluation.policies import (
     is_training,
     knowledge,
     not_found,
+    prepared,
 )
 from tdac_agent.planners.planner import planner_names
 from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.tasks.task import Task
 from tdac_agent.verification.drive_episodes import Request
-from tdac_agent.verification.drive_episodes import drive as drive_request
-from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import TaskSet
-
-Watch = Callable[[int, int], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Worlds:
-    """The worlds on which all entrants drive.
-
-    Attributes:
-        tasks: The task set.
-        split: `dev`, `test` or `hidden`.
-        count: Number of worlds, from world 0 on.
-        salt_file: File with the salt of hidden worlds.
-        tier: Sandbox tier.
-    """
-
-    tasks: TaskSet
-    split: str
-    count: int
-    salt_file: Path | None = None
-    tier: str = "auto"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,14 +95,14 @@ def _check(word: str) -> None:
     raise ControllerFileError(not_found("entrant", word, (BUILTIN, *planner_names())))
 
 
-def member_of(word: str, tasks: TaskSet) -> Entrant:
-    """The policy that drives for a word on a set.
+def member_of(word: str, problem: Task | TaskSet) -> Entrant:
+    """The policy that drives for a word on a problem.
 
     Raises:
-        TaskError: There is none for this set.
+        TaskError: There is none for this problem.
         ControllerFileError: It is broken, or was trained elsewhere.
     """
-    return fitted(entrant_of(word, ours=()), tasks)
+    return prepared(fitted(entrant_of(word, ours=()), problem), problem)[0]
 
 
 def steps_of(member: Entrant) -> int | None:
@@ -132,37 +110,24 @@ def steps_of(member: Entrant) -> int | None:
     return None if member.saved is None else member.saved.steps
 
 
-def drive(
-    member: Entrant, worlds: Worlds, folder: Path, judge: WarmJudge, watch: Watch
-) -> EpisodeReport:
-    """Drives a policy on worlds.
-
-    Args:
-        member: The policy.
-        worlds: The worlds.
-        folder: Folder for the report, and for the episodes.
-        judge: A warm judge.
-        watch: Called repeatedly with the numbers of episodes and successes so far.
-
-    Raises:
-        TaskError: The ledger of hidden evaluations cannot be used.
-        Fault: The sandbox is broken.
-    """
-    request = Request(
+def request_of(
+    member: Entrant, problem: Task | TaskSet, part: Part, tier: str
+) -> Request:
+    """What the judge is to drive."""
+    return Request(
         member.policy,
         member.sha256,
-        episodes_of(worlds.tasks),
-        Part(range(worlds.count), worlds.split, worlds.salt_file),
+        episodes_of(problem),
+        part,
         member.source,
         lineage=member.lineage,
-        tier=worlds.tier,
+        tier=tier,
         trajectories=True,
     )
-    return drive_request(request, folder, judge, watch)
 
 
-def knows(member: Entrant, tasks: TaskSet) -> str:
+def knows(member: Entrant, problem: Task | TaskSet) -> str:
     """What a policy may use."""
     if member.kind == PRIVILEGED:
         return "all"
-    return knowledge(member.policy, tasks)
+    return knowledge(member.policy, problem)

@@ -9,10 +9,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.bench.arena import Arena, Part, is_driven, place_of
-from tdac_agent.bench.entrants import Worlds, drive, member_of
+from tdac_agent.bench.arena import Arena, Entry
+from tdac_agent.bench.entrants import member_of, request_of
 from tdac_agent.errors import ControllerFileError
+from tdac_agent.evaluation.evaluate import part_of
 from tdac_agent.executors.executor import Ended, Executor, Reported, Work
+from tdac_agent.runs.ownership import load_task
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.drive_episodes import drive
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.ladder.task_sets import load_set
 
@@ -22,17 +26,19 @@ Reached = int | None
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A file that drives on a set.
+    """A file that drives on a task or a set.
 
     Attributes:
-        set: Name of the set, or path of its file.
-        named: Name of the set.
+        set: Name of the task or set, or path of its file.
+        is_task: Whether it is a task.
+        named: Its name.
         entrant: Name of the entrant.
         word: The file, as for `entrants.named`.
         folder: Folder of what it does.
     """
 
     set: str
+    is_task: bool
     named: str
     entrant: str
     word: str
@@ -49,26 +55,35 @@ class Drive:
 
 
 def drives_of(
-    arena: Arena, parts: Sequence[tuple[str | Path, Part]]
+    arena: Arena, entries: Sequence[tuple[str | Path, Entry]]
 ) -> Iterator[Drive]:
     """What has not been driven yet; a file that several entrants have, once.
 
     Args:
         arena: What all entrants share.
-        parts: The parts, each with the name or the path of its set.
+        entries: The entries, each with the name or the path of its task or set.
     """
     seen = set[Path]()
-    for given, part in parts:
-        for word, member in zip(part.entrant.words, part.members, strict=False):
-            folder = place_of(arena, part.tasks, member)
-            if folder in seen or is_driven(arena, part.tasks, member):
+    for given, entry in entries:
+        problem = entry.problem
+        for word, member in zip(entry.entrant.words, entry.members, strict=False):
+            folder = arena.folder(problem, member)
+            if folder in seen or arena.kept(problem, member) is not None:
                 continue
             seen.add(folder)
-            # Workers have another working folder.
-            file = str(Path(word).resolve()) if Path(word).exists() else word
-            name = str(Path(given).resolve()) if Path(given).exists() else str(given)
-            own = part.tasks.name, part.entrant.name
-            yield Drive(name, *own, file, str(folder.resolve()))
+            yield Drive(
+                set=_absolute(given),
+                is_task=isinstance(problem, Task),
+                named=problem.name,
+                entrant=entry.entrant.name,
+                word=_absolute(word),
+                folder=str(folder.resolve()),
+            )
+
+
+def _absolute(word: str | Path) -> str:
+    """A path for workers, which have another working folder; else the word."""
+    return str(Path(word).resolve()) if Path(word).exists() else str(word)
 
 
 def drive_all(
@@ -113,22 +128,23 @@ def perform_job(
 ) -> dict[str, Any]:
     """Drives for an executor; see `executors.executor.Work`."""
     own = Drive(**json.loads(job))
-    tasks, folder = load_set(own.set), Path(own.folder)
-    salt = terms["salt_file"]
-    worlds = Worlds(
-        tasks,
-        terms["split"],
-        terms["count"],
-        None if salt is None else Path(salt),
-        terms["tier"],
-    )
+    problem = load_task(own.set) if own.is_task else load_set(own.set)
+    folder, salt = Path(own.folder), terms["salt_file"]
 
     def watch(episodes: int, successes: int) -> None:
         tell({"episodes": episodes, "reached": successes})
 
+    part = part_of(
+        problem,
+        terms["count"],
+        split=terms["split"],
+        salt_file=None if salt is None else Path(salt),
+    )
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        report = drive(member_of(own.word, tasks), worlds, folder, judge, watch)
+        member = member_of(own.word, problem)
+        request = request_of(member, problem, part, terms["tier"])
+        report = drive(request, folder, judge, watch)
     except ControllerFileError:
         return {"reached": None}
     return {"reached": None if report.refused else report.successes}

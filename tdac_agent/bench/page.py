@@ -27,13 +27,15 @@ class Replay:
 
     Attributes:
         entrant: Name of the entrant.
-        index: Number of the world.
+        index: Number of the episode.
+        name: Its name.
         outcome: How it ended.
         trajectory: The episode.
     """
 
     entrant: str
     index: int
+    name: str
     outcome: str
     trajectory: Trajectory
 
@@ -94,7 +96,7 @@ def _episode(
     return {
         "candidate": replay.entrant,
         "label": replay.entrant,
-        "name": f"world {replay.index}",
+        "name": replay.name,
         "scene": key,
         **encoded(task, scene, replay.trajectory, replay.outcome, most),
     }

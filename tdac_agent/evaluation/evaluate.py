@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from tdac_agent.evaluation.policies import (
     entrants_of,
     fitted,
     knowledge,
-    written_for,
+    prepared,
 )
 from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_agent.runs.ownership import load_task
@@ -37,7 +37,7 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.verification.drive_episodes import Request, drive
 from tdac_agent.verification.episode_report import EpisodeReport
@@ -121,7 +121,12 @@ def evaluate(
     one_of("variation", variation, VARIATIONS)
     entrants, problems = entrants_of(policies, wrappers), load_problems(tasks)
     on_sets = [isinstance(each, TaskSet) for each in problems]
-    parts = [_part(each, episodes, seed, variation, split) for each in problems]
+    for each in problems:
+        _refuse_hidden(each, split)
+    parts = [
+        part_of(each, episodes, seed=seed, variation=variation, split=split)
+        for each in problems
+    ]
     own = [[fitted(each, problem) for each in entrants] for problem in problems]
     about: dict[str, Any] = {
         "variation": None if all(on_sets) else variation,
@@ -194,19 +199,32 @@ def episode_seeds(seed: int, episodes: int) -> tuple[int, ...]:
     return tuple(np.random.SeedSequence(seed).generate_state(episodes).tolist())
 
 
-def _part(
-    problem: Problem, episodes: int, seed: int, variation: str, split: str
+def part_of(
+    problem: Problem,
+    episodes: int,
+    *,
+    seed: int = 0,
+    variation: str = "jitter",
+    split: str = "test",
+    salt_file: Path | None = None,
 ) -> Part:
-    """The episodes of an evaluation on a problem."""
+    """The episodes of an evaluation on a problem; see `evaluate`.
+
+    Raises:
+        TaskError: The set has no such worlds, or they are hidden without a salt.
+    """
     if isinstance(problem, Task):
         seeds = episode_seeds(seed, episodes)
         return Part(seeds, disturbance=NO_DISTURBANCE, variation=variation)
-    if split == "hidden":
+    return part_of_set(problem, split, episodes, salt_file=salt_file)[0]
+
+
+def _refuse_hidden(problem: Problem, split: str) -> None:
+    if isinstance(problem, TaskSet) and split == "hidden":
         raise TaskError(
             "hidden worlds are evaluated one controller at a time, and counted: tdac "
             f"verify FILE --set {problem.name} --split hidden --salt-file FILE"
         )
-    return part_of_set(problem, split, episodes)[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,12 +258,10 @@ def _compete(entrant: Entrant, problem: Problem, part: Part, terms: _Terms) -> D
             terms.watch(problem.name, entrant.name, count, successes)
 
     watch(0, 0)
-    folder, note = terms.place / POLICIES / problem.name, None
+    folder = terms.place / POLICIES / problem.name
     folder.mkdir(parents=True, exist_ok=True)
-    if entrant.kind == "builtin" and isinstance(problem, Task):
-        source, verified = written_for(problem, terms.tier)
-        entrant = replace(entrant, source=source, sha256=sha256_of(source))
-        note = None if verified else NOT_VERIFIED
+    entrant, verified = prepared(entrant, problem, terms.tier)
+    note = None if verified else NOT_VERIFIED
     request = Request(
         entrant.policy,
         entrant.sha256,

@@ -316,11 +316,22 @@ def _check_training(name: str, saved: SavedPolicy, tasks: TaskSet) -> None:
     raise ControllerFileError(f"{name} was trained {where}")
 
 
-def written_for(task: Task, tier: str = "auto") -> tuple[bytes, bool]:
-    """Writes a controller without a model; returns it and whether it is verified.
+def prepared(
+    entrant: Entrant, problem: Task | TaskSet, tier: str = "auto"
+) -> tuple[Entrant, bool]:
+    """A fitted entrant, ready to drive: on a task, `builtin` is written here.
 
-    If no candidate is verified, the controller is the last one.
+    Returns:
+        The entrant, and whether it is verified, if it was written. If no candidate is,
+        it is the last one.
     """
+    if entrant.kind != "builtin" or isinstance(problem, TaskSet):
+        return entrant, True
+    source, verified = _written_for(problem, tier)
+    return replace(entrant, source=source, sha256=sha256_of(source)), verified
+
+
+def _written_for(task: Task, tier: str) -> tuple[bytes, bool]:
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
         run = synthesize(task, BUILTIN, out=Path(name) / "run", tier=tier)
         if run.verified:

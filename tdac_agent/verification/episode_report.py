@@ -174,8 +174,8 @@ class EpisodeReport(_Record):
             return values
         gone = {"rate", "outcomes", "time_outs", "failed_seeds", "worst", "episodes"}
         kept = {name: each for name, each in values.items() if name not in gone}
-        worst = sorted(values["worst"], key=lambda each: each["seed"])
-        return {**kept, "count": values["episodes"], "episodes": worst}
+        count, worst = values.get("episodes"), values.get("worst")
+        return {**kept, "count": count, "episodes": worst}
 
     @property
     def refused(self) -> bool:

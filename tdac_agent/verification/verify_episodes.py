@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 from pathlib import Path
+from typing import Any
 
 from tdac_agent.errors import RunError
 from tdac_agent.problems.episodes import Part, episodes_of
@@ -178,3 +179,26 @@ def most_worlds(tasks: TaskSet, split: str) -> int:
     """
     count = tasks.different(split)
     return MOST_WORLDS if count is None else min(MOST_WORLDS, count)
+
+
+def verify_robust(
+    controller: str | bytes | Path,
+    task: Task,
+    episodes: int = EPISODES,
+    *,
+    first_seed: int | None = None,
+    **options: Any,
+) -> EpisodeReport:
+    """`verify_episodes` of a task, by its earlier name and arguments."""
+    return verify_episodes(controller, task, episodes, first=first_seed, **options)
+
+
+def verify_on_set(
+    controller: str | bytes | Path,
+    tasks: TaskSet,
+    split: str = "test",
+    worlds: int | None = None,
+    **options: Any,
+) -> EpisodeReport:
+    """`verify_episodes` of a task set, by its earlier name and arguments."""
+    return verify_episodes(controller, tasks, worlds, split=split, **options)

@@ -13,7 +13,7 @@ import yaml
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
-from tdac_agent.bench.arena import part_of
+from tdac_agent.bench.arena import entry_of
 from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, bench
 from tdac_agent.bench.compared import Driven
 from tdac_agent.bench.entrants import named
@@ -397,10 +397,10 @@ def test_names_and_seeds(tmp_path, files, monkeypatch):
         (tmp_path / name / "policy.zip").touch()
     words = named(["a/policy.zip", "b", "x=dwa,still.py"])
     assert [each.name for each in words] == ["a", "b", "x"]
-    problem = part_of(words[-1], load_set("known")).problem
+    problem = entry_of(words[-1], load_set("known")).reason
     assert problem == "its files are not seeds of one training: planner, controller"
     (twice,) = named(["twice=still.py,still.py"])
-    assert part_of(twice, load_set("known")).problem == "two of its files are the same"
+    assert entry_of(twice, load_set("known")).reason == "two of its files are the same"
     with pytest.raises(ControllerFileError, match="it has neither contr"):
         named([str(tmp_path)])
 
@@ -490,3 +490,18 @@ def test_the_page_in_a_browser(browser, judge, tmp_path, level, files):
     entrant = Select(browser.find_element(By.CSS_SELECTOR, "select.candidate"))
     assert entrant.first_selected_option.text == "ahead"
     assert browser.get_log("browser") == []
+
+
+def test_tasks_beside_sets(judge, tmp_path, files, level, small_task):
+    """Programs and planners drive on both, and are compared over all of them."""
+    out = tmp_path / "out"
+    given = {"tasks": [small_task.folder], "out": out, "judge": judge}
+    found = bench(["dwa", files[0]], [level], "dev", 2, **given)
+    assert [each.split for each in found.sets] == ["dev", "jitter"]
+    by = {(row.set, row.entrant): row for row in found.rows}
+    name = found.sets[1].name
+    assert by[name, "dwa"].success.value == 1.0
+    assert {each.entrant for each in found.overall} == set(found.entrants)
+    assert (out / "bench.html").read_text().count("seed ") > 0
+    with pytest.raises(TaskError, match="tasks have no hidden worlds"):
+        bench(["dwa"], [level], "hidden", 2, **given)

@@ -117,6 +117,24 @@ def test_builtin_is_the_controller_of_the_level(judge, level):
     assert row.knows == "sensors"
 
 
+def test_baselines_and_planners_drive_on_worlds_and_on_tasks(judge, level, small_task):
+    """All that drives on a set drives on a task on a map, and the other way round."""
+    words = ["reference", "go-to-goal", "random", "dwa"]
+    found = evaluate(words, [load_set(level), small_task], 2, judge=judge)
+    knows = {row.policy: row.knows for row in found.of("few")}
+    assert knows == {
+        "reference": "privileged",
+        "go-to-goal": "sensors",
+        "random": "nothing",
+        "dwa": "sensors",
+    }
+    errors = [row.outcomes.get("error", 0) for row in found.rows]
+    assert errors == [0] * 8
+    reached = {row.policy: row.successes for row in found.of(small_task.name)}
+    assert (reached["reference"], reached["dwa"], reached["random"]) == (2, 2, 0)
+    assert {pair.task for pair in found.comparisons} == {"few", small_task.name}
+
+
 @pytest.mark.parametrize(
     ("policies", "split", "message"),
     [
