@@ -11,8 +11,8 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.baseline_trainings import PPO_TASKS, TRAININGS, trained
-from tdac_agent.evaluation.policies import entrants_of
 from tdac_agent.evaluation.evaluate import evaluate, write_evaluation
+from tdac_agent.evaluation.policies import entrants_of
 from tdac_agent.verification.judge.warm import WarmJudge
 
 SEED = 0

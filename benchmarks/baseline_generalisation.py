@@ -10,8 +10,8 @@ import pandas as pd
 
 from benchmarks.baseline_trainings import TRAININGS, trained
 from tdac_agent import load_task
-from tdac_agent.evaluation.policies import entrants_of
 from tdac_agent.evaluation.evaluate import EPISODES, episode_seeds
+from tdac_agent.evaluation.policies import entrants_of
 from tdac_agent.metrics.exact import exact_interval
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task_file import bundled_tasks

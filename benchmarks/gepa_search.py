@@ -50,14 +50,9 @@ from rich.table import Table
 from benchmarks.in_process import Drives
 from benchmarks.timing import whole_from_one
 from benchmarks.tune_planners import drawn
-from tdac_agent.planners.planner import ranges_of, source_of, with_values
 from tdac_agent.builtin.variation import varied
-from tdac_agent.verification.episode_report import (
-    EpisodeProvenance,
-    EpisodeReport,
-    summarise,
-)
 from tdac_agent.metrics.paired import bootstrap
+from tdac_agent.planners.planner import ranges_of, source_of, with_values
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import Run
 from tdac_agent.set_synthesis.improve import SetExplorer, finalists, founders
@@ -74,6 +69,11 @@ from tdac_agent.synthesis.dialogue import ModelAnswer
 from tdac_agent.synthesis.improve import ImprovingSearch
 from tdac_agent.synthesis.workload import Shares, shares
 from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.verification.episode_report import (
+    EpisodeProvenance,
+    EpisodeReport,
+    summarise,
+)
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
@@ -137,10 +137,16 @@ class Terms(NamedTuple):
     def report(self, source: str, worlds: Sequence[int]) -> EpisodeReport:
         """How a controller drives on worlds of `dev`."""
         episodes = [self.drive(source, "dev", index) for index in worlds]
-        about = EpisodeProvenance.unconfined(
-            self.tasks, "dev", None, sha256_of(source.encode())
+        about = EpisodeProvenance(
+            name=self.tasks.name,
+            sha256=self.tasks.sha256,
+            split="dev",
+            controller_sha256=sha256_of(source.encode()),
+            sandbox="none",
+            limits={},
+            versions={},
         )
-        return summarise(about, episodes, None, 0.0, per_world=True)
+        return summarise(about, episodes, None, 0.0)
 
     def variation(self, source: str, number: int) -> str:
         """The proposal with a number, from 1."""

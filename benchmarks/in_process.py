@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from tdac_agent.episodes.episode import Record, not_driven, run_policy
+from tdac_agent.episodes.episode import not_driven, run_policy
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.tasks.provenance import sha256_of
-from tdac_agent.verification.judge.driving import FOREVER
+from tdac_agent.verification.judge.episode_job import row_of
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.set_files import write_files
-from tdac_agent.verification.judge.episode_row import EpisodeRow, figures_of
-from tdac_envs.ladder.env import OnSet, make
+from tdac_agent.verification.judge.worlds import SetEpisodes, SetWorlds
 
 
 class Imported:
@@ -71,7 +71,7 @@ class Drives:
 
     def __init__(self, level: str) -> None:
         self._level = level
-        self._envs: dict[str, OnSet] = {}
+        self._worlds: dict[str, SetEpisodes] = {}
         self._driven: dict[tuple[str, str, int], EpisodeRow] = {}
 
     def __call__(self, source: str, split: str, index: int) -> EpisodeRow:
@@ -82,11 +82,11 @@ class Drives:
         return self._driven[key]
 
     def _drive(self, source: str, split: str, index: int) -> EpisodeRow:
-        if split not in self._envs:
-            made = make(self._level, split=split, train_pool=0, privileged=True)
-            self._envs[split] = made
-        env, began = self._envs[split], time.process_time()
-        record = Record(env, None, FOREVER, options={"index": index})
+        if split not in self._worlds:
+            own = SetWorlds(set_file=Path(self._level), split=split)
+            self._worlds[split] = own.opened()
+        worlds, began = self._worlds[split], time.process_time()
+        env, record = worlds.env, worlds.record(index)
         with tempfile.TemporaryDirectory(prefix="tdac-drive-") as name:
             folder = Path(name)
             write_files(folder, env.set.file, env.setup.source.task(index))
@@ -100,4 +100,4 @@ class Drives:
                 except ControllerFault as fault:
                     rollout = not_driven(record, f"world {index}", fault)
         cpu = time.process_time() - began
-        return figures_of(env, split, index, rollout, cpu, per_world=True)
+        return row_of(worlds, index, rollout, env, cpu)

@@ -33,12 +33,12 @@ from scipy import stats
 from tdac_agent.bench.bench import WORLD_TABLE, bench
 from tdac_agent.bench.figures import draw_figures, frame_of
 from tdac_agent.bench.record import Bench, BenchRow, Interval
-from tdac_agent.planners.planner import levels_of, planner_names
 from tdac_agent.bench.shown import merged, reveal
-from tdac_agent.verification.salt import SEALED, drawn_salt
+from tdac_agent.planners.planner import levels_of, planner_names
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_envs.ladder.set_file import set_names
 
 RESULTS = Path(__file__).parents[1] / "results" / "ladder"

@@ -28,12 +28,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from benchmarks.recorded_answers import driven_on, episodes_in, interval
-from tdac_agent.verification.store import kept_report
-from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.store import kept_report
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 RESULTS = Path("results/ladder")
@@ -96,9 +96,10 @@ def best_of_n(
         assert source is not None
         raw = source.encode()
         kept = out / "dev" / tasks.name / sha256_of(raw)[:16]
-        about = sha256_of(raw), tasks.sha256, "dev", share
-        report = kept_report(kept, *about) or verify_episodes(
-            raw, tasks, "dev", share, out=kept, judge=judge
+        about = {"controller_sha256": sha256_of(raw), "sha256": tasks.sha256}
+        known = kept_report(kept, {**about, "split": "dev"}, range(share))
+        report = known or verify_episodes(
+            raw, tasks, share, split="dev", out=kept, judge=judge
         )
         means.append(np.mean([each.time_score for each in report.episodes]))
     best = judged[int(np.argmax(means))].parent.name

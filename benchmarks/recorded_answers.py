@@ -30,14 +30,14 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from tdac_agent.builtin.level import LEVELS
-from tdac_agent.verification.store import REPORT_FILE, ROWS_FILE
-from tdac_agent.verification.salt import SEALED, drawn_salt
-from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.salt import SEALED, drawn_salt
+from tdac_agent.verification.store import REPORT_FILE, ROWS_FILE
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.ladder.task_sets import load_set
 
 BUILTIN = "builtin"
@@ -102,7 +102,7 @@ def driven_on(
         if same and report.count == worlds:
             return report
     return verify_episodes(
-        raw, tasks, "hidden", worlds, salt_file=salt, out=kept, judge=warm
+        raw, tasks, worlds, split="hidden", salt_file=salt, out=kept, judge=warm
     )
 
 

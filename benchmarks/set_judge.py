@@ -22,8 +22,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.timing import Bench, Effort, Row
-from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.ladder.set_file import HorizonSpec
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
@@ -110,7 +110,7 @@ def _own_cpu(judge: WarmJudge, episodes: int, steps: int) -> float:
     """CPU time of the judge's processes for some episodes, s."""
     _ready()
     before = _ended()
-    report = verify_episodes(IDLE, _fixed(steps), "test", episodes, judge=judge)
+    report = verify_episodes(IDLE, _fixed(steps), episodes, judge=judge)
     assert sum(each.steps for each in report.episodes) == episodes * steps
     _ready()
     return _ended() - before + report.child_cpu_seconds
@@ -134,10 +134,10 @@ def _whole(few: int | None) -> tuple[float, float]:
     episodes, steps = WHOLE
     number, busy = few or episodes, BUSY.format(loops=_loops())
     with WarmJudge() as judge:
-        verify_episodes(busy, _fixed(1), "test", 1, judge=judge)  # it is warm then
+        verify_episodes(busy, _fixed(1), 1, judge=judge)  # it is warm then
         _ready()
         before, began = _ended(), time.perf_counter()
-        report = verify_episodes(busy, _fixed(steps), "test", number, judge=judge)
+        report = verify_episodes(busy, _fixed(steps), number, judge=judge)
         wall = time.perf_counter() - began
         _ready()
         computed = _ended() - before + report.child_cpu_seconds

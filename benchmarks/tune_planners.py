@@ -28,8 +28,8 @@ import numpy as np
 from tdac_agent.planners.planner import (
     TUNED,
     levels_of,
-    ranges_of,
     planner_names,
+    ranges_of,
     source_of,
     with_values,
 )

@@ -30,10 +30,10 @@ from benchmarks.recorded_answers import (
     episodes_in,
     interval,
 )
-from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.salt import SEALED, drawn_salt
 
 GENUINE = Path(__file__).parents[1] / "results" / "ladder" / "genuine"
 BEFORE, WITH, WITHOUT = "before", "with", "without"

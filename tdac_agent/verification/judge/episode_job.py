@@ -37,6 +37,7 @@ from tdac_agent.verification.judge.worlds import (
     SetWorlds,
     TaskEpisodes,
     TaskWorld,
+    Worlds,
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
@@ -215,7 +216,9 @@ def kept_rows(path: Path | None, numbers: tuple[int, ...]) -> list[EpisodeRow]:
 def drive_number(run: EpisodeRun, number: int) -> Driven:
     """Drives an episode; a controller runs in a fresh child, told nothing of it."""
     rollout, env, cpu_seconds, tier = _drive(run, number)
-    return Driven(rollout, _row(run, number, rollout, env, cpu_seconds), tier)
+    told = run.job.told
+    row = row_of(run.worlds, number, rollout, env, cpu_seconds, told=told)
+    return Driven(rollout, row, tier)
 
 
 def _checked(run: EpisodeRun) -> tuple[Checks, str]:
@@ -266,7 +269,8 @@ def _skipped(run: EpisodeRun, number: int) -> Driven:
     record = run.worlds.record(number)
     fault = ControllerFault(reason, "policy")
     rollout = not_driven(record, run.worlds.name(number), fault)
-    return Driven(rollout, _row(run, number, rollout, record.env, 0.0), "")
+    row = row_of(run.worlds, number, rollout, record.env, 0.0, told=run.job.told)
+    return Driven(rollout, row, "")
 
 
 def _drive(
@@ -308,16 +312,23 @@ def _loaded(child: Child) -> Driver:
     return child
 
 
-def _row(
-    run: EpisodeRun, number: int, rollout: Rollout, env: JudgedEnv, cpu_seconds: float
+def row_of(
+    worlds: Worlds,
+    number: int,
+    rollout: Rollout,
+    env: JudgedEnv,
+    cpu_seconds: float,
+    *,
+    told: bool = True,
 ) -> EpisodeRow:
-    task, shown = run.worlds.diagnosed(env)
+    """The row of an episode that has just been driven in an environment."""
+    task, shown = worlds.diagnosed(env)
     return driven_row(
         rollout,
         task,
-        run.worlds.facts(env, number),
-        units=run.worlds.units,
+        worlds.facts(env, number),
+        units=worlds.units,
         shown=shown,
-        told=run.job.told,
+        told=told,
         cpu_seconds=cpu_seconds,
     )

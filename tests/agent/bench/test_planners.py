@@ -8,9 +8,9 @@ from tdac_agent.planners.planner import (
     FOLDER,
     TUNED,
     levels_of,
-    ranges_of,
     planner_names,
     planner_on,
+    ranges_of,
     source_of,
     with_values,
 )

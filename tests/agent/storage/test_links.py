@@ -61,7 +61,7 @@ def test_only_what_is_written_counts(place):
     (place / "run" / ".venv").mkdir()
     (place / "run" / ".venv" / "python").symlink_to("/usr/bin/python3")
     refuse_links(place / "run", "report.json", "inner")
-    with open_store(place / "run", "*.png"):
+    with own_folder(place / "run", "*.png", who="evaluation"):
         (place / "run" / "maze.png").symlink_to("../outside/kept")
     with pytest.raises(RunError, match=r"maze\.png is a link"):
         refuse_links(place / "run", "*.png")
@@ -81,7 +81,7 @@ def test_other_verifications_write_through_no_link(place):
     """The disturbed episodes, and the worlds of a set."""
     run = place / "run"
     (run / "episodes.json").symlink_to("../outside/kept")
-    with pytest.raises(RunError, match=r"robust\.json is a link"):
+    with pytest.raises(RunError, match=r"episodes\.json is a link"):
         verify_episodes("def policy():\n", load_task("maze"), 1, out=run)
     (run / "sealed").symlink_to("../outside")
     with pytest.raises(RunError, match=r"sealed is a link"):

@@ -11,7 +11,6 @@ from tdac_agent.bench.bench import bench
 from tdac_agent.episodes.sb3_file import read_metadata
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
-from tdac_agent.evaluation.set_evaluate import evaluate_on_set
 from tdac_agent.training.curve import read_curve
 from tdac_agent.training.hyperparameters import config_file
 from tdac_agent.training.plan import read_plan
@@ -112,10 +111,10 @@ def test_its_evaluation_is_that_of_the_judge(trained, algo):
     """
     tasks, _, points, out = trained(algo, **LOST)
     best = max(points, key=lambda point: point.worth)
-    found = evaluate_on_set([out / "policy.zip"], tasks, "dev", 4)
-    (row,), (report,) = found.rows, found.reports
+    found = evaluate([out / "policy.zip"], [tasks], 4, split="dev")
+    (row,), (report,) = found.rows, found.results
     assert row.successes / 4 == best.success_rate
-    assert row.hit / 4 == best.collision_rate
+    assert row.collided / 4 == best.collision_rate
     steps = np.mean([episode.steps for episode in report.episodes])
     assert steps == pytest.approx(best.mean_length)
 
@@ -130,7 +129,7 @@ def test_a_policy_in_a_bench(trained, few, tmp_path, monkeypatch):
     still.write_text("def policy(obs):\n    return 0.0, 0.0\n")
     words = [f"ppo={file}", str(still)]
     found = bench(words, [level], "dev", 4, out=tmp_path / "bench")
-    alone = evaluate_on_set([file], tasks, "dev", 4)
+    alone = evaluate([file], [tasks], 4, split="dev")
     learned, program = found.rows
     assert learned.success.value == alone.rows[0].successes / 4
     assert (learned.kind, learned.knows, program.kind) == (
@@ -186,10 +185,10 @@ def test_a_policy_of_another_training_is_refused(trained, few):
     file = str(out / "policy.zip")
     other = load_set(few(name="others"))
     with pytest.raises(ControllerFileError, match=r"the task set 'few', not on 'oth"):
-        evaluate_on_set([file], other, "dev", 1)
+        evaluate([file], [other], 1)
     changed = load_set(few(goal_tolerance=5))
     with pytest.raises(ControllerFileError, match="on another version of the task set"):
-        evaluate_on_set([file], changed, "dev", 1)
+        evaluate([file], [changed], 1)
     with pytest.raises(TaskError, match="the task set 'few', not on tasks: evaluate"):
         evaluate([file], ["maze"], 1)
 
