@@ -27,6 +27,7 @@ from tdac_agent.evaluation.kept_sets import REPORT_FILE, TRAJECTORIES
 from tdac_agent.evaluation.robust_report import decision_text
 from tdac_agent.evaluation.set_report import HiddenCount, SetReport
 from tdac_agent.evaluation.set_verify import most_worlds, verify_on_set
+from tdac_agent.runs.ownership import mark_verified
 from tdac_agent.runs.selection_record import Scores
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -94,6 +95,9 @@ def run(
             judge=judge,
             watch=watch,
         )
+    if report.passed and report.sequential is not None:
+        again = mark_verified(file.parent, report.provenance.set_sha256)
+        print(again, end="\n" * bool(again), file=sys.stderr)
     if as_json:
         sys.stdout.write(report.model_dump_json(indent=2) + "\n")
     else:

@@ -10,7 +10,7 @@ from typing import Literal, TypeVar
 from tdac_agent.episodes.trajectory import Trajectory, nominal_first
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.rules import RuleBook
-from tdac_agent.runs.ownership import load_task
+from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.rule_history import RuleChanges, rule_changes
 from tdac_agent.runs.run_record import (
     AGENT,
@@ -99,6 +99,8 @@ class RunHistory:
             code.
         book: Its rules.
         problems: What could not be read, one line each.
+        foreign: Why its verdict is only a claim, after `this folder`; empty for an own
+            run.
     """
 
     run: Run
@@ -109,6 +111,7 @@ class RunHistory:
     source: str | None
     book: RuleBook
     problems: tuple[str, ...]
+    foreign: str = ""
 
 
 def learner_named(learner: str) -> str:
@@ -150,6 +153,7 @@ def gather_run(source: Path | Run) -> RunHistory:
         verified_source or (sources[-1] if sources else None),
         _try_to(problems, lambda: load_rules(folder)) or RuleBook(),
         tuple(dict.fromkeys(problems)),
+        "" if before else remark_on(run).removeprefix(f"{folder} "),
     )
 
 

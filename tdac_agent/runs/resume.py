@@ -11,7 +11,15 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.given_rules import given_book
 from tdac_agent.prompting.prompt import VARIANTS
-from tdac_agent.runs.ownership import is_own, is_own_folder, load_task, wishes_of
+from tdac_agent.runs.ownership import (
+    called,
+    has_earlier_mark,
+    is_own,
+    is_own_folder,
+    load_task,
+    remark_on,
+    wishes_of,
+)
 from tdac_agent.runs.run_record import (
     AGENT,
     GIVEN_FILE,
@@ -110,13 +118,15 @@ def check_own(before: Run) -> None:
     Raises:
         RunError: Another installation began the run.
     """
-    if not is_own_folder(before):
-        raise RunError(
-            f"{before.folder} contains a run that this installation did not begin "
-            f"and that claims to be {before.status}: test it with "
-            f"{shlex.join(['tdac', 'verify', str(before.folder)])}, or give a new "
-            "folder with --out"
-        )
+    if is_own_folder(before):
+        return
+    if has_earlier_mark(before):
+        raise RunError(remark_on(before))
+    raise RunError(
+        f"{remark_on(before)}, and it claims to be {before.status}: test it with "
+        f"{shlex.join(['tdac', 'verify', str(before.folder)])}, or give a new "
+        "folder with --out"
+    )
 
 
 def _difference(words: str, before: object, now: object) -> str:
@@ -159,7 +169,7 @@ def resume_arguments(
     flags = {name: value for name, value in (given or {}).items() if value is not None}
     task = recorded_task(folder)
     if not is_own(run, task.suite):
-        permit(folder, wishes_of(run, task.suite, flags), trust=trust)
+        permit(called(run), wishes_of(run, task.suite, flags), trust=trust)
     suite = flags.pop("suite", None)
     if task.suite is not None:
         task = replace(task, suite=suite or task.suite, trusted=True)

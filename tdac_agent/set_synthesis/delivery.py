@@ -80,7 +80,7 @@ def deliver_selected(
         improvement=improvement,
         stopped=stopped,
     )
-    write_atomic(run.controller, chosen.source)
+    trials.recorder.deliver(chosen.source)
     write_atomic(
         run.folder / SELECTION_FILE, selection.model_dump_json(indent=2) + "\n"
     )

@@ -35,7 +35,8 @@ def verify_hidden(
     folder, raw = recorder.run.folder, source.encode("utf-8", "surrogatepass")
     about = {"controller_sha256": sha256_of(raw), "set_sha256": tasks.sha256}
     recorder.event("hidden.start", **about)
-    report = _recorded(folder / HIDDEN_FILE, about) if recorder.run.mark else None
+    known = recorder.vouches(folder / HIDDEN_FILE)
+    report = _recorded(folder / HIDDEN_FILE, about) if known else None
     if report is None:
         report = verify_on_set(
             raw,
@@ -52,6 +53,7 @@ def verify_hidden(
             ),
         )
         write_atomic(folder / HIDDEN_FILE, report.model_dump_json(indent=2) + "\n")
+        recorder.vouch(folder / HIDDEN_FILE)
     recorder.event("hidden.end", passed=report.passed, worlds=report.worlds, **about)
     return report
 

@@ -222,9 +222,8 @@ class Trials:
         about = {"k": k, "j": j, "what": out.name.partition("-")[0], "worlds": count}
         self.recorder.event("drive.start", **about)
         source = candidate.source.encode("utf-8", "surrogatepass")
-        # The record of another installation's run is not trusted.
         report = None
-        if self.recorder.run.mark:
+        if self.recorder.vouches(out / SET_REPORT):
             report = kept_report(out, self.tasks, source, first, count)
         if report is None:
             report = verify_on_set(
@@ -240,6 +239,7 @@ class Trials:
                     {"event": "drive.step", **about, "done": done, "reached": reached}
                 ),
             )
+            self.recorder.vouch(out / SET_REPORT)
         self.recorder.event(
             "drive.end", **about, reached=report.successes, driven=report.worlds
         )

@@ -53,6 +53,38 @@ def write_if_changed(path: Path, data: str | bytes) -> None:
         write_atomic(path, raw)
 
 
+def append_line(path: Path, line: bytes) -> None:
+    """Appends one line and flushes it to disk; a part of it is removed again.
+
+    Raises:
+        OSError: The write failed; the error names the file.
+    """
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        try:
+            _append(handle, line)
+            size = os.fstat(handle).st_size
+        finally:
+            os.close(handle)
+        if size == len(line):
+            sync_folder(path.parent)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _append(handle: int, line: bytes) -> None:
+    size = os.fstat(handle).st_size
+    try:
+        # Usually one write; a full disk accepts a part, and the next write raises.
+        while line:
+            line = line[os.write(handle, line) :]
+        os.fsync(handle)
+    except OSError:
+        with contextlib.suppress(OSError):
+            os.ftruncate(handle, size)
+        raise
+
+
 def sync_folder(folder: Path) -> None:
     """Flushes the entries of a folder to disk, if the system supports it."""
     with contextlib.suppress(OSError):

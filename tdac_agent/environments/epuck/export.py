@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tdac_agent.environments.epuck.setting import WORLD_FILE
 from tdac_agent.errors import RunError
-from tdac_agent.runs.ownership import load_task
+from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
@@ -36,6 +36,7 @@ class Project:
         tolerance: Distance at which the goal is reached, m.
         horizon: Maximum number of the controller's steps.
         verified_steps: Steps to the goal in the verification, if a report states them.
+        remark: Why the verification is only a claim; empty for an own run.
     """
 
     folder: Path
@@ -44,6 +45,7 @@ class Project:
     tolerance: float
     horizon: int
     verified_steps: int | None
+    remark: str = ""
 
 
 def export_webots(run_folder: Path, out: Path) -> Project:
@@ -81,6 +83,7 @@ def export_webots(run_folder: Path, out: Path) -> Project:
         task.nominal.goal_tolerance,
         task.nominal.horizon,
         _verified_steps(run_folder),
+        remark_on(run),
     )
     folder = project.controller.parent
     for new in (folder, project.world.parent):
@@ -127,9 +130,11 @@ def _verified_steps(run_folder: Path) -> int | None:
 
 
 def _readme(task: Task, name: str, source: bytes, project: Project) -> str:
-    digest = hashlib.sha256(source).hexdigest()
+    digest = sha256_of(source)
     steps = project.verified_steps
     verified = "" if steps is None else f"\nIt reached the goal there in {steps} steps."
+    if project.remark:
+        verified = "\nThis is only what the run claims, which is not known to be true."
     return f"""\
 # {task.name}: an e-puck controller for Webots
 
