@@ -20,7 +20,7 @@ import numpy as np
 
 from tdac_agent.episodes.episode import Record, not_driven, run_policy
 from tdac_agent.sandbox import ControllerFault
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.driving import FOREVER
 from tdac_agent.verification.judge.set_files import write_files
 from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of

@@ -16,7 +16,7 @@ from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.kept_sets import ROWS_FILE, TRAJECTORIES, kept_report
 from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_report import SetReport
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.set_job import WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TaskError

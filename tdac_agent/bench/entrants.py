@@ -21,7 +21,7 @@ from tdac_agent.evaluation.set_entrants import set_entrants
 from tdac_agent.evaluation.set_learned import LearnedRuns
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set, written_by
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.errors import TaskError

@@ -14,7 +14,7 @@ import numpy as np
 
 from tdac_agent.evaluation.kept_sets import keep_report, keep_sealed
 from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of_world
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder import orca_driver, space_time

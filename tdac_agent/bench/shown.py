@@ -17,8 +17,8 @@ from tdac_agent.bench.record import Bench, BenchRow, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.locks import LOCK_FILE, own_folder
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.set_file import set_names

@@ -36,8 +36,9 @@ from tdac_agent.evaluation.unfinished import folder_of, open_store
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.task import Task, display_name, lay_out
 from tdac_agent.verification.diagnosis.measures import Measured
 from tdac_agent.verification.judge.kept_episodes import KeptEpisode, kept_episodes

@@ -10,7 +10,7 @@ from tdac_agent.builtin.level import controller_of
 from tdac_agent.episodes.sb3_file import SavedPolicy
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.entrants import Entrant, entrants_of
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import TaskSet
 

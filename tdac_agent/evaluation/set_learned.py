@@ -26,7 +26,8 @@ from tdac_agent.evaluation.ledger import HiddenEvaluation, on_record
 from tdac_agent.evaluation.set_report import SetProvenance, SetReport, summarise
 from tdac_agent.evaluation.set_verify import write_set
 from tdac_agent.sandbox import ControllerFault
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.driving import FOREVER
 from tdac_agent.verification.judge.set_job import (
     WorldEpisode,

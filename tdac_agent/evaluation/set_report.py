@@ -20,8 +20,9 @@ from tdac_agent.evaluation.robust_report import (
 from tdac_agent.metrics.exact import CONFIDENCE
 from tdac_agent.metrics.rates import rate_of_runs
 from tdac_agent.runs.selection_record import Scores
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.printable_record import PrintableRecord
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import Checks
 from tdac_agent.verification.judge.set_job import WorldEpisode

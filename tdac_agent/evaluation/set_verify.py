@@ -35,9 +35,10 @@ from tdac_agent.runs.run_record import load_run
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.first_run import compile_first
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.registry import environment
 from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks

@@ -11,8 +11,9 @@ from dataclasses import asdict
 from pathlib import Path
 
 from tdac_agent.storage.files import clear_unfinished
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.locks import LOCK_FILE, own_folder
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.kept_episodes import SUFFIX
 from tdac_agent.verification.judge.seeded import SeededJob

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import re
 import zipfile
 from collections.abc import Iterator
 from importlib.metadata import distribution
 from pathlib import Path
 
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.shipped import shipped, shipped_names
 
 PACKAGE = "tdac"
@@ -74,7 +74,7 @@ def _sources() -> Iterator[tuple[str, bytes]]:
 
 
 def _hash(raw: bytes) -> str:
-    digest = base64.urlsafe_b64encode(hashlib.sha256(raw).digest())
+    digest = base64.urlsafe_b64encode(bytes.fromhex(sha256_of(raw)))
     return f"sha256={digest.decode().rstrip('=')}"
 
 

@@ -21,9 +21,9 @@ from tdac_agent.mcp.submitted import source_of
 from tdac_agent.mcp.watch import Watch
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import JOURNAL, Run
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.plain import one_line
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_envs.core.errors import TdacError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,8 @@ from tdac_agent.prompting.rules import BEGIN
 from tdac_agent.runs.journal_state import reply_of
 from tdac_agent.runs.ownership import OURS, is_own_folder
 from tdac_agent.runs.run_record import JOURNAL, load_run
+from tdac_agent.storage.hashes import sha256_of_json
 from tdac_agent.storage.journal import JournalRecord, read_records
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 DEMO = Path(__file__).parent / "demo"
@@ -85,7 +84,7 @@ class Replay:
 
     def answers_sha256(self) -> str:
         """Hash of all recorded answers."""
-        return sha256_of(json.dumps(self._replies, sort_keys=True).encode())
+        return sha256_of_json(self._replies)
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""

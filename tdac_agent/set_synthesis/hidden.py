@@ -12,7 +12,7 @@ from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet

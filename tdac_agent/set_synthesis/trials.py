@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,8 +12,9 @@ from pydantic import ValidationError
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.runs.recorder import Recorder
+from tdac_agent.storage.hashes import number_of, sha256_of
 from tdac_agent.synthesis.workload import Shares
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.set_job import WorldEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
@@ -98,8 +98,7 @@ def _mean(episodes: Sequence[WorldEpisode]) -> float:
 
 def first_world(seed: int, index: int) -> int:
     """Number of the first feedback world of a run, below `BLOCKS` - `MOST_EPISODES`."""
-    digest = hashlib.sha256(f"dev block|{seed}|{index}".encode("ascii")).digest()
-    return int.from_bytes(digest[:8], "big") % (BLOCKS - MOST_EPISODES)
+    return number_of(f"dev block|{seed}|{index}") % (BLOCKS - MOST_EPISODES)
 
 
 @dataclass(slots=True)

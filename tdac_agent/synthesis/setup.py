@@ -24,10 +24,10 @@ from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, Run
 from tdac_agent.storage.files import clear_unfinished
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.journal import read_records, repair_end
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.installation import drawn_seed, lasting_secret
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.verify import suite_sha256
 
@@ -127,8 +127,8 @@ def new_run(
         optimizer=models[1].name,
         served_at={name: url for name, url in addresses.items() if url is not None},
         version=importlib.metadata.version("tdac"),
-        prompt_sha256=_hash(question),
-        given_sha256=None if start_from is None else _hash(start_from),
+        prompt_sha256=sha256_of(question),
+        given_sha256=None if start_from is None else sha256_of(start_from),
         cost=0.0,
         id=secrets.token_hex(8),
         started=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -232,7 +232,3 @@ def open_record(
     except OSError as error:
         raise RunError(f"cannot write to {run.folder}: {error.strerror}") from error
     return recorder
-
-
-def _hash(text: str) -> str:
-    return sha256_of(text.encode("utf-8", "surrogatepass"))

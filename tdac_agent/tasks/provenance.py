@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib.metadata
 import platform
 from dataclasses import asdict
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.sandbox import Limits
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.task import Task
 
 VERSIONED = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
@@ -50,8 +50,3 @@ def versions() -> dict[str, str]:
     """Returns the versions of Python and of the packages a verdict may depend on."""
     packages = {name: importlib.metadata.version(name) for name in VERSIONED}
     return {"python": platform.python_version(), **packages}
-
-
-def sha256_of(data: bytes) -> str:
-    """Returns the hexadecimal SHA-256 of some bytes."""
-    return hashlib.sha256(data).hexdigest()

@@ -13,9 +13,10 @@ from tdac_agent.episodes.trajectory import Trajectory, nominal_first
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.installation import seed_of
-from tdac_agent.tasks.provenance import origin, sha256_of, versions
+from tdac_agent.tasks.provenance import origin, versions
 from tdac_agent.tasks.task import Task, display_name, lay_out
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed

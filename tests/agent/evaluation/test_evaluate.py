@@ -33,8 +33,8 @@ from tdac_agent.evaluation.overlay import COLOURS
 from tdac_agent.evaluation.unfinished import FOLDER
 from tdac_agent.metrics.exact import sign_test
 from tdac_agent.sandbox import ControllerFault
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.locks import LOCK_FILE, hold
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.diagnosis.measures import (
     measure,
     shortest_path_length,

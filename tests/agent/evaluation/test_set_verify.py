@@ -18,7 +18,7 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.evaluation.ledger import user_ledger
 from tdac_agent.evaluation.set_report import SetReport, clock_dependence
 from tdac_agent.evaluation.set_verify import verify_on_set
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.set_checks import static_checks
 from tdac_agent.verification.judge.set_files import level_params, write_files
 from tdac_agent.verification.judge.warm import WarmJudge
