@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from tdac_agent.bench.arena import DRIVEN, folder_of, sealed_episodes, world_rows
-from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, publish
+from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, publish, read_worlds
 from tdac_agent.bench.compared import Driven, overall_of, pairs_of
 from tdac_agent.bench.figures import draw_figures
 from tdac_agent.bench.page import PAGE, write_page
@@ -143,8 +143,11 @@ def _short(value: object) -> str:
 
 
 def _table(folder: Path) -> pd.DataFrame:
+    file = folder / WORLD_TABLE
     try:
-        return pd.read_csv(folder / WORLD_TABLE)
+        return read_worlds(file)
+    except ValueError as error:
+        raise RunError(f"{file}: {one_line_reason(error)}") from error
     except OSError as error:
         raise RunError(
             f"{folder / WORLD_TABLE}: {one_line_reason(error)}; results on sealed "

@@ -188,6 +188,6 @@ def write_builtin(task: Task, tier: str = "auto") -> tuple[bytes, bool]:
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
         run = synthesize(task, BUILTIN, out=Path(name) / "run", tier=tier)
         if run.verified:
-            return run.controller.read_bytes(), True
+            return run.controller.read_bytes(), True  # raw read: our temporary folder
         candidates = sorted((run.folder / "iterations").rglob("controller.py"))
-        return candidates[-1].read_bytes(), False
+        return candidates[-1].read_bytes(), False  # raw read: our temporary folder

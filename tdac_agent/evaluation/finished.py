@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,11 +14,11 @@ from tdac_agent.evaluation.evaluation_report import (
     Result,
     Timing,
 )
+from tdac_agent.storage.csv_file import read_rows
 from tdac_agent.verification.diagnosis.measures import Measured
 from tdac_envs.core.intake import RECORD_BYTES, one_line, parse_json, read_file
 
 RESULTS, EPISODE_TABLE, TIMING = "evaluation.json", "episodes.csv", "timing.csv"
-_MOST_BYTES = 512 << 20
 
 
 def finished_evaluation(out: Path, wanted: dict[str, Any]) -> Evaluation | None:
@@ -57,7 +55,7 @@ def finished_evaluation(out: Path, wanted: dict[str, Any]) -> Evaluation | None:
         return None
     try:
         results, timings = _results(out, found), _timings(out)
-    except (OSError, ValueError, KeyError, csv.Error):
+    except (OSError, ValueError, KeyError):
         return None
     return found.model_copy(update={"results": results, "timings": timings})
 
@@ -94,8 +92,7 @@ def _summary(found: Evaluation) -> str:
 
 def _rows(file: Path) -> Iterator[dict[str, Any]]:
     """The rows of a CSV file; an empty value is None."""
-    text = read_file(file, _MOST_BYTES).decode("utf-8")
-    for row in csv.DictReader(io.StringIO(text, newline="")):
+    for row in read_rows(file):
         yield {name: value or None for name, value in row.items()}
 
 

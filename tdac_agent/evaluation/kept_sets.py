@@ -91,6 +91,7 @@ def keep_trajectories(trajectories: Path | None, out: Path) -> None:
     kept = out / TRAJECTORIES
     kept.mkdir(exist_ok=True)
     for path in sorted(trajectories.iterdir()):
+        # raw read: our temporary folder
         write_atomic(kept / path.name, path.read_bytes())
 
 

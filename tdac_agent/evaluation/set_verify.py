@@ -241,6 +241,7 @@ def _driven(
         write_atomic(job.controller, request.source)
         longest = tasks.file.horizon.most * tasks.file.dt * len(job.worlds)
         ended, ending = run_job(job, job.out, longest, WorldEpisode, judge, watch)
+        # raw read: our temporary folder
         checks = Checks.model_validate_json((job.out / CHECKS_FILE).read_bytes())
         provenance = SetProvenance(
             set=tasks.name,

@@ -187,6 +187,7 @@ def short_test(test: str) -> str:
 
 
 def _text(name: str) -> str:
+    # raw read: shipped
     return (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
 
 

@@ -23,11 +23,12 @@ from tdac_agent.runs.run_record import (
     load_run,
     status_now,
 )
+from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.journal import read_records
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TdacError
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.intake import RECORD_BYTES, parse_json
 
 MOST_BYTES = 8 << 20
 T = TypeVar("T")
@@ -138,10 +139,10 @@ def gather_run(source: Path | Run) -> RunHistory:
     sources = [one.source for one in tried if one.source is not None]
     report = verified_source = None
     if run.on_set and run.tau is not None:
-        verified_source = read_text(run.controller)
+        verified_source = read_text(folder, "controller.py")
     elif run.verified:
-        report = _report(folder / "report.json", problems)
-        verified_source = read_text(run.controller)
+        report = _report(folder, "report.json", problems)
+        verified_source = read_text(folder, "controller.py")
         if verified_source is None:
             problems.append("controller.py of the verified run is missing")
     return RunHistory(
@@ -171,10 +172,10 @@ def run_folders(place: Path) -> list[Path]:
     return found
 
 
-def read_text(path: Path, most: int = MOST_BYTES) -> str | None:
-    """Reads text leniently; None if the file is missing or has over `most` bytes."""
+def read_text(folder: Path, name: str, most: int = MOST_BYTES) -> str | None:
+    """Reads text of a run leniently; None if it cannot be read or is too long."""
     try:
-        return read_file(path, most).decode("utf-8", "replace")
+        return read_inside(folder, name, most).decode("utf-8", "replace")
     except OSError:
         return None
 
@@ -186,7 +187,8 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
     begun = {_numbers(path) for path in (run.folder / "iterations").glob("k*/j*")}
     for k, j in sorted({*judged, *begun} - {(0, 0)}):
         attempt = judged.get((k, j))
-        folder = run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        at = f"iterations/k{k:02d}/j{j}"
+        folder = run.folder / at
         has_report = attempt is not None and attempt.valid and not attempt.unchanged
         has_report = has_report and not run.on_set
         yield CandidateHistory(
@@ -195,9 +197,9 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
             folder,
             _state(attempt),
             attempt,
-            _report(folder / "report.json", problems) if has_report else None,
-            read_text(folder / "controller.py"),
-            read_text(folder / "controller.diff") or "",
+            _report(run.folder, f"{at}/report.json", problems) if has_report else None,
+            read_text(run.folder, f"{at}/controller.py"),
+            read_text(run.folder, f"{at}/controller.diff") or "",
             learnt.get((k, j), RuleChanges()),
             run.on_set,
             _varies(run, k, attempt),
@@ -235,12 +237,13 @@ def _state(attempt: Attempt | None) -> State:
     return "passed" if attempt.passed else "failed"
 
 
-def _report(path: Path, problems: list[str]) -> Report | None:
+def _report(folder: Path, name: str, problems: list[str]) -> Report | None:
     try:
-        return Report.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+        content = read_inside(folder, name, RECORD_BYTES)
+        return Report.model_validate(parse_json(content))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "damaged"
-        problems.append(f"{'/'.join(path.parts[-4:])}: {reason}")
+        problems.append(f"{'/'.join((folder / name).parts[-4:])}: {reason}")
         return None
 
 

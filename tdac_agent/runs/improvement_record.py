@@ -6,10 +6,11 @@ from pathlib import Path
 
 from pydantic import ConfigDict, Field, ValidationError
 
+from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.units import Place
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.intake import RECORD_BYTES, parse_json
 
 IMPROVEMENT_FILE = "improvement.json"
 NOT_SHOWN = "no improvement is shown"
@@ -157,7 +158,7 @@ class TaskImprovement(_Record):
 def read_improvement(folder: Path) -> TaskImprovement | None:
     """What the search of a run brought; None if there is no readable record."""
     try:
-        content = parse_json(read_file(folder / IMPROVEMENT_FILE, RECORD_BYTES))
+        content = parse_json(read_inside(folder, IMPROVEMENT_FILE, RECORD_BYTES))
         return TaskImprovement.model_validate(content)
     except (OSError, ValueError, ValidationError):
         return None

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.runs.run_record import JOURNAL, PROMPT_FILE, Run
-from tdac_agent.storage.files import append_line
+from tdac_agent.storage.files import append_line, check_inside, read_inside
 from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.storage.journal import (
     JOURNAL_BYTES,
@@ -27,7 +27,6 @@ from tdac_agent.storage.journal import (
 )
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.trust import tree_sha256
-from tdac_envs.core.intake import read_file
 
 VERSION = "2"
 MARKS = "run.marks"
@@ -63,6 +62,8 @@ def files_of(folder: Path, suite: Path | None) -> Files | None:
     if tests is None:
         return None
     template, controller = folder / PROMPT_FILE, folder / "controller.py"
+    for file in (template, controller):
+        check_inside(folder, file)
     return Files(
         sha256_of_file(template) if template.is_file() else "",
         tests,
@@ -138,7 +139,7 @@ def lines_of(folder: Path) -> bytes:
         OSError: It cannot be read.
     """
     try:
-        return whole_lines(read_file(folder / JOURNAL, JOURNAL_BYTES))
+        return whole_lines(read_inside(folder, JOURNAL, JOURNAL_BYTES))
     except FileNotFoundError:
         return b""
 
@@ -183,7 +184,7 @@ def is_marked(run: Run, suite: Path | None) -> bool:
 def _knows(folder: Path, about: str, what: str, sha256: str) -> bool:
     """Whether `run.marks` has the mark of a journal or a file."""
     try:
-        known = read_file(folder / MARKS, JOURNAL_BYTES).split(b"\n")
+        known = read_inside(folder, MARKS, JOURNAL_BYTES).split(b"\n")
     except OSError:
         return False
     return _further_mark(about, what, sha256).encode() in known

@@ -38,6 +38,7 @@ from tdac_agent.tasks.installation import lasting_secret
 from tdac_agent.tasks.task import Task, portable_task_file, write_workdir
 from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.verification.diagnosis.report import Report
+from tdac_envs.core.intake import IMAGE_BYTES, read_file
 from tdac_envs.mapping.map_folder import png
 
 MOST_LINES = 5000
@@ -428,7 +429,7 @@ def _write_task(task: Task, folder: Path) -> None:
         shutil.copytree(task.suite, own, ignore=ignored, dirs_exist_ok=True)
     original = task.setting.original
     if original is not None:
-        write_atomic(folder / original.name, original.file.read_bytes())
+        write_atomic(folder / original.name, read_file(original.file, IMAGE_BYTES))
 
 
 def _about(request: Request, key: str) -> dict[str, Any]:

@@ -28,13 +28,13 @@ from tdac_agent.runs.run_record import (
     Run,
     load_run,
 )
-from tdac_agent.storage.files import UNFINISHED
+from tdac_agent.storage.files import UNFINISHED, read_inside
 from tdac_agent.storage.locks import LOCK_FILE
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.tasks.trust import permit
 from tdac_envs.core.errors import one_line_reason
-from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
+from tdac_envs.core.intake import TEXT_BYTES, parse_json
 
 # Fields that determine the questions of a run and the use of the answers, as named in
 # messages. Runs that agree in all of them are the same run.
@@ -197,7 +197,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "improve": run.improve,
         "seed": run.seed,
         "index": run.index,
-        "start_from": _text(initial) if initial.is_file() else None,
+        "start_from": _text(folder) if initial.is_file() else None,
         "base_url": run.base_url,
         "refine": run.refine,
         "vision": run.vision,
@@ -208,15 +208,16 @@ def settings_of(run: Run) -> dict[str, Any]:
     }
 
 
-def _text(file: Path) -> str:
+def _text(folder: Path) -> str:
     """Reads the initial controller of a run.
 
     Raises:
         RunError: It cannot be read, or is not UTF-8.
     """
     try:
-        return read_file(file, TEXT_BYTES).decode("utf-8")
+        return read_inside(folder, GIVEN_FILE, TEXT_BYTES).decode("utf-8")
     except (OSError, ValueError) as error:
+        file = folder / GIVEN_FILE
         raise RunError(f"cannot read {file}: {one_line_reason(error)}") from error
 
 
@@ -231,7 +232,7 @@ def recorded_task(folder: Path) -> Task:
     task = load_task(folder)
     setting: Any = task.setting
     try:
-        raw = read_file(folder / "params.json", TEXT_BYTES)
+        raw = read_inside(folder, "params.json", TEXT_BYTES)
         params = setting.params.read(parse_json(raw))
     except (OSError, ValueError) as error:
         raise RunError(

@@ -10,11 +10,12 @@ from pydantic import BeforeValidator, ConfigDict, Field
 from tdac_agent.errors import RunError
 from tdac_agent.models.budget import Enough
 from tdac_agent.prompting.rules import RuleBook
+from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.locks import LOCK_FILE, is_held
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.task_file import Profile
 from tdac_envs.core.errors import nearest, one_line_reason
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.intake import RECORD_BYTES, parse_json
 
 Status = Literal[
     "running",
@@ -232,9 +233,8 @@ def load_run(folder: Path) -> Run:
     Raises:
         RunError: The folder has no readable `run.json`.
     """
-    path = folder / RUN_FILE
     try:
-        content = parse_json(read_file(path, RECORD_BYTES))
+        content = parse_json(read_inside(folder, RUN_FILE, RECORD_BYTES))
         return Run.model_validate({**content, "folder": folder})
     except FileNotFoundError as error:
         raise RunError(f"{folder} is not a run folder: {_missing(folder)}") from error
@@ -263,7 +263,9 @@ def load_rules(folder: Path) -> RuleBook:
     """
     path = folder / RULES_FILE
     try:
-        return RuleBook.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+        return RuleBook.model_validate(
+            parse_json(read_inside(folder, RULES_FILE, RECORD_BYTES))
+        )
     except FileNotFoundError:
         return RuleBook()
     except (OSError, ValueError) as error:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from pydantic import ConfigDict, Field, ValidationError
 
+from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.printable_record import PrintableRecord
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.intake import RECORD_BYTES, parse_json
 
 SELECTION_FILE = "report.json"
 HIDDEN_FILE = "hidden.json"
@@ -104,7 +105,7 @@ class Selection(_Record):
 def read_selection(folder: Path) -> Selection | None:
     """What a run selected; None if there is no readable record."""
     try:
-        content = parse_json(read_file(folder / SELECTION_FILE, RECORD_BYTES))
+        content = parse_json(read_inside(folder, SELECTION_FILE, RECORD_BYTES))
         return Selection.model_validate(content)
     except (OSError, ValueError, ValidationError):
         return None
@@ -122,7 +123,7 @@ class HiddenCounts(PrintableRecord):
 def read_hidden(folder: Path) -> HiddenCounts | None:
     """The counts of a run on hidden worlds; None if there is no readable record."""
     try:
-        content = parse_json(read_file(folder / HIDDEN_FILE, RECORD_BYTES))
+        content = parse_json(read_inside(folder, HIDDEN_FILE, RECORD_BYTES))
         return HiddenCounts.model_validate(content)
     except (OSError, ValueError, ValidationError):
         return None

@@ -6,6 +6,7 @@ import hashlib
 import json
 from pathlib import Path
 
+from tdac_agent.storage.files import open_regular
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 
@@ -23,6 +24,12 @@ def sha256_of_json(value: object) -> str:
 def sha256_of_file(path: Path, most: int = RECORD_BYTES) -> str:
     """The hash of a regular file; OSError if it has more than `most` bytes."""
     return sha256_of(read_file(path, most))
+
+
+def sha256_of_large_file(path: Path) -> str:
+    """The hash of a regular file of any size; a replay buffer can take gigabytes."""
+    with open_regular(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def number_of(text: str) -> int:

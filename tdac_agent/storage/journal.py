@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.storage.files import append_line
+from tdac_agent.storage.files import append_line, read_inside
 from tdac_envs.core.intake import check, read_file
 
 JournalRecord = dict[str, Any]
@@ -33,7 +33,7 @@ def line_of(record: JournalRecord) -> bytes:
 def read_records(path: Path) -> list[JournalRecord]:
     """Returns all records, without torn or invalid lines; [] for a missing file."""
     try:
-        raw = read_file(path, JOURNAL_BYTES)
+        raw = read_inside(path.parent, path.name, JOURNAL_BYTES)
     except FileNotFoundError:
         return []
     return _records(raw)
@@ -74,7 +74,7 @@ def repair_end(path: Path) -> None:
     whole = whole_lines(raw)
     if whole == raw:
         return
-    with path.open("r+b") as file:
+    with path.open("r+b") as file:  # raw read: written, too
         file.truncate(len(whole))
         if len(whole) > len(raw):
             file.seek(-1, os.SEEK_END)

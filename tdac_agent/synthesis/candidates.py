@@ -17,6 +17,7 @@ from tdac_agent.verification.diagnosis.figures import draw_trajectories
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
+from tdac_envs.core.intake import IMAGE_BYTES, read_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +103,7 @@ def place(
     write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")
     (folder / "trajectories").mkdir(exist_ok=True)
     for path in sorted((evidence / "trajectories").glob("*.npz")):
-        write_atomic(folder / "trajectories" / path.name, path.read_bytes())
+        write_atomic(folder / "trajectories" / path.name, read_file(path, IMAGE_BYTES))
     outcomes = {episode.name: episode.outcome for episode in report.episodes}
     trajectories = load_trajectories(folder / "trajectories")
     draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")

@@ -36,6 +36,7 @@ def origin(
         "left_out": task.setting.left_out,
         "map_sha256": task.setting.world_sha256(),
         "params_sha256": sha256_of(task.params.model_dump_json().encode()),
+        # raw read: our temporary folder
         "sensors_sha256": sha256_of((workdir / "sensors.py").read_bytes()),
         "controller_sha256": sha256_of(source),
         "sandbox": tier,

@@ -212,7 +212,7 @@ def write_workdir(folder: Path, task: Task) -> None:
     """
     folder.mkdir(parents=True, exist_ok=True)
     task.setting.write_files(folder)
-    (folder / "sensors.py").write_bytes(SENSORS_FILE.read_bytes())
+    (folder / "sensors.py").write_bytes(SENSORS_FILE.read_bytes())  # raw read: shipped
 
 
 def lay_out(task: Task, folder: Path) -> Path:

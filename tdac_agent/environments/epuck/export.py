@@ -91,7 +91,7 @@ def export_webots(run_folder: Path, out: Path) -> Project:
     write_atomic(folder / POLICY, source)
     for file, content in beside.items():
         write_atomic(folder / file, content)
-    write_atomic(project.controller, ADAPTER.read_bytes())
+    write_atomic(project.controller, ADAPTER.read_bytes())  # raw read: shipped
     write_atomic(project.world, _world(task.nominal, name))
     write_atomic(out / "README.md", _readme(task, name, source, project))
     return project

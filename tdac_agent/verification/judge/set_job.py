@@ -42,7 +42,7 @@ from tdac_agent.verification.judge.set_checks import (
 )
 from tdac_agent.verification.judge.set_files import write_files
 from tdac_envs.core.errors import TaskError
-from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.core.intake import IMAGE_BYTES, RECORD_BYTES, read_file
 from tdac_envs.ladder.env import OnSet, make
 from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.set_file import SetFile
@@ -138,7 +138,7 @@ def kept_worlds(path: Path | None, worlds: tuple[int, ...]) -> list[WorldEpisode
     found: list[WorldEpisode] = []
     if path is None or not path.is_file():
         return found
-    text = path.read_bytes()
+    text = read_file(path, IMAGE_BYTES)
     size = 0
     for line in text.splitlines(keepends=True):
         if len(found) == len(worlds) or not line.endswith(b"\n"):
