@@ -15,6 +15,7 @@ from tdac_agent.html_report.scene import data_address
 from tdac_agent.models.picture import MEDIA_TYPE
 from tdac_agent.runs.history import RunHistory
 from tdac_agent.runs.ownership import remark_on
+from tdac_agent.runs.run_record import candidate_at
 from tdac_agent.runs.selection_record import (
     HiddenCounts,
     Selection,
@@ -84,8 +85,7 @@ def set_part_of(history: RunHistory) -> SetPart | None:
     selection = read_selection(run.folder) if run.on_set else None
     if selection is None:
         return None
-    at = f"k{selection.k:02d}", f"j{selection.j}"
-    driven = list(_driven(run.folder.joinpath("iterations", *at)))
+    driven = list(_driven(run.folder / candidate_at(selection.k, selection.j)))
     episodes = [each for _, named in driven for _, each in named]
     failed = sum(not each.success for each in episodes)
     drawn, problem = list[DrawnFailure](), ""

@@ -19,16 +19,17 @@ from tdac_agent.runs.run_record import (
     Attempt,
     Run,
     at_work,
+    candidate_at,
     load_rules,
     load_run,
     status_now,
 )
 from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.journal import read_records
+from tdac_agent.storage.printable_record import load_record
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TdacError
-from tdac_envs.core.intake import RECORD_BYTES, parse_json
 
 MOST_BYTES = 8 << 20
 T = TypeVar("T")
@@ -187,7 +188,7 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
     begun = {_numbers(path) for path in (run.folder / "iterations").glob("k*/j*")}
     for k, j in sorted({*judged, *begun} - {(0, 0)}):
         attempt = judged.get((k, j))
-        at = f"iterations/k{k:02d}/j{j}"
+        at = candidate_at(k, j)
         folder = run.folder / at
         has_report = attempt is not None and attempt.valid and not attempt.unchanged
         has_report = has_report and not run.on_set
@@ -239,8 +240,7 @@ def _state(attempt: Attempt | None) -> State:
 
 def _report(folder: Path, name: str, problems: list[str]) -> Report | None:
     try:
-        content = read_inside(folder, name, RECORD_BYTES)
-        return Report.model_validate(parse_json(content))
+        return load_record(Report, folder, name)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "damaged"
         problems.append(f"{'/'.join((folder / name).parts[-4:])}: {reason}")

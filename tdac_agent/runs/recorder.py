@@ -30,6 +30,8 @@ from tdac_agent.runs.run_record import (
     Attempt,
     Run,
     Status,
+    call_file,
+    candidate_at,
 )
 from tdac_agent.storage.blobs import Blobs
 from tdac_agent.storage.files import write_atomic, write_if_changed
@@ -405,13 +407,11 @@ class Recorder:
         return Blobs(self.run.folder / "blobs")
 
     def _call_file(self, request: Request, what: str) -> Path:
-        """Path such as `edit.reply.md`; `edit.reply-2.md` for the second question."""
         _, k, j = request.sample
-        suffix = f"-{request.turn + 1}" if request.turn else ""
-        return self._folder(k, j) / f"{request.kind}.{what}{suffix}.md"
+        return self._folder(k, j) / call_file(request.kind, what, request.turn + 1)
 
     def _folder(self, k: int, j: int) -> Path:
-        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        folder = self.run.folder / candidate_at(k, j)
         folder.mkdir(parents=True, exist_ok=True)
         return folder
 

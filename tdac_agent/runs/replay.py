@@ -16,7 +16,7 @@ from tdac_agent.models.provider import PermanentFault, Reply, Request
 from tdac_agent.prompting.rules import BEGIN
 from tdac_agent.runs.journal_state import reply_of
 from tdac_agent.runs.ownership import OURS, is_own_folder
-from tdac_agent.runs.run_record import JOURNAL, load_run
+from tdac_agent.runs.run_record import JOURNAL, call_file, candidate_at, load_run
 from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.hashes import sha256_of_json
 from tdac_agent.storage.journal import JournalRecord, read_records
@@ -147,10 +147,9 @@ class Replay:
 
 def _files(place: Place, number: int) -> tuple[Path, Path]:
     """Files of question and answer of the numbered call of its kind, in a run."""
-    kind, k, j = place
-    calls = Path("iterations") / f"k{k:02d}" / f"j{j}"
-    suffix = "" if number == 1 else f"-{number}"
-    return calls / f"{kind}.prompt{suffix}.md", calls / f"{kind}.reply{suffix}.md"
+    kind, *at = place
+    prompt, answer = (call_file(kind, what, number) for what in ("prompt", "reply"))
+    return candidate_at(*at) / prompt, candidate_at(*at) / answer
 
 
 def _place(record: JournalRecord) -> tuple[Any, Any, Any]:

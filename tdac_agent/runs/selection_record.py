@@ -4,22 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field
 
-from tdac_agent.storage.files import read_inside
-from tdac_agent.storage.printable_record import PrintableRecord
-from tdac_envs.core.intake import RECORD_BYTES, parse_json
+from tdac_agent.storage.printable_record import FrozenRecord, read_record
 
 SELECTION_FILE = "report.json"
 HIDDEN_FILE = "hidden.json"
 """Report on the selected controller on hidden worlds: sums alone."""
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Scores(_Record):
+class Scores(FrozenRecord):
     """Means over a fixed number of worlds, each in [0, 1]."""
 
     success: float
@@ -28,7 +22,7 @@ class Scores(_Record):
     barn: float = Field(description="The metric of BARN, at most 0.5.")
 
 
-class CandidateFigures(_Record):
+class CandidateFigures(FrozenRecord):
     """How a candidate drove, in numbers of worlds of `dev`."""
 
     k: int
@@ -46,7 +40,7 @@ class CandidateFigures(_Record):
     )
 
 
-class Improvement(_Record):
+class Improvement(FrozenRecord):
     """The selected controller beside what it improves, on worlds that decided nothing.
 
     Both drove on the same worlds. The interval is that of a paired bootstrap over
@@ -67,7 +61,7 @@ class Improvement(_Record):
     )
 
 
-class Selection(_Record):
+class Selection(FrozenRecord):
     """`report.json` of a run on a task set: what was selected, and from what.
 
     The figures of the selected candidate are optimistic: it was chosen by them.
@@ -104,17 +98,13 @@ class Selection(_Record):
 
 def read_selection(folder: Path) -> Selection | None:
     """What a run selected; None if there is no readable record."""
-    try:
-        content = parse_json(read_inside(folder, SELECTION_FILE, RECORD_BYTES))
-        return Selection.model_validate(content)
-    except (OSError, ValueError, ValidationError):
-        return None
+    return read_record(Selection, folder, SELECTION_FILE)
 
 
-class HiddenCounts(PrintableRecord):
+class HiddenCounts(FrozenRecord):
     """How often the selected controller reached the goal on hidden worlds."""
 
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(extra="ignore")
 
     worlds: int
     successes: int
@@ -122,8 +112,4 @@ class HiddenCounts(PrintableRecord):
 
 def read_hidden(folder: Path) -> HiddenCounts | None:
     """The counts of a run on hidden worlds; None if there is no readable record."""
-    try:
-        content = parse_json(read_inside(folder, HIDDEN_FILE, RECORD_BYTES))
-        return HiddenCounts.model_validate(content)
-    except (OSError, ValueError, ValidationError):
-        return None
+    return read_record(HiddenCounts, folder, HIDDEN_FILE)

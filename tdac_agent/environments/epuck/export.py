@@ -12,9 +12,10 @@ from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.storage.printable_record import read_record
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.wbt.writer import write_world
 
@@ -120,12 +121,9 @@ def _read(path: Path) -> bytes:
 
 def _verified_steps(run_folder: Path) -> int | None:
     """Returns the steps of the nominal episode according to the run's report."""
-    try:
-        raw = read_file(run_folder / "report.json", RECORD_BYTES)
-        report = Report.model_validate(parse_json(raw))
-    except (OSError, ValueError):
-        return None
-    steps = [e.steps for e in report.episodes if e.name == "nominal"]
+    report = read_record(Report, run_folder, "report.json")
+    episodes = () if report is None else report.episodes
+    steps = [e.steps for e in episodes if e.name == "nominal"]
     return steps[0] if steps else None
 
 
