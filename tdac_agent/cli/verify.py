@@ -71,7 +71,8 @@ def run(
         if junit is not None:
             write_junit(report, junit)
         if report.passed and not report.provenance.paper:
-            again = mark_verified(file.parent, report.provenance.task_sha256)
+            about = report.provenance
+            again = mark_verified(file, about.task_sha256, about.profile)
             print(again, end="\n" * bool(again), file=sys.stderr)
         if not as_json:
             _show(report, out, task)

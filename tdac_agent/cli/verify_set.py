@@ -96,7 +96,7 @@ def run(
             watch=watch,
         )
     if report.passed and report.sequential is not None:
-        again = mark_verified(file.parent, report.provenance.set_sha256)
+        again = mark_verified(file, report.provenance.set_sha256, "policy")
         print(again, end="\n" * bool(again), file=sys.stderr)
     if as_json:
         sys.stdout.write(report.model_dump_json(indent=2) + "\n")

@@ -125,21 +125,24 @@ def mark_anew(run: Run) -> None:
     write_atomic(run.folder / RUN_FILE, run.model_dump_json(indent=2) + "\n")
 
 
-def mark_verified(folder: Path, about_sha256: str) -> str:
+def mark_verified(file: Path, about_sha256: str, profile: str) -> str:
     """Marks the run of an earlier version whose controller was verified again.
 
     Args:
-        folder: The folder of the controller.
+        file: The controller.
         about_sha256: Hash of the task or task set that it was verified on.
+        profile: The profile of the tests.
 
     Returns:
         What was done, as one line; empty if nothing was.
     """
+    folder = file.parent
     try:
         run = load_run(folder)
-    except (RunError, OSError):
+    except RunError:
         return ""
-    wanted = run.tau is not None and run.task_sha256 == about_sha256
+    same = (run.task_sha256, run.profile, run.controller.name)
+    wanted = run.tau is not None and same == (about_sha256, profile, file.name)
     if not wanted or at_work(folder) or not has_earlier_mark(run):
         return ""
     mark_anew(run)

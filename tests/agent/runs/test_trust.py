@@ -302,7 +302,12 @@ def test_an_earlier_mark_is_no_way_around(tdac, run):
     swap_the_controller(run, run)
     assert tdac("verify", run, "--trust")[0] == 1
     assert not is_own_folder(load_run(run))
-    assert mark_verified(run, "0" * 64) == ""
+    known = load_run(run)
+    same, file = (known.task_sha256, known.profile), run / "controller.py"
+    assert mark_verified(file, "0" * 64, known.profile) == ""
+    assert mark_verified(file, known.task_sha256, "paper") == ""
+    assert mark_verified(run / "other.py", *same) == ""
+    assert mark_verified(file, *same) == f"{run} is marked anew"
 
 
 @pytest.mark.parametrize("file", ["prompt.j2", "suite/conftest.py", "suite/data.json"])
