@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import shutil
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -33,20 +32,17 @@ from tdac_agent.runs.run_record import (
     call_file,
     candidate_at,
 )
+from tdac_agent.runs.task_files import write_task
 from tdac_agent.storage.blobs import Blobs
 from tdac_agent.storage.files import write_atomic, write_if_changed
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.installation import lasting_secret
-from tdac_agent.tasks.task import Task, portable_task_file, write_workdir
+from tdac_agent.tasks.task import Task, portable_task_file
 from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.verification.diagnosis.report import Report
-from tdac_envs.core.intake import IMAGE_BYTES, read_file
-from tdac_envs.mapping.map_folder import png
 
 MOST_LINES = 5000
 """Longest source that is diffed; the time grows with the square of the length."""
-PREVIEW_FILE = "preview.png"
-"""Picture of the map or world as it was read."""
 Event = Callable[[dict[str, Any]], None]
 
 
@@ -91,7 +87,7 @@ class Recorder:
         """
         last = TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE)
         own = self.run.folder / OWN_SUITE if task.suite else None
-        self.begin(partial(_write_task, task), last, template, given, own, **facts)
+        self.begin(partial(write_task, task), last, template, given, own, **facts)
 
     def begin(
         self,
@@ -417,19 +413,6 @@ class Recorder:
 
     def _elapsed(self) -> float:
         return self.past.seconds + time.monotonic() - self._clock
-
-
-def _write_task(task: Task, folder: Path) -> None:
-    """Writes what a run on a task is about: the working files, tests, the original."""
-    write_workdir(folder, task)
-    write_atomic(folder / PREVIEW_FILE, png(task.setting.preview()))
-    if task.suite is not None:
-        ignored = shutil.ignore_patterns("__pycache__")
-        own = folder / OWN_SUITE
-        shutil.copytree(task.suite, own, ignore=ignored, dirs_exist_ok=True)
-    original = task.setting.original
-    if original is not None:
-        write_atomic(folder / original.name, read_file(original.file, IMAGE_BYTES))
 
 
 def _about(request: Request, key: str) -> dict[str, Any]:
