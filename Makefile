@@ -16,7 +16,8 @@
 #                     after an interruption it goes on.
 #   make docs         The site, in build/site, with its links checked and its notebooks run.
 #   make linkcheck    Links to other sites; needs a network.
-#   make lint         Style, types, import rules, circles of imports and long modules.
+#   make lint         Style, types, import rules, circles of imports, long modules, and reads
+#                     of files that bypass the safe reader.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -75,6 +76,7 @@ lint: $(VENV)/.lint-installed
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m tools.sizes >/dev/null
+	$(BIN)/python -m tools.raw_reads
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)

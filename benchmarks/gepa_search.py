@@ -65,10 +65,10 @@ from tdac_agent.set_synthesis.trials import (
     first_world,
 )
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.synthesis.dialogue import ModelAnswer
 from tdac_agent.synthesis.improve import ImprovingSearch
 from tdac_agent.synthesis.workload import Shares, shares
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.episode_report import (
     EpisodeProvenance,
     EpisodeReport,

@@ -20,7 +20,7 @@ import numpy as np
 
 from tdac_agent.episodes.episode import not_driven, run_policy
 from tdac_agent.sandbox import ControllerFault
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.episode_job import row_of
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.set_files import write_files

@@ -30,7 +30,7 @@ from scipy import stats
 from benchmarks.recorded_answers import driven_on, episodes_in, interval
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.store import kept_report
 from tdac_agent.verification.verify_episodes import verify_episodes

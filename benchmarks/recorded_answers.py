@@ -32,7 +32,7 @@ from scipy import stats
 from tdac_agent.builtin.level import LEVELS
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.salt import SEALED, drawn_salt

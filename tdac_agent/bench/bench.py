@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,6 +32,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import Executor
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.runs.ownership import load_task
+from tdac_agent.storage.csv_file import TABLE_BYTES, read_rows
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.provenance import versions
@@ -155,6 +157,22 @@ def publish(out: Path, rows: Sequence[dict[str, Any]], salt_file: Path | None) -
     write_atomic(out / WORLD_TABLE, pd.DataFrame(rows).to_csv(index=False))
     if salt_file is not None:
         write_atomic(out / SALT, f"{read_salt(salt_file).hex()}\n")
+
+
+def read_worlds(file: Path) -> pd.DataFrame:
+    """The table of `publish`.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: It is not such a table.
+    """
+    key = ["set", "entrant", "file", "index"]
+    figures = ["success", "time_score"]
+    read_rows(file, [*key, *figures], key)
+    table = pd.read_csv(io.BytesIO(read_file(file, TABLE_BYTES)))
+    if table[figures].astype(float).isna().any(axis=None):
+        raise ValueError("a row without success or time_score")
+    return table
 
 
 def _record(out: Path, entries: Sequence[Entry], worlds: int) -> None:

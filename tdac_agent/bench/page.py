@@ -13,6 +13,7 @@ from tdac_agent.html_report.animation import encoded, shares
 from tdac_agent.html_report.page import rendered
 from tdac_agent.html_report.scene import TaskPicture, data_address, picture_of
 from tdac_agent.storage.files import write_atomic
+from tdac_envs.core.intake import IMAGE_BYTES, read_file
 from tdac_envs.ladder.picture import backdrop_of
 from tdac_envs.ladder.task_sets import AnyTask
 
@@ -78,7 +79,7 @@ def write_page(
             }
         )
     pictures = [
-        (name, data_address((out / name).read_bytes(), "image/svg+xml"))
+        (name, data_address(read_file(out / name, IMAGE_BYTES), "image/svg+xml"))
         for name in figures
     ]
     values = {"bench": found, "sections": sections, "figures": pictures}

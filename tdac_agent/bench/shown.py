@@ -9,15 +9,15 @@ import numpy as np
 import pandas as pd
 
 from tdac_agent.bench.arena import DRIVEN, folder_of, sealed_episodes, world_rows
-from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, publish
+from tdac_agent.bench.bench import RESULTS, WORLD_TABLE, publish, read_worlds
 from tdac_agent.bench.compared import Driven, overall_of, pairs_of
 from tdac_agent.bench.figures import draw_figures
 from tdac_agent.bench.page import PAGE, write_page
 from tdac_agent.bench.record import Bench, BenchRow, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.locks import LOCK_FILE, own_folder
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.salt import SEALED
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, read_file
@@ -143,8 +143,11 @@ def _short(value: object) -> str:
 
 
 def _table(folder: Path) -> pd.DataFrame:
+    file = folder / WORLD_TABLE
     try:
-        return pd.read_csv(folder / WORLD_TABLE)
+        return read_worlds(file)
+    except ValueError as error:
+        raise RunError(f"{file}: {one_line_reason(error)}") from error
     except OSError as error:
         raise RunError(
             f"{folder / WORLD_TABLE}: {one_line_reason(error)}; results on sealed "

@@ -49,7 +49,7 @@ class LevelController:
         if request.kind == "improve":
             source, notes = varied(request.controller or "", request.sample)
             return Reply(f"```python\n{source}```\n", notes=notes)
-        source = self._file.read_text(encoding="utf-8")
+        source = self._file.read_text(encoding="utf-8")  # raw read: shipped
         note = f"the built-in controller of the level {self._file.stem}"
         return Reply(f"```python\n{source}```\n", notes=(note,))
 

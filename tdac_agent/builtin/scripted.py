@@ -20,9 +20,9 @@ from tdac_agent.builtin.provider import template_of
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import Kind, Reply, Request
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.shipped import shipped
 from tdac_agent.storage.yaml_file import read_yaml
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.setting import Setting
 from tdac_envs.core.errors import hint
 from tdac_envs.core.intake import TEXT_BYTES, read_file

@@ -29,7 +29,7 @@ class Template(Generic[P]):
         """Returns the source of the controller with these parameters."""
         template = jinja2.Environment(
             undefined=jinja2.StrictUndefined, keep_trailing_newline=True
-        ).from_string(self.file.read_text(encoding="utf-8"))
+        ).from_string(self.file.read_text(encoding="utf-8"))  # raw read: shipped
         tuning = [
             {
                 "constant": item.name.upper(),

@@ -12,7 +12,10 @@ from tdac_agent.campaign.config import CampaignError
 from tdac_agent.campaign.perform import RUNS, Outcome, Terms, read_outcome, work_of
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
 from tdac_agent.campaign.progress import Progress, RunEnded, RunUpdate
+from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import Ended, Executor
+from tdac_agent.runs.ownership import is_own_folder
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.locks import own_folder
 
@@ -115,6 +118,22 @@ def campaign_folder(out: Path, shard: Shard, config: str) -> Generator[None]:
         except OSError as error:
             raise CampaignError(f"cannot write to {out}: {error.strerror}") from error
         yield
+
+
+def foreign_runs(plan: Plan, runs: Path) -> int:
+    """Number of finished runs that this installation did not write as they are.
+
+    Those of other shards can be from other machines, so they count.
+    """
+    return sum(_is_foreign(runs / planned.name) for planned in plan.all())
+
+
+def _is_foreign(folder: Path) -> bool:
+    try:
+        run = load_run(folder)
+    except RunError:
+        return False
+    return run.finished and not is_own_folder(run)
 
 
 def unplanned_folders(plan: Plan, runs: Path) -> list[str]:

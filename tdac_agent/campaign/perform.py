@@ -18,7 +18,7 @@ from tdac_agent.executors.executor import Work
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.retry import RetryPolicy
-from tdac_agent.runs.ownership import load_task
+from tdac_agent.runs.ownership import is_own_folder, load_task, mark_anew
 from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run
 from tdac_agent.runs.selection_record import HIDDEN_FILE
@@ -136,7 +136,10 @@ def perform(
         reason = " ".join(str(error).split())
         return Outcome(planned.name, "error", f"{type(error).__name__}: {reason}")
     if terms.keep == "records" and run.finished:
+        own = is_own_folder(run)
         _thin_out(run.folder)
+        if own:
+            mark_anew(run)
     return _outcome(planned.name, run)
 
 

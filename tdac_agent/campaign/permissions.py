@@ -8,9 +8,10 @@ from pathlib import Path
 
 from tdac_agent.campaign.config import CampaignConfig
 from tdac_agent.prompting.prompt import VARIANTS
+from tdac_agent.storage.hashes import sha256_of_file
 from tdac_agent.storage.shipped import shipped
 from tdac_agent.tasks.task import Task
-from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish
+from tdac_agent.tasks.trust import Wish, asking, suite_wish
 
 
 def required_permissions(
@@ -35,7 +36,7 @@ def required_permissions(
     for name in config.prompts:
         if name not in VARIANTS:
             template = base / name
-            digest = file_sha256(template) if template.is_file() else ""
+            digest = sha256_of_file(template) if template.is_file() else ""
             yield Wish(f"fill in the template {template}", (), digest)
     for task in tasks:
         if task.suite is not None and not task.trusted:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
 import json
 import re
@@ -25,6 +24,7 @@ from tdac_agent.prompting.prompt import (
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.run_record import Setting
+from tdac_agent.storage.hashes import sha256_of, sha256_of_json
 from tdac_agent.tasks.setting import Setting as TaskSetting
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import bundled_task
@@ -250,7 +250,7 @@ def _cell(
     question = _question(task, load_template(template))
     hashed = facts | {
         **_hashes(task),
-        "prompt": hashlib.sha256(question.encode("utf-8", "surrogatepass")).hexdigest(),
+        "prompt": sha256_of(question),
         "version": importlib.metadata.version("tdac"),
         "seed": config.seed,
     }
@@ -259,7 +259,7 @@ def _cell(
         answers = answers_sha256(model, options)
         if answers is not None:
             hashed[f"answers of {model}"] = answers
-    digest = hashlib.sha256(json.dumps(hashed, sort_keys=True).encode()).hexdigest()
+    digest = sha256_of_json(hashed)
     shown = [
         facts["task_name"],
         learner,

@@ -9,10 +9,16 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-import pandas as pd
 from rich.markup import escape
 
-from tdac_agent.bench.bench import RESULTS, SALT, TIMING, WORLD_TABLE, bench
+from tdac_agent.bench.bench import (
+    RESULTS,
+    SALT,
+    TIMING,
+    WORLD_TABLE,
+    bench,
+    read_worlds,
+)
 from tdac_agent.bench.entrants import Named, named
 from tdac_agent.bench.page import PAGE
 from tdac_agent.bench.record import Bench
@@ -141,7 +147,7 @@ def _say_how_to_watch(
     rows = folder / WORLD_TABLE
     if not own or not rows.is_file() or not any(row.time for row in found.rows):
         return
-    entrant, table = own[0], pd.read_csv(rows)
+    entrant, table = own[0], read_worlds(rows)
     for name, tasks in zip(names, found.sets, strict=True):
         mine = table[(table["set"] == tasks.name) & (table["entrant"] == entrant.name)]
         failed = mine[mine["success"] == 0]["index"]

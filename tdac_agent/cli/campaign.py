@@ -16,6 +16,7 @@ from rich.markup import escape
 from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
 from tdac_agent.campaign.drive import (
     campaign_folder,
+    foreign_runs,
     read_progress,
     run_all,
     unplanned_folders,
@@ -189,6 +190,11 @@ def _print_notes(console: Console, plan: Plan, terms: Terms) -> None:
         kinds = f"{len(others)} other kind{'' if len(others) == 1 else 's'} of run"
         note = f"ignoring {kinds} in {terms.runs}: of an earlier file, task, suite or"
         print_sentences(console, f"note: {note} version", "yellow")
+    foreign = foreign_runs(plan, terms.runs)
+    if foreign:
+        these = "1 finished run" if foreign == 1 else f"{foreign} finished runs"
+        note = f"{these} in {terms.runs} did not end here or changed since: counted as"
+        print_sentences(console, f"note: {note} their files claim", "yellow")
 
 
 def _print_ending(

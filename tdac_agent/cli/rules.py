@@ -16,6 +16,7 @@ from tdac_agent.prompting.given_rules import GIVEN, shared_rules, written
 from tdac_agent.prompting.rules import RepairRule, RuleBook
 from tdac_agent.runs.run_record import Run, load_rules, load_run
 from tdac_agent.storage.files import write_atomic
+from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 _COLOURS = {"in force": "green", "dropped": "red", "made room": "yellow"}
 
@@ -60,7 +61,7 @@ def export(folders: list[Path], out: Path) -> int:
     heading = f"Learnt on {tasks} by {authors}."
     text = written(rules, heading)
     try:
-        if out.is_file() and out.read_text(encoding="utf-8") != text:
+        if out.is_file() and read_file(out, TEXT_BYTES) != text.encode():
             raise RunError(
                 f"{out} exists and has other rules: delete it, or give another --out"
             )

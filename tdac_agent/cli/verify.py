@@ -53,6 +53,7 @@ def run(
     gc.enable()
     with WarmJudge(child_pool) as judge:
         # Imported while the judge starts.
+        from tdac_agent.runs.ownership import mark_verified
         from tdac_agent.verification.verify import verify
 
         with Spinner(f"verifying {file.name} on {task.name} …") as spinner:
@@ -69,6 +70,10 @@ def run(
             )
         if junit is not None:
             write_junit(report, junit)
+        if report.passed and not report.provenance.paper:
+            about = report.provenance
+            again = mark_verified(file, about.task_sha256, about.profile)
+            print(again, end="\n" * bool(again), file=sys.stderr)
         if not as_json:
             _show(report, out, task)
         measured = None

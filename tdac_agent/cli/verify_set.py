@@ -23,6 +23,7 @@ from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.set_flags import SetFlags
 from tdac_agent.cli.verify import check_folder, controller_file
 from tdac_agent.evaluation.policies import BUILTIN
+from tdac_agent.runs.ownership import mark_verified
 from tdac_agent.verification.episode_report import (
     EpisodeReport,
     HiddenCount,
@@ -97,6 +98,9 @@ def run(
             judge=judge,
             watch=watch,
         )
+    if report.passed and report.sequential is not None:
+        again = mark_verified(file, report.provenance.sha256, "policy")
+        print(again, end="\n" * bool(again), file=sys.stderr)
     if as_json:
         sys.stdout.write(report.model_dump_json(indent=2) + "\n")
     else:

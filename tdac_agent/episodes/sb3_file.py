@@ -144,6 +144,7 @@ def read_metadata(file: Path) -> SavedPolicy | None:
 def write_metadata(file: Path, saved: SavedPolicy) -> None:
     """Writes metadata into a policy file, replacing any older metadata."""
     content = io.BytesIO()
+    # raw read: bytes in memory
     with zipfile.ZipFile(file) as old, zipfile.ZipFile(content, "w") as new:
         for item in old.infolist():
             if item.filename != METADATA:

@@ -23,8 +23,8 @@ from tdac_agent.evaluation.controller_file import check_controller
 from tdac_agent.planners.planner import planner_names, planner_on
 from tdac_agent.problems.episodes import episodes_of, planner_sha256, write_set
 from tdac_agent.sandbox import ControllerFault
+from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file
 from tdac_agent.verification.judge.drivers import Kind, PolicySpec
@@ -262,7 +262,7 @@ def _fitted_to_set(entrant: Entrant, tasks: TaskSet) -> Entrant:
     if entrant.kind == "builtin":
         file = controller_of(tasks, "leave out builtin")
         policy = replace(entrant.policy, file=file)
-        return replace(entrant, policy=policy, sha256=sha256_of(file.read_bytes()))
+        return replace(entrant, policy=policy, sha256=sha256_of_file(file))
     if entrant.saved is not None:
         _check_training(entrant.name, entrant.saved, tasks)
     if entrant.kind == "learned":
@@ -335,6 +335,6 @@ def _written_for(task: Task, tier: str) -> tuple[bytes, bool]:
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
         run = synthesize(task, BUILTIN, out=Path(name) / "run", tier=tier)
         if run.verified:
-            return run.controller.read_bytes(), True
+            return run.controller.read_bytes(), True  # raw read: our temporary folder
         candidates = sorted((run.folder / "iterations").rglob("controller.py"))
-        return candidates[-1].read_bytes(), False
+        return candidates[-1].read_bytes(), False  # raw read: our temporary folder

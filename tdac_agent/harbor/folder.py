@@ -18,7 +18,7 @@ from tdac_agent.harbor.wheel import pinned_versions, write_wheel
 from tdac_agent.problems.episodes import episodes_of, write_set
 from tdac_agent.problems.problem import LevelProblem, Problem, TaskProblem
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.verification.salt import SALT_BYTES

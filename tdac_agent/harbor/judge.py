@@ -19,7 +19,7 @@ from tdac_agent.runs.ownership import load_task
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_envs.core.errors import TdacError
-from tdac_envs.core.intake import parse_json
+from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import load_set
 
 WORLDS_FILE = "worlds.json"
@@ -38,7 +38,7 @@ def problem_in(tests: Path) -> Problem:
     """
     if (tests / TASK_FOLDER / TASK_FILE).is_file():
         return TaskProblem(load_task(tests / TASK_FOLDER))
-    worlds = parse_json((tests / WORLDS_FILE).read_bytes())
+    worlds = parse_json(read_file(tests / WORLDS_FILE, TEXT_BYTES))
     tasks = load_set(tests / SET_FILE)
     return LevelProblem(tasks, worlds, "hidden", tests / SALT_FILE)
 
@@ -72,7 +72,7 @@ def _read(path: Path) -> tuple[bytes | None, str]:
         return None, f"{path.name} is not an ordinary file"
     if about.st_size > MOST_BYTES:
         return None, f"{path.name} is larger than {MOST_BYTES} bytes"
-    return path.read_bytes(), ""
+    return read_file(path, MOST_BYTES), ""
 
 
 def _write(path: Path, values: object) -> None:

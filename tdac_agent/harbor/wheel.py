@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import re
 import zipfile
 from collections.abc import Iterator
 from importlib.metadata import distribution
 from pathlib import Path
 
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.shipped import shipped, shipped_names
 
 PACKAGE = "tdac"
@@ -33,6 +33,7 @@ def write_wheel(folder: Path) -> Path:
     info = f"{stem}.dist-info"
     files = dict(_sources())
     for name in FACTS:
+        # raw read: shipped
         files[f"{info}/{name}"] = (about.read_text(name) or "").encode()
     files[f"{info}/WHEEL"] = (
         f"Wheel-Version: 1.0\nGenerator: tdac\nRoot-Is-Purelib: true\nTag: {TAG}\n"
@@ -67,14 +68,15 @@ def _sources() -> Iterator[tuple[str, bytes]]:
             name = file.relative_to(ROOT)
             is_made = "__pycache__" in name.parts or name.is_relative_to(CONFIGS)
             if file.is_file() and not is_made:
-                yield name.as_posix(), file.read_bytes()
+                yield name.as_posix(), file.read_bytes()  # raw read: shipped
     for config in shipped_names("**/*"):
         if shipped(config).is_file():
+            # raw read: shipped
             yield f"{CONFIGS}/{config}", shipped(config).read_bytes()
 
 
 def _hash(raw: bytes) -> str:
-    digest = base64.urlsafe_b64encode(hashlib.sha256(raw).digest())
+    digest = base64.urlsafe_b64encode(bytes.fromhex(sha256_of(raw)))
     return f"sha256={digest.decode().rstrip('=')}"
 
 

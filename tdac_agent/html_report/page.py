@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import functools
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +24,7 @@ from tdac_agent.html_report.section import (
 )
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.history import RunHistory, gather_run, learner_named, run_folders
+from tdac_agent.storage.hashes import sha256_of
 
 MOST_BYTES = 24 << 20
 """Limit for the details of all runs; further runs are only listed."""
@@ -187,6 +187,7 @@ def short_test(test: str) -> str:
 
 
 def _text(name: str) -> str:
+    # raw read: shipped
     return (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
 
 
@@ -197,5 +198,5 @@ def own_script() -> str:
 
 def _hash(script: str) -> str:
     """The hash by which a content security policy allows a script."""
-    digest = hashlib.sha256(script.encode()).digest()
+    digest = bytes.fromhex(sha256_of(script))
     return f"sha256-{base64.b64encode(digest).decode()}"

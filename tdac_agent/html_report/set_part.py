@@ -13,7 +13,8 @@ from tdac_agent.html_report.scene import data_address
 from tdac_agent.models.picture import MEDIA_TYPE
 from tdac_agent.runs.episode_pictures import failure_pictures
 from tdac_agent.runs.history import RunHistory
-from tdac_agent.runs.ownership import is_own_folder
+from tdac_agent.runs.ownership import remark_on
+from tdac_agent.runs.run_record import candidate_at
 from tdac_agent.runs.selection_record import (
     HiddenCounts,
     Selection,
@@ -81,17 +82,17 @@ def set_part_of(history: RunHistory) -> SetPart | None:
     selection = read_selection(run.folder) if run.on_set else None
     if selection is None:
         return None
-    at = f"k{selection.k:02d}", f"j{selection.j}"
-    driven = list(_driven(run.folder.joinpath("iterations", *at)))
+    driven = list(_driven(run.folder / candidate_at(selection.k, selection.j)))
     episodes = [each for _, named in driven for _, each in named]
     failed = sum(not each.success for each in episodes)
     drawn, problem = list[DrawnFailure](), ""
     try:
-        if failed and is_own_folder(run):
+        remark = remark_on(run) if failed else ""
+        if failed and not remark:
             tasks = load_set(run.folder / SET_FILE)
             drawn += itertools.islice(_drawn(tasks, driven), MOST_DRAWN)
         elif failed:
-            problem = "this installation did not begin the run"
+            problem = remark.removeprefix(f"{run.folder} ")
     except (TdacError, OSError, ValueError) as error:
         problem = str(error)
     hidden = read_hidden(run.folder)

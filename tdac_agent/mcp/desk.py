@@ -20,10 +20,10 @@ from tdac_agent.mcp.judging import Judging, Submission
 from tdac_agent.mcp.submitted import source_of
 from tdac_agent.mcp.watch import Watch
 from tdac_agent.runs.recorder import Recorder
-from tdac_agent.runs.run_record import JOURNAL, Run
+from tdac_agent.runs.run_record import JOURNAL, Run, candidate_at
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.plain import one_line
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_envs.core.errors import TdacError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
@@ -206,7 +206,7 @@ class Desk:
         return self.run.folder / JOURNAL
 
     def _folder(self, number: int) -> Path:
-        return self.run.folder / "iterations" / f"k{number:02d}" / "j0"
+        return self.run.folder / candidate_at(number, 0)
 
     def _source(self, number: int) -> str | None:
         """The source of a submission on disk; None if there is none."""

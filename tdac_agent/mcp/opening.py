@@ -16,7 +16,7 @@ from tdac_agent.mcp.watch import Watch
 from tdac_agent.models.budget import Budget
 from tdac_agent.prompting.prompt import FULL
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
-from tdac_agent.runs.ownership import is_own_folder
+from tdac_agent.runs.ownership import remark_on
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.resume import check_same, existing_run, recorded_task
 from tdac_agent.runs.run_record import AGENT, Agent, Run
@@ -124,13 +124,11 @@ class _Opening:
         run: Its record, if it is new.
         start: Writes its files; see `open_record`.
         judging: Makes what judges its submissions.
-        suite: The user's own tests, if there are any.
     """
 
     run: Run
     start: Callable[..., None]
     judging: Callable[[Recorder, WarmJudge], OnTask | OnSet]
-    suite: Path | None = None
 
 
 def _on_task(task: Task, out: Path, episodes: int) -> _Opening:
@@ -150,7 +148,6 @@ def _on_task(task: Task, out: Path, episodes: int) -> _Opening:
         run,
         partial(Recorder.start, task=task, template=FULL, given=None),
         lambda recorder, judge: OnTask(recorder, Tests(task, judge, TIER)),
-        task.suite,
     )
 
 
@@ -196,7 +193,7 @@ def _recorder(opening: _Opening, before: Run | None) -> Recorder:
         if "unconfined" in (before.agent, run.agent):
             run.agent = "unconfined"
     account = Account(Budget(), {})
-    return open_record(opening.start, run, before, account, None, opening.suite)
+    return open_record(opening.start, run, before, account, None)
 
 
 def _check_ours(before: Run) -> None:
@@ -205,8 +202,6 @@ def _check_ours(before: Run) -> None:
     Raises:
         RunError: Another installation began it.
     """
-    if lasting_secret() is not None and not is_own_folder(before):
-        raise RunError(
-            f"{before.folder} contains a run that this installation did not begin: "
-            "give a new folder with --out"
-        )
+    remark = remark_on(before) if lasting_secret() is not None else ""
+    if remark:
+        raise RunError(f"{remark}: give a new folder with --out")

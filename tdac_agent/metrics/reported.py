@@ -14,6 +14,8 @@ from tdac_agent.metrics.frames import (
     frames_from_tau,
     join_frames,
 )
+from tdac_agent.storage.csv_file import read_rows
+from tdac_envs.core.errors import one_line_reason
 
 PAPER_K = 20
 LABELS = {*RUN_COLUMNS, "environment"} - {"tau"}
@@ -38,10 +40,9 @@ def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
         RunError: The file cannot be read, or a column or row is missing.
     """
     try:
-        table = pd.read_csv(path, dtype=str, keep_default_na=False)
+        table = pd.DataFrame(read_rows(path))
     except (OSError, ValueError) as error:
-        reason = str(error).partition("\n")[0]
-        raise RunError(f"cannot read {path}: {reason}") from error
+        raise RunError(f"cannot read {path}: {one_line_reason(error)}") from error
     for name in ("tau", *only):
         if name not in table:
             known = ", ".join(table.columns)

@@ -103,6 +103,7 @@ class Command:
 def _unstarted(program: str, error: OSError) -> ProviderFault:
     """The fault if a program cannot be started; a script's interpreter is named."""
     first = b""
+    # raw read: a program to run
     with suppress(OSError), open(shutil.which(program) or program, "rb") as file:
         first = file.readline(200).rstrip()
     line = first.decode("utf-8", "replace")

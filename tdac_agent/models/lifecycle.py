@@ -29,6 +29,7 @@ class Lifecycle(BaseModel):
 @functools.cache
 def load_lifecycle() -> Lifecycle:
     """Returns the contents of the shipped file."""
+    # raw read: shipped
     return Lifecycle.model_validate(yaml.safe_load(FILE.read_text("utf-8")))
 
 

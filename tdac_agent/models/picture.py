@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+
+from tdac_agent.storage.hashes import sha256_of
 
 LARGEST_SIDE = 1024
 """Longest side of a picture, px."""
@@ -52,7 +53,7 @@ class Picture:
     @property
     def sha256(self) -> str:
         """Hash of the content."""
-        return hashlib.sha256(self.png).hexdigest()
+        return sha256_of(self.png)
 
     @property
     def base64(self) -> str:

@@ -93,6 +93,7 @@ def source_of(name: str) -> str:
     """The file of a planner with its own values, after the parts that it shares."""
     parts = [FOLDER / "parts" / f"{part}.py" for part in _known()[name].parts]
     files = [*parts, FOLDER / f"{name.replace('-', '_')}.py"]
+    # raw read: shipped
     return "\n\n".join(file.read_text(encoding="utf-8") for file in files)
 
 

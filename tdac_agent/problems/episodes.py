@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from tdac_agent.sandbox import Limits
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.first_run import compile_first
-from tdac_agent.tasks.provenance import origin, sha256_of, versions
+from tdac_agent.tasks.provenance import origin, versions
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.verification.judge.drivers import PolicySpec
@@ -309,6 +310,7 @@ class OfSet:
 def planner_sha256() -> str:
     """Hash of the source code of the planners that know the world in advance."""
     files = (space_time.__file__, orca_driver.__file__)
+    # raw read: shipped
     return sha256_of(b"".join(Path(file).read_bytes() for file in files))
 
 

@@ -102,6 +102,7 @@ class TaskProblem:
         with tempfile.TemporaryDirectory(prefix="tdac-files-") as name:
             folder = Path(name)
             write_workdir(folder, self.task)
+            # raw read: our temporary folder
             return {file.name: file.read_bytes() for file in sorted(folder.iterdir())}
 
     def reference(self) -> str:
@@ -117,6 +118,7 @@ class TaskProblem:
                     f"the learner `builtin` has no verified controller for the task "
                     f"{self.task.name}"
                 )
+            # raw read: our temporary folder
             return run.controller.read_text(encoding="utf-8")
 
     def judge(self, source: bytes, poll: Poll) -> Judged:
@@ -183,6 +185,7 @@ class LevelProblem:
 
     def reference(self) -> str:
         """See `Problem`."""
+        # raw read: shipped
         return controller_of(self.tasks, "ask a model").read_text(encoding="utf-8")
 
     def judge(self, source: bytes, poll: Poll) -> Judged:

@@ -10,7 +10,7 @@ from typing import Literal, TypeVar
 from tdac_agent.episodes.trajectory import Trajectory, nominal_first
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.rules import RuleBook
-from tdac_agent.runs.ownership import load_task
+from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.rule_history import RuleChanges, rule_changes
 from tdac_agent.runs.run_record import (
     AGENT,
@@ -19,15 +19,17 @@ from tdac_agent.runs.run_record import (
     Attempt,
     Run,
     at_work,
+    candidate_at,
     load_rules,
     load_run,
     status_now,
 )
+from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.journal import read_records
+from tdac_agent.storage.printable_record import load_record
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TdacError
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 MOST_BYTES = 8 << 20
 T = TypeVar("T")
@@ -99,6 +101,8 @@ class RunHistory:
             code.
         book: Its rules.
         problems: What could not be read, one line each.
+        foreign: Why its verdict is only a claim, after `this folder`; empty for an own
+            run.
     """
 
     run: Run
@@ -109,6 +113,7 @@ class RunHistory:
     source: str | None
     book: RuleBook
     problems: tuple[str, ...]
+    foreign: str = ""
 
 
 def learner_named(learner: str) -> str:
@@ -135,10 +140,10 @@ def gather_run(source: Path | Run) -> RunHistory:
     sources = [one.source for one in tried if one.source is not None]
     report = verified_source = None
     if run.on_set and run.tau is not None:
-        verified_source = read_text(run.controller)
+        verified_source = read_text(folder, "controller.py")
     elif run.verified:
-        report = _report(folder / "report.json", problems)
-        verified_source = read_text(run.controller)
+        report = _report(folder, "report.json", problems)
+        verified_source = read_text(folder, "controller.py")
         if verified_source is None:
             problems.append("controller.py of the verified run is missing")
     return RunHistory(
@@ -150,6 +155,7 @@ def gather_run(source: Path | Run) -> RunHistory:
         verified_source or (sources[-1] if sources else None),
         _try_to(problems, lambda: load_rules(folder)) or RuleBook(),
         tuple(dict.fromkeys(problems)),
+        "" if before else remark_on(run).removeprefix(f"{folder} "),
     )
 
 
@@ -167,10 +173,10 @@ def run_folders(place: Path) -> list[Path]:
     return found
 
 
-def read_text(path: Path, most: int = MOST_BYTES) -> str | None:
-    """Reads text leniently; None if the file is missing or has over `most` bytes."""
+def read_text(folder: Path, name: str, most: int = MOST_BYTES) -> str | None:
+    """Reads text of a run leniently; None if it cannot be read or is too long."""
     try:
-        return read_file(path, most).decode("utf-8", "replace")
+        return read_inside(folder, name, most).decode("utf-8", "replace")
     except OSError:
         return None
 
@@ -182,7 +188,8 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
     begun = {_numbers(path) for path in (run.folder / "iterations").glob("k*/j*")}
     for k, j in sorted({*judged, *begun} - {(0, 0)}):
         attempt = judged.get((k, j))
-        folder = run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        at = candidate_at(k, j)
+        folder = run.folder / at
         has_report = attempt is not None and attempt.valid and not attempt.unchanged
         has_report = has_report and not run.on_set
         yield CandidateHistory(
@@ -191,9 +198,9 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
             folder,
             _state(attempt),
             attempt,
-            _report(folder / "report.json", problems) if has_report else None,
-            read_text(folder / "controller.py"),
-            read_text(folder / "controller.diff") or "",
+            _report(run.folder, f"{at}/report.json", problems) if has_report else None,
+            read_text(run.folder, f"{at}/controller.py"),
+            read_text(run.folder, f"{at}/controller.diff") or "",
             learnt.get((k, j), RuleChanges()),
             run.on_set,
             _varies(run, k, attempt),
@@ -231,12 +238,12 @@ def _state(attempt: Attempt | None) -> State:
     return "passed" if attempt.passed else "failed"
 
 
-def _report(path: Path, problems: list[str]) -> Report | None:
+def _report(folder: Path, name: str, problems: list[str]) -> Report | None:
     try:
-        return Report.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+        return load_record(Report, folder, name)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "damaged"
-        problems.append(f"{'/'.join(path.parts[-4:])}: {reason}")
+        problems.append(f"{'/'.join((folder / name).parts[-4:])}: {reason}")
         return None
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import FrozenRecord, read_record
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.units import Place
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 IMPROVEMENT_FILE = "improvement.json"
 NOT_SHOWN = "no improvement is shown"
@@ -45,11 +44,7 @@ def goals_text(reached: int, count: int) -> str:
     return f"the goal reached in {reached} of {count} disturbed episodes"
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class MemberFigures(_Record):
+class MemberFigures(FrozenRecord):
     """A verified candidate in the disturbed episodes of the search."""
 
     k: int
@@ -67,7 +62,7 @@ class MemberFigures(_Record):
     )
 
 
-class PairedChange(_Record):
+class PairedChange(FrozenRecord):
     """Means of both controllers in the same episodes, and their difference.
 
     The interval is that of a paired bootstrap over episodes, with 95 % confidence.
@@ -96,7 +91,7 @@ class PairedChange(_Record):
         )
 
 
-class TaskImprovement(_Record):
+class TaskImprovement(FrozenRecord):
     """The search for a better controller, after the first verified one."""
 
     schema_version: int = 1
@@ -156,8 +151,4 @@ class TaskImprovement(_Record):
 
 def read_improvement(folder: Path) -> TaskImprovement | None:
     """What the search of a run brought; None if there is no readable record."""
-    try:
-        content = parse_json(read_file(folder / IMPROVEMENT_FILE, RECORD_BYTES))
-        return TaskImprovement.model_validate(content)
-    except (OSError, ValueError, ValidationError):
-        return None
+    return read_record(TaskImprovement, folder, IMPROVEMENT_FILE)

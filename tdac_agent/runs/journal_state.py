@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterable
@@ -13,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from tdac_agent.models.budget import Amount
 from tdac_agent.models.provider import Provider, Reply, Request, served_at
+from tdac_agent.storage.hashes import sha256_of_json
 from tdac_agent.storage.journal import JournalRecord
 
 KEY_SCHEMA = 1
@@ -44,7 +44,7 @@ def call_key(model: Provider, request: Request) -> str:
     }
     if request.images:
         facts["images"] = [image.sha256 for image in request.images]
-    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()
+    return sha256_of_json(facts)
 
 
 def reply_of(record: JournalRecord, text: str) -> Reply | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hmac
 import json
+import shlex
 from collections.abc import Container, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,11 +12,14 @@ from pathlib import Path
 from tdac_agent.errors import RunError
 from tdac_agent.models.tariff import MAX_COST
 from tdac_agent.prompting.prompt import VARIANTS
-from tdac_agent.runs.run_record import PROMPT_FILE, Run, load_run
+from tdac_agent.runs.mark import MarkedJournal, files_of, is_marked, mark_of
+from tdac_agent.runs.run_record import PROMPT_FILE, RUN_FILE, Run, at_work, load_run
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of_file
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import Task, read_task
-from tdac_agent.tasks.task_file import TaskFile
-from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish, tree_sha256
+from tdac_agent.tasks.task_file import SET_FILE, TaskFile
+from tdac_agent.tasks.trust import Wish, asking, suite_wish
 
 OWN_SUITE = "suite"
 """Subfolder of a run with the tests of its task."""
@@ -41,7 +45,7 @@ def wishes_of(run: Run, suite: Path | None, given: Container[str]) -> Iterator[W
     template = run.folder / PROMPT_FILE
     if run.prompt not in VARIANTS and "prompt" not in given:
         what = f"fill in the template {template}"
-        digest = file_sha256(template) if template.is_file() else ""
+        digest = sha256_of_file(template) if template.is_file() else ""
         yield Wish(what, ("--prompt", str(template)), digest)
     if suite is not None and "suite" not in given:
         yield suite_wish(suite)
@@ -54,32 +58,95 @@ def wishes_of(run: Run, suite: Path | None, given: Container[str]) -> Iterator[W
 
 
 def sign(run: Run, suite: Path | None) -> str:
-    """The mark of a run of this installation; empty if no secret can be kept.
+    """The mark of a run of this installation, with the files that its folder has.
 
-    It is a MAC over everything in the run that can execute code, reach a server or
-    spend money. The files of the run must be in its folder already.
+    It is empty if no secret can be kept, or if the tests cannot be hashed.
     """
-    facts = _facts(run, suite)
-    if facts is None or lasting_secret() is None:
-        return ""
-    return keyed(facts).hex()
+    files = files_of(run.folder, suite)
+    return "" if files is None else mark_of(run, files, MarkedJournal.of(run))
 
 
 def is_own(run: Run, suite: Path | None) -> bool:
-    """Whether this installation began a run, and what its mark covers is unchanged.
+    """Whether this installation wrote a run, and what its mark covers is unchanged.
 
     Args:
         run: The run as recorded.
         suite: Folder with the tests of its task, as recorded.
     """
-    mark = run.mark.encode("utf-8", "surrogatepass")
-    return bool(mark) and hmac.compare_digest(mark, sign(run, suite).encode())
+    return is_marked(run, suite)
+
+
+def suite_in(folder: Path) -> Path | None:
+    """The folder with the user's own tests of a run; None if there are none."""
+    suite = folder / OWN_SUITE
+    return suite if suite.is_dir() else None
 
 
 def is_own_folder(run: Run) -> bool:
     """Like `is_own`, without reading the task: its tests are in the run folder."""
-    suite = run.folder / OWN_SUITE
-    return is_own(run, suite if suite.is_dir() else None)
+    return is_own(run, suite_in(run.folder))
+
+
+def remark_on(run: Run) -> str:
+    """What is to be said before a run is believed or resumed; empty for an own one."""
+    if is_own_folder(run):
+        return ""
+    if has_earlier_mark(run):
+        return f"{run.folder} is {_earlier(run)}"
+    return (
+        f"{run.folder} contains a run that this installation did not begin, or that "
+        "was changed since"
+    )
+
+
+def called(run: Run) -> str:
+    """The folder of a foreign run, with what makes an earlier version's own again."""
+    return f"{run.folder}{f' ({_earlier(run)})' if has_earlier_mark(run) else ''}"
+
+
+def _earlier(run: Run) -> str:
+    about = ["--set", f"{run.folder}/{SET_FILE}", "--split", "hidden"]
+    words = ["tdac", "verify", str(run.folder), *about[: 4 * run.on_set]]
+    command = shlex.join(words)
+    return f"marked by an earlier version; `{command}` marks it anew"
+
+
+def has_earlier_mark(run: Run) -> bool:
+    """Whether a run has a valid mark of an earlier version, which covered less."""
+    facts, mark = _earlier_facts(run), run.mark.encode("utf-8", "surrogatepass")
+    if facts is None or lasting_secret() is None:
+        return False
+    return hmac.compare_digest(mark, keyed(facts).hex().encode())
+
+
+def mark_anew(run: Run) -> None:
+    """Marks a run as its folder is now; only after all of that has been checked."""
+    run.mark = sign(run, suite_in(run.folder))
+    write_atomic(run.folder / RUN_FILE, run.model_dump_json(indent=2) + "\n")
+
+
+def mark_verified(file: Path, about_sha256: str, profile: str) -> str:
+    """Marks the run of an earlier version whose controller was verified again.
+
+    Args:
+        file: The controller.
+        about_sha256: Hash of the task or task set that it was verified on.
+        profile: The profile of the tests.
+
+    Returns:
+        What was done, as one line; empty if nothing was.
+    """
+    folder = file.parent
+    try:
+        run = load_run(folder)
+    except RunError:
+        return ""
+    same = (run.task_sha256, run.profile, run.controller.name)
+    wanted = run.tau is not None and same == (about_sha256, profile, file.name)
+    if not wanted or at_work(folder) or not has_earlier_mark(run):
+        return ""
+    mark_anew(run)
+    return f"{folder} is marked anew"
 
 
 def load_task(
@@ -109,14 +176,14 @@ def load_task(
     return replace(task, trusted=own)
 
 
-def _facts(run: Run, suite: Path | None) -> bytes | None:
-    """What the mark of a run covers; None if the suite cannot be hashed."""
-    template, tests = run.folder / PROMPT_FILE, ""
-    if suite is not None:
-        found = tree_sha256(suite)
-        if found is None:
-            return None
-        tests = found
+def _earlier_facts(run: Run) -> bytes | None:
+    """What the mark of an earlier version covers; None if it cannot be computed."""
+    try:
+        files = files_of(run.folder, suite_in(run.folder))
+    except OSError:
+        return None
+    if files is None:
+        return None
     facts = {
         "learner": run.learner,
         "optimizer": run.optimizer,
@@ -124,8 +191,8 @@ def _facts(run: Run, suite: Path | None) -> bytes | None:
         "seed": run.seed,
         "max_cost": run.max_cost,
         "max_tokens": run.max_tokens,
-        "template": file_sha256(template) if template.is_file() else "",
-        "suite": tests,
+        "template": files.template,
+        "suite": files.suite,
     }
     if run.enough is not None:
         facts["enough"] = str(run.enough)

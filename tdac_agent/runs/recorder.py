@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import shutil
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -18,11 +17,11 @@ from tdac_agent.models.retry import FailedCall
 from tdac_agent.prompting.prompt import PromptTemplate
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.runs.journal_state import REPEATED, JournalState, reply_of
-from tdac_agent.runs.ownership import OWN_SUITE, sign
+from tdac_agent.runs.mark import Files, MarkedJournal, files_of, mark_of
+from tdac_agent.runs.ownership import OWN_SUITE, suite_in
 from tdac_agent.runs.run_record import (
     GIVEN_FILE,
     GIVEN_RULES_FILE,
-    JOURNAL,
     PICTURE_FILE,
     PROMPT_FILE,
     RULES_FILE,
@@ -30,19 +29,20 @@ from tdac_agent.runs.run_record import (
     Attempt,
     Run,
     Status,
+    call_file,
+    candidate_at,
 )
+from tdac_agent.runs.task_files import write_task
 from tdac_agent.storage.blobs import Blobs
 from tdac_agent.storage.files import write_atomic, write_if_changed
-from tdac_agent.storage.journal import append_record
-from tdac_agent.tasks.task import Task, portable_task_file, write_workdir
+from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.tasks.installation import lasting_secret
+from tdac_agent.tasks.task import Task, portable_task_file
 from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.verification.diagnosis.report import Report
-from tdac_envs.mapping.map_folder import png
 
 MOST_LINES = 5000
 """Longest source that is diffed; the time grows with the square of the length."""
-PREVIEW_FILE = "preview.png"
-"""Picture of the map or world as it was read."""
 Event = Callable[[dict[str, Any]], None]
 
 
@@ -67,6 +67,12 @@ class Recorder:
     _previous: str = ""
     _turns: Counter[tuple[str, int, int]] = field(default_factory=Counter)
     _asked: Counter[tuple[str, ...]] = field(default_factory=Counter)
+    _files: Files = field(default_factory=Files)
+    _journal: MarkedJournal = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Reads what the journal has already."""
+        self._journal = MarkedJournal.of(self.run)
 
     def start(
         self, task: Task, template: PromptTemplate, given: str | None, **facts: Any
@@ -81,7 +87,7 @@ class Recorder:
         """
         last = TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE)
         own = self.run.folder / OWN_SUITE if task.suite else None
-        self.begin(partial(_write_task, task), last, template, given, own, **facts)
+        self.begin(partial(write_task, task), last, template, given, own, **facts)
 
     def begin(
         self,
@@ -104,14 +110,14 @@ class Recorder:
         """
         folder = self.run.folder
         # Most runs have neither template nor tests: they are known from here on.
-        self.run.mark = sign(self.run, None)
+        self.run.mark = "" if lasting_secret() is None else "own"
         self.save()
         write(folder)
         if template.text is not None:
             write_atomic(folder / PROMPT_FILE, template.text)
         if given is not None:
             write_atomic(folder / GIVEN_FILE, given)
-        self.run.mark = sign(self.run, suite)
+        self._take_files(suite)
         self.save()
         # Written last: a run with a task but no mark is from another installation.
         write_atomic(folder / last[0], last[1])
@@ -126,6 +132,7 @@ class Recorder:
             **facts: Further fields of the journal record.
         """
         past, self._before = self.past, before
+        self._take_files(suite_in(self.run.folder))
         self.run.seconds, self.run.cost_lost = before.seconds, past.lost_usd
         self._write(self._with_earlier_progress(before))
         self.event(
@@ -143,7 +150,7 @@ class Recorder:
         record = {"event": name, "seconds": round(self._elapsed(), 3), **facts}
         new = name not in REPEATED or not self.past.has_step(name, facts)
         if new:
-            append_record(self.run.folder / JOURNAL, record)
+            self._journal.append(record, marked=bool(self.run.mark))
         self.tell(record)
         return new
 
@@ -268,6 +275,25 @@ class Recorder:
         self._previous = source
         return folder
 
+    def deliver(self, source: str) -> None:
+        """Writes the controller of the run, in place of an earlier one."""
+        before, after = self._files.controllers[-1], sha256_of(source)
+        if before != after and self.run.mark:
+            # Killed in between, the folder has one of them.
+            self._files = replace(self._files, controllers=(before, after))
+            self.save()
+        write_atomic(self.run.controller, source)
+        self._files = replace(self._files, controllers=(after,))
+
+    def vouch(self, file: Path) -> None:
+        """Marks a report that this run has written, so that it can be reused."""
+        if self.run.mark:
+            self._journal.vouch(file)
+
+    def vouches(self, file: Path) -> bool:
+        """Whether a report may be reused: this run has written it, as it is now."""
+        return bool(self.run.mark) and self._journal.vouches(file)
+
     def judged(
         self,
         k: int,
@@ -333,9 +359,6 @@ class Recorder:
         self.run.reason = str(facts.get("reason", ""))
         self.run.outlook = str(facts.get("outlook", ""))
         self.run.censored = not (self.run.finished or self.run.verified)
-        if self.run.mark:  # which covers the limit
-            tests = self.run.folder / OWN_SUITE
-            self.run.mark = sign(self.run, tests if tests.is_dir() else None)
         facts |= {} if enough is None else {"enough": str(enough)}
         self.event("run.end", status=status, **facts)
         self.save()
@@ -362,7 +385,17 @@ class Recorder:
         cut_short = run.status != "running" and not run.verified
         return run.model_copy(update={"censored": cut_short})
 
+    def _take_files(self, suite: Path | None) -> None:
+        """Hashes the files that the mark covers, once: later changes are not ours."""
+        files = files_of(self.run.folder, suite)
+        if files is None:
+            self.run.mark = ""
+        else:
+            self._files = files
+
     def _write(self, run: Run) -> None:
+        if self.run.mark:
+            self.run.mark = run.mark = mark_of(run, self._files, self._journal)
         write_atomic(run.folder / RUN_FILE, run.model_dump_json(indent=2) + "\n")
 
     @property
@@ -370,31 +403,16 @@ class Recorder:
         return Blobs(self.run.folder / "blobs")
 
     def _call_file(self, request: Request, what: str) -> Path:
-        """Path such as `edit.reply.md`; `edit.reply-2.md` for the second question."""
         _, k, j = request.sample
-        suffix = f"-{request.turn + 1}" if request.turn else ""
-        return self._folder(k, j) / f"{request.kind}.{what}{suffix}.md"
+        return self._folder(k, j) / call_file(request.kind, what, request.turn + 1)
 
     def _folder(self, k: int, j: int) -> Path:
-        folder = self.run.folder / "iterations" / f"k{k:02d}" / f"j{j}"
+        folder = self.run.folder / candidate_at(k, j)
         folder.mkdir(parents=True, exist_ok=True)
         return folder
 
     def _elapsed(self) -> float:
         return self.past.seconds + time.monotonic() - self._clock
-
-
-def _write_task(task: Task, folder: Path) -> None:
-    """Writes what a run on a task is about: the working files, tests, the original."""
-    write_workdir(folder, task)
-    write_atomic(folder / PREVIEW_FILE, png(task.setting.preview()))
-    if task.suite is not None:
-        ignored = shutil.ignore_patterns("__pycache__")
-        own = folder / OWN_SUITE
-        shutil.copytree(task.suite, own, ignore=ignored, dirs_exist_ok=True)
-    original = task.setting.original
-    if original is not None:
-        write_atomic(folder / original.name, original.file.read_bytes())
 
 
 def _about(request: Request, key: str) -> dict[str, Any]:

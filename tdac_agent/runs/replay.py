@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,10 +16,11 @@ from tdac_agent.models.provider import PermanentFault, Reply, Request
 from tdac_agent.prompting.rules import BEGIN
 from tdac_agent.runs.journal_state import reply_of
 from tdac_agent.runs.ownership import OURS, is_own_folder
-from tdac_agent.runs.run_record import JOURNAL, load_run
+from tdac_agent.runs.run_record import JOURNAL, call_file, candidate_at, load_run
+from tdac_agent.storage.files import read_inside
+from tdac_agent.storage.hashes import sha256_of_json
 from tdac_agent.storage.journal import JournalRecord, read_records
-from tdac_agent.tasks.provenance import sha256_of
-from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.core.intake import RECORD_BYTES
 
 DEMO = Path(__file__).parent / "demo"
 Place = tuple[str, int, int]
@@ -85,7 +85,7 @@ class Replay:
 
     def answers_sha256(self) -> str:
         """Hash of all recorded answers."""
-        return sha256_of(json.dumps(self._replies, sort_keys=True).encode())
+        return sha256_of_json(self._replies)
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
@@ -94,11 +94,13 @@ class Replay:
         number = request.turn
         at = f"{request.kind} k={k} j={j}"
         try:
-            prompt, answer = _files(self._folder, place, number + 1)
+            prompt, answer = _files(place, number + 1)
             where = f"{at} in {prompt}"
-            recorded = read_file(prompt, RECORD_BYTES).decode("utf-8")
+            recorded = read_inside(self._folder, prompt, RECORD_BYTES).decode("utf-8")
             notes = self._compare(recorded, request, where)
-            text = read_file(answer, RECORD_BYTES).decode("utf-8", "surrogatepass")
+            text = read_inside(self._folder, answer, RECORD_BYTES).decode(
+                "utf-8", "surrogatepass"
+            )
             record = [r for r in self._replies if _place(r) == place][number]
         except (OSError, IndexError):
             raise PermanentFault(
@@ -143,12 +145,11 @@ class Replay:
         raise PermanentFault(f"the question differs from the record in {line}: {where}")
 
 
-def _files(folder: Path, place: Place, number: int) -> tuple[Path, Path]:
-    """Files of question and answer of the numbered call of its kind."""
-    kind, k, j = place
-    calls = folder / "iterations" / f"k{k:02d}" / f"j{j}"
-    suffix = "" if number == 1 else f"-{number}"
-    return calls / f"{kind}.prompt{suffix}.md", calls / f"{kind}.reply{suffix}.md"
+def _files(place: Place, number: int) -> tuple[Path, Path]:
+    """Files of question and answer of the numbered call of its kind, in a run."""
+    kind, *at = place
+    prompt, answer = (call_file(kind, what, number) for what in ("prompt", "reply"))
+    return candidate_at(*at) / prompt, candidate_at(*at) / answer
 
 
 def _place(record: JournalRecord) -> tuple[Any, Any, Any]:

@@ -11,7 +11,15 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.given_rules import given_book
 from tdac_agent.prompting.prompt import VARIANTS
-from tdac_agent.runs.ownership import is_own, is_own_folder, load_task, wishes_of
+from tdac_agent.runs.ownership import (
+    called,
+    has_earlier_mark,
+    is_own,
+    is_own_folder,
+    load_task,
+    remark_on,
+    wishes_of,
+)
 from tdac_agent.runs.run_record import (
     AGENT,
     GIVEN_FILE,
@@ -20,13 +28,13 @@ from tdac_agent.runs.run_record import (
     Run,
     load_run,
 )
-from tdac_agent.storage.files import UNFINISHED
+from tdac_agent.storage.files import UNFINISHED, read_inside
 from tdac_agent.storage.locks import LOCK_FILE
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.tasks.trust import permit
 from tdac_envs.core.errors import one_line_reason
-from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
+from tdac_envs.core.intake import TEXT_BYTES, parse_json
 
 # Fields that determine the questions of a run and the use of the answers, as named in
 # messages. Runs that agree in all of them are the same run.
@@ -110,13 +118,15 @@ def check_own(before: Run) -> None:
     Raises:
         RunError: Another installation began the run.
     """
-    if not is_own_folder(before):
-        raise RunError(
-            f"{before.folder} contains a run that this installation did not begin "
-            f"and that claims to be {before.status}: test it with "
-            f"{shlex.join(['tdac', 'verify', str(before.folder)])}, or give a new "
-            "folder with --out"
-        )
+    if is_own_folder(before):
+        return
+    if has_earlier_mark(before):
+        raise RunError(remark_on(before))
+    raise RunError(
+        f"{remark_on(before)}, and it claims to be {before.status}: test it with "
+        f"{shlex.join(['tdac', 'verify', str(before.folder)])}, or give a new "
+        "folder with --out"
+    )
 
 
 def _difference(words: str, before: object, now: object) -> str:
@@ -159,7 +169,7 @@ def resume_arguments(
     flags = {name: value for name, value in (given or {}).items() if value is not None}
     task = recorded_task(folder)
     if not is_own(run, task.suite):
-        permit(folder, wishes_of(run, task.suite, flags), trust=trust)
+        permit(called(run), wishes_of(run, task.suite, flags), trust=trust)
     suite = flags.pop("suite", None)
     if task.suite is not None:
         task = replace(task, suite=suite or task.suite, trusted=True)
@@ -187,7 +197,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "improve": run.improve,
         "seed": run.seed,
         "index": run.index,
-        "start_from": _text(initial) if initial.is_file() else None,
+        "start_from": _text(folder) if initial.is_file() else None,
         "base_url": run.base_url,
         "refine": run.refine,
         "vision": run.vision,
@@ -198,15 +208,16 @@ def settings_of(run: Run) -> dict[str, Any]:
     }
 
 
-def _text(file: Path) -> str:
+def _text(folder: Path) -> str:
     """Reads the initial controller of a run.
 
     Raises:
         RunError: It cannot be read, or is not UTF-8.
     """
     try:
-        return read_file(file, TEXT_BYTES).decode("utf-8")
+        return read_inside(folder, GIVEN_FILE, TEXT_BYTES).decode("utf-8")
     except (OSError, ValueError) as error:
+        file = folder / GIVEN_FILE
         raise RunError(f"cannot read {file}: {one_line_reason(error)}") from error
 
 
@@ -221,7 +232,7 @@ def recorded_task(folder: Path) -> Task:
     task = load_task(folder)
     setting: Any = task.setting
     try:
-        raw = read_file(folder / "params.json", TEXT_BYTES)
+        raw = read_inside(folder, "params.json", TEXT_BYTES)
         params = setting.params.read(parse_json(raw))
     except (OSError, ValueError) as error:
         raise RunError(

@@ -10,11 +10,12 @@ from pydantic import BeforeValidator, ConfigDict, Field
 from tdac_agent.errors import RunError
 from tdac_agent.models.budget import Enough
 from tdac_agent.prompting.rules import RuleBook
+from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.locks import LOCK_FILE, is_held
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import PrintableRecord, load_record
 from tdac_agent.tasks.task_file import Profile
 from tdac_envs.core.errors import nearest, one_line_reason
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.intake import RECORD_BYTES, parse_json
 
 Status = Literal[
     "running",
@@ -201,6 +202,16 @@ def setting_of(iterations: int, patience: int, *, refine: bool) -> Setting:
     return "one shot" if iterations == 1 else "best of N"
 
 
+def candidate_at(k: int, j: int) -> Path:
+    """The folder of a candidate, relative to that of its run."""
+    return Path("iterations", f"k{k:02d}", f"j{j}")
+
+
+def call_file(kind: str, what: str, number: int) -> str:
+    """Name such as `edit.reply.md`; `edit.reply-2.md` for the second question."""
+    return f"{kind}.{what}{f'-{number}' if number > 1 else ''}.md"
+
+
 def at_work(folder: Path) -> bool:
     """Whether a process is at work on a run."""
     return is_held(folder / LOCK_FILE)
@@ -232,9 +243,8 @@ def load_run(folder: Path) -> Run:
     Raises:
         RunError: The folder has no readable `run.json`.
     """
-    path = folder / RUN_FILE
     try:
-        content = parse_json(read_file(path, RECORD_BYTES))
+        content = parse_json(read_inside(folder, RUN_FILE, RECORD_BYTES))
         return Run.model_validate({**content, "folder": folder})
     except FileNotFoundError as error:
         raise RunError(f"{folder} is not a run folder: {_missing(folder)}") from error
@@ -263,7 +273,7 @@ def load_rules(folder: Path) -> RuleBook:
     """
     path = folder / RULES_FILE
     try:
-        return RuleBook.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+        return load_record(RuleBook, folder, RULES_FILE)
     except FileNotFoundError:
         return RuleBook()
     except (OSError, ValueError) as error:

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field
 
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import FrozenRecord, read_record
 from tdac_agent.verification.judge.episode_row import Scores
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 SELECTION_FILE = "report.json"
 HIDDEN_FILE = "hidden.json"
 """Report on the selected controller on hidden worlds: sums alone."""
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class CandidateFigures(_Record):
+class CandidateFigures(FrozenRecord):
     """How a candidate drove, in numbers of worlds of `dev`."""
 
     k: int
@@ -37,7 +32,7 @@ class CandidateFigures(_Record):
     )
 
 
-class Improvement(_Record):
+class Improvement(FrozenRecord):
     """The selected controller beside what it improves, on worlds that decided nothing.
 
     Both drove on the same worlds. The interval is that of a paired bootstrap over
@@ -58,7 +53,7 @@ class Improvement(_Record):
     )
 
 
-class Selection(_Record):
+class Selection(FrozenRecord):
     """`report.json` of a run on a task set: what was selected, and from what.
 
     The figures of the selected candidate are optimistic: it was chosen by them.
@@ -95,17 +90,13 @@ class Selection(_Record):
 
 def read_selection(folder: Path) -> Selection | None:
     """What a run selected; None if there is no readable record."""
-    try:
-        content = parse_json(read_file(folder / SELECTION_FILE, RECORD_BYTES))
-        return Selection.model_validate(content)
-    except (OSError, ValueError, ValidationError):
-        return None
+    return read_record(Selection, folder, SELECTION_FILE)
 
 
-class HiddenCounts(PrintableRecord):
+class HiddenCounts(FrozenRecord):
     """How often the selected controller reached the goal on hidden worlds."""
 
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(extra="ignore")
 
     worlds: int
     successes: int
@@ -113,8 +104,4 @@ class HiddenCounts(PrintableRecord):
 
 def read_hidden(folder: Path) -> HiddenCounts | None:
     """The counts of a run on hidden worlds; None if there is no readable record."""
-    try:
-        content = parse_json(read_file(folder / HIDDEN_FILE, RECORD_BYTES))
-        return HiddenCounts.model_validate(content)
-    except (OSError, ValueError, ValidationError):
-        return None
+    return read_record(HiddenCounts, folder, HIDDEN_FILE)

@@ -109,11 +109,14 @@ def usage_of_tree(pid: int) -> tuple[float, int]:
     while pids:
         folder = Path(f"/proc/{pids.pop()}")
         try:
+            # raw read: of the kernel
             fields = (folder / "stat").read_text().rpartition(")")[2].split()
+            # raw read: of the kernel
             peak = (folder / "status").read_text().partition("VmHWM:")[2].split()
             children = [
                 int(child)
                 for task in (folder / "task").iterdir()
+                # raw read: of the kernel
                 for child in (task / "children").read_text().split()
             ]
         except (OSError, ValueError):

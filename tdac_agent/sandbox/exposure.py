@@ -88,6 +88,7 @@ def _extension_folders() -> set[str]:
 
 def _library_folders() -> set[str]:
     """Return the folders of the shared libraries that this process has mapped."""
+    # raw read: of the kernel
     with open("/proc/self/maps", encoding="utf-8", errors="replace") as maps:
         paths = {line.split(maxsplit=5)[5].rstrip() for line in maps if ".so" in line}
     return {

@@ -81,6 +81,7 @@ class RunQueue:
 
     def _statistics(self) -> tuple[int, int]:
         try:
+            # raw read: of the kernel
             fields = Path(f"/proc/{self.pid}/schedstat").read_text().split()
             return int(fields[0]), int(fields[1])
         except (OSError, ValueError, IndexError):
@@ -89,7 +90,7 @@ class RunQueue:
     def is_ready(self) -> bool:
         """Whether it runs or waits for a CPU."""
         try:
-            stat = Path(f"/proc/{self.pid}/stat").read_text()
+            stat = Path(f"/proc/{self.pid}/stat").read_text()  # raw read: of the kernel
         except OSError:
             return False
         return stat.rpartition(")")[2].split()[:1] == ["R"]

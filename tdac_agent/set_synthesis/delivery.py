@@ -19,7 +19,7 @@ from tdac_agent.runs.selection_record import (
 from tdac_agent.set_synthesis.selection import scores_of_selected
 from tdac_agent.set_synthesis.trials import BLOCKS, Candidate, Trials
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.verification.judge.set_files import level_params
 from tdac_envs.ladder.task_sets import TaskSet
@@ -75,12 +75,12 @@ def deliver_selected(
         candidates=tuple(map(_figures, written)),
         k=chosen.k,
         j=chosen.j,
-        controller_sha256=_sha256(chosen),
+        controller_sha256=sha256_of(chosen.source),
         optimistic=scores_of_selected(chosen),
         improvement=improvement,
         stopped=stopped,
     )
-    write_atomic(run.controller, chosen.source)
+    trials.recorder.deliver(chosen.source)
     write_atomic(
         run.folder / SELECTION_FILE, selection.model_dump_json(indent=2) + "\n"
     )
@@ -93,7 +93,7 @@ def _figures(candidate: Candidate) -> CandidateFigures:
     return CandidateFigures(
         k=candidate.k,
         j=candidate.j,
-        controller_sha256=_sha256(candidate),
+        controller_sha256=sha256_of(candidate.source),
         feedback_worlds=sum(report.count for report in drives),
         feedback_reached=sum(report.successes for report in drives),
         validation_worlds=len(candidate.validation),
@@ -101,10 +101,6 @@ def _figures(candidate: Candidate) -> CandidateFigures:
         validation_time=candidate.score if candidate.validation else None,
         improve_time=candidate.explored_score,
     )
-
-
-def _sha256(candidate: Candidate) -> str:
-    return sha256_of(candidate.source.encode("utf-8", "surrogatepass"))
 
 
 def _write_level(tasks: TaskSet, folder: Path) -> None:

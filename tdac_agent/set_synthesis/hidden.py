@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.salt import SEALED, drawn_salt
@@ -35,7 +35,8 @@ def verify_hidden(
     folder, raw = recorder.run.folder, source.encode("utf-8", "surrogatepass")
     about = {"controller_sha256": sha256_of(raw), "sha256": tasks.sha256}
     recorder.event("hidden.start", **about)
-    report = _recorded(folder / HIDDEN_FILE, about) if recorder.run.mark else None
+    known = recorder.vouches(folder / HIDDEN_FILE)
+    report = _recorded(folder / HIDDEN_FILE, about) if known else None
     if report is None:
         report = verify_episodes(
             raw,
@@ -52,6 +53,7 @@ def verify_hidden(
             ),
         )
         write_atomic(folder / HIDDEN_FILE, report.model_dump_json(indent=2) + "\n")
+        recorder.vouch(folder / HIDDEN_FILE)
     recorder.event("hidden.end", passed=report.passed, worlds=report.count, **about)
     return report
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from tdac_agent.errors import RunError
-from tdac_agent.runs.ownership import is_own, wishes_of
+from tdac_agent.runs.ownership import called, is_own, wishes_of
 from tdac_agent.runs.resume import settings_of
 from tdac_agent.runs.run_record import Run
 from tdac_agent.tasks.task_file import SET_FILE
@@ -37,7 +37,7 @@ def resume_set_arguments(
         )
     flags = {name: value for name, value in given.items() if value is not None}
     if not is_own(run, None):
-        permit(run.folder, wishes_of(run, None, flags), trust=trust)
+        permit(called(run), wishes_of(run, None, flags), trust=trust)
     return {
         **settings_of(run),
         "tasks": load_set(file),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,8 +10,9 @@ from statistics import fmean
 from pydantic import ValidationError
 
 from tdac_agent.runs.recorder import Recorder
+from tdac_agent.storage.hashes import number_of, sha256_of
 from tdac_agent.synthesis.workload import Shares
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -98,8 +98,7 @@ def _mean(episodes: Sequence[EpisodeRow]) -> float:
 
 def first_world(seed: int, index: int) -> int:
     """Number of the first feedback world of a run, below `BLOCKS` - `MOST_EPISODES`."""
-    digest = hashlib.sha256(f"dev block|{seed}|{index}".encode("ascii")).digest()
-    return int.from_bytes(digest[:8], "big") % (BLOCKS - MOST_EPISODES)
+    return number_of(f"dev block|{seed}|{index}") % (BLOCKS - MOST_EPISODES)
 
 
 @dataclass(slots=True)
@@ -224,9 +223,8 @@ class Trials:
         about = {"k": k, "j": j, "what": out.name.partition("-")[0], "worlds": count}
         self.recorder.event("drive.start", **about)
         source = candidate.source.encode("utf-8", "surrogatepass")
-        # The record of another installation's run is not trusted.
         report = None
-        if self.recorder.run.mark:
+        if self.recorder.vouches(out / SET_REPORT):
             report = kept_report(out, self.tasks, source, first, count)
         if report is None:
             report = verify_episodes(
@@ -242,6 +240,7 @@ class Trials:
                     {"event": "drive.step", **about, "done": done, "reached": reached}
                 ),
             )
+            self.recorder.vouch(out / SET_REPORT)
         self.recorder.event(
             "drive.end", **about, reached=report.successes, driven=report.count
         )

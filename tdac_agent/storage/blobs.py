@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 
@@ -23,7 +23,7 @@ class Blobs:
     def put(self, text: str) -> str:
         """Stores a text and returns its hash."""
         raw = text.encode("utf-8", "surrogatepass")
-        name = hashlib.sha256(raw).hexdigest()
+        name = sha256_of(raw)
         if self.get(name) is None:
             self.folder.mkdir(parents=True, exist_ok=True)
             write_atomic(self.folder / name, raw)
@@ -35,6 +35,6 @@ class Blobs:
             raw = read_file(self.folder / name, RECORD_BYTES)
         except OSError:
             return None
-        if hashlib.sha256(raw).hexdigest() != name:
+        if sha256_of(raw) != name:
             return None
         return raw.decode("utf-8", "surrogatepass")

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.storage.files import sync_folder
+from tdac_agent.storage.files import append_line, read_inside
 from tdac_envs.core.intake import check, read_file
 
 JournalRecord = dict[str, Any]
@@ -23,37 +22,18 @@ def append_record(path: Path, record: JournalRecord) -> None:
     Raises:
         OSError: The write failed; the error names the file.
     """
-    line = json.dumps(record, sort_keys=True).encode() + b"\n"
-    try:
-        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-        try:
-            _write(handle, line)
-            size = os.fstat(handle).st_size
-        finally:
-            os.close(handle)
-        if size == len(line):
-            sync_folder(path.parent)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from error
+    append_line(path, line_of(record))
 
 
-def _write(handle: int, line: bytes) -> None:
-    size = os.fstat(handle).st_size
-    try:
-        # Usually one write; a full disk accepts a part, and the next write raises.
-        while line:
-            line = line[os.write(handle, line) :]
-        os.fsync(handle)
-    except OSError:
-        with suppress(OSError):
-            os.ftruncate(handle, size)
-        raise
+def line_of(record: JournalRecord) -> bytes:
+    """The line of a record, with its end."""
+    return json.dumps(record, sort_keys=True).encode() + b"\n"
 
 
 def read_records(path: Path) -> list[JournalRecord]:
     """Returns all records, without torn or invalid lines; [] for a missing file."""
     try:
-        raw = read_file(path, JOURNAL_BYTES)
+        raw = read_inside(path.parent, path.name, JOURNAL_BYTES)
     except FileNotFoundError:
         return []
     return _records(raw)
@@ -91,17 +71,24 @@ def repair_end(path: Path) -> None:
         raw = read_file(path, JOURNAL_BYTES)
     except FileNotFoundError:
         return
-    tail = raw.rpartition(b"\n")[2]
-    if not tail:
+    whole = whole_lines(raw)
+    if whole == raw:
         return
-    with path.open("r+b") as file:
-        if _record(tail) is None:
-            file.truncate(len(raw) - len(tail))
-        else:
-            file.seek(0, os.SEEK_END)
+    with path.open("r+b") as file:  # raw read: written, too
+        file.truncate(len(whole))
+        if len(whole) > len(raw):
+            file.seek(-1, os.SEEK_END)
             file.write(b"\n")
         file.flush()
         os.fsync(file.fileno())
+
+
+def whole_lines(raw: bytes) -> bytes:
+    """The content of a journal as `repair_end` leaves it."""
+    tail = raw.rpartition(b"\n")[2]
+    if not tail:
+        return raw
+    return raw.removesuffix(tail) if _record(tail) is None else raw + b"\n"
 
 
 def _record(line: bytes) -> JournalRecord | None:

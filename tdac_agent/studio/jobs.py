@@ -21,6 +21,7 @@ from pydantic import ValidationError
 
 from tdac_agent.interpreter import python, safe_environment
 from tdac_agent.library.listing import next_folder
+from tdac_agent.storage.files import open_regular
 from tdac_agent.studio.folder import STATE, made_within
 from tdac_agent.studio.job_file import JobFile, read_job, write_job
 from tdac_envs.core.errors import one_line_reason
@@ -101,7 +102,7 @@ class Job:
         try:
             if not file.is_file():
                 return ""
-            with file.open("rb") as stream:
+            with open_regular(file) as stream:
                 size = stream.seek(0, os.SEEK_END)
                 stream.seek(max(0, size - TAIL_BYTES))
                 data = stream.read(TAIL_BYTES)
@@ -221,6 +222,7 @@ def _leads_group(pid: int) -> bool:
 def _born(pid: int) -> str:
     """Start time of a process in clock ticks since boot; empty if it is gone."""
     try:
+        # raw read: of the kernel
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
         return ""

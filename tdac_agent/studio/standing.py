@@ -8,7 +8,7 @@ from typing import Any
 
 from tdac_agent.html_report.names import candidate_name
 from tdac_agent.library.listing import variations_text
-from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
+from tdac_agent.runs.ownership import is_own_folder, remark_on, suite_in, wishes_of
 from tdac_agent.runs.run_record import JOURNAL, Run, at_work, load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.studio.folder import lines_in
@@ -100,27 +100,25 @@ def candidates_of(folder: Path) -> int:
         return 0
 
 
-def is_from_elsewhere(folder: Path) -> bool:
-    """Whether another installation, or nobody known, began a run.
+def from_elsewhere(folder: Path) -> str:
+    """Why a run is not believed to be from here; empty for an own one.
 
     While a run's own files are being written, its mark does not hold yet.
     """
     at_first = not any((folder / name).is_file() for name in (TASK_FILE, SET_FILE))
     if at_first and at_work(folder):
-        return False
+        return ""
     try:
-        return not is_own_folder(load_run(folder))
+        return remark_on(load_run(folder))
     except (TdacError, OSError):
-        return False
+        return ""
 
 
 def asked_by(run: Run) -> list[str] | None:
     """What a run from elsewhere asks for to be continued; None for one of our own."""
     if is_own_folder(run):
         return None
-    tests = run.folder / OWN_SUITE
-    suite = tests if tests.is_dir() else None
-    asked = [wish.what for wish in wishes_of(run, suite, ())]
+    asked = [wish.what for wish in wishes_of(run, suite_in(run.folder), ())]
     if run.enough is not None:
         unit = "USD" if run.enough.max_tokens is None else "tokens"
         asked.append(f"use up to {run.enough.words[1]} {unit} in all")

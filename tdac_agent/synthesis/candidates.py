@@ -11,13 +11,13 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from tdac_agent.runs.recorder import Recorder
-from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import draw_trajectories
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
+from tdac_envs.core.intake import IMAGE_BYTES, read_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def verify_all(recorder: Recorder, jobs: Sequence[Job], tests: Tests) -> list[Re
         def report(job: Job) -> Report:
             judge = judges.get()
             try:
-                return _report(recorder.run, *job[2:], replace(tests, judge=judge))
+                return _report(recorder, *job[2:], replace(tests, judge=judge))
             finally:
                 judges.put(judge)
 
@@ -64,13 +64,16 @@ def verify_candidate(
 ) -> Report:
     """The report on a candidate; a recorded one is reused."""
     recorder.event("verify.start", k=k, j=j)
-    return _report(recorder.run, source, folder, tests)
+    return _report(recorder, source, folder, tests)
 
 
-def _report(run: Run, source: str, folder: Path, tests: Tests) -> Report:
-    task, seed = tests.task, run.seed
-    kept = kept_report(folder, task, source, seed) if run.mark else None
-    return kept or verify(
+def _report(recorder: Recorder, source: str, folder: Path, tests: Tests) -> Report:
+    task, seed, file = tests.task, recorder.run.seed, folder / "report.json"
+    known = recorder.vouches(file)
+    kept = kept_report(folder, task, source, seed) if known else None
+    if kept is not None:
+        return kept
+    report = verify(
         folder / "controller.py",
         task,
         tier=tests.tier,
@@ -78,6 +81,8 @@ def _report(run: Run, source: str, folder: Path, tests: Tests) -> Report:
         out=folder,
         judge=tests.judge,
     )
+    recorder.vouch(file)
+    return report
 
 
 def deliver(
@@ -94,11 +99,11 @@ def place(
 ) -> None:
     """Copies a verified controller and its evidence to the top of the run folder."""
     folder = recorder.run.folder
-    write_atomic(folder / "controller.py", source)
+    recorder.deliver(source)
     write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")
     (folder / "trajectories").mkdir(exist_ok=True)
     for path in sorted((evidence / "trajectories").glob("*.npz")):
-        write_atomic(folder / "trajectories" / path.name, path.read_bytes())
+        write_atomic(folder / "trajectories" / path.name, read_file(path, IMAGE_BYTES))
     outcomes = {episode.name: episode.outcome for episode in report.episodes}
     trajectories = load_trajectories(folder / "trajectories")
     draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")

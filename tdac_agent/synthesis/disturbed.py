@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +12,13 @@ from tdac_agent.prompting.feedback import cut
 from tdac_agent.runs.improvement_record import goals_text
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import number_of, sha256_of
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.synthesis.archive import Candidate
 from tdac_agent.synthesis.candidates import Tests
 from tdac_agent.synthesis.workload import Shares
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
@@ -131,8 +131,8 @@ class DisturbedTrials:
     def first_seed(self, purpose: str) -> int:
         """Seed of the first episode for a purpose; the others count up from it."""
         run = self.recorder.run
-        digest = hashlib.sha256(f"disturbed|{run.seed}|{run.index}".encode()).digest()
-        first = int.from_bytes(digest[:8], "big") % (SEEDS - MOST_EPISODES)
+        number = number_of(f"disturbed|{run.seed}|{run.index}")
+        first = number % (SEEDS - MOST_EPISODES)
         return FIRST_SEED + PURPOSES.index(purpose) * SEEDS + first
 
     def _drive(
@@ -142,9 +142,8 @@ class DisturbedTrials:
         about = {"k": candidate.k, "j": candidate.j, "what": purpose, "episodes": count}
         self.recorder.event("drive.start", **about)
         out, first = candidate.folder / purpose, self.first_seed(purpose)
-        # The record of another installation's run is not trusted.
         found = None
-        if self.recorder.run.mark:
+        if self.recorder.vouches(out / EPISODES_FILE):
             found = self._kept(out, candidate, first, count)
         if found is None:
             found = self._driven(candidate, out, range(first, first + count), about)
@@ -181,6 +180,7 @@ class DisturbedTrials:
             episodes=report.episodes,
         )
         write_atomic(out / EPISODES_FILE, found.model_dump_json(indent=2) + "\n")
+        self.recorder.vouch(out / EPISODES_FILE)
         return found
 
     def _kept(

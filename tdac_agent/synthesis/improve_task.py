@@ -21,6 +21,7 @@ from tdac_agent.runs.improvement_record import (
 )
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.synthesis.archive import Member
 from tdac_agent.synthesis.calls import OutOfBudget
 from tdac_agent.synthesis.candidates import Tests, verify_candidate
@@ -33,7 +34,6 @@ from tdac_agent.synthesis.disturbed import (
 )
 from tdac_agent.synthesis.improve import FOUNDERS, Explored, ImprovingSearch
 from tdac_agent.synthesis.workload import most_variations, task_shares
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.measures import least_steps
 from tdac_agent.verification.diagnosis.model_picture import (
@@ -269,7 +269,7 @@ def _compared(
         first=(first.k, first.j),
         k=chosen.k,
         j=chosen.j,
-        controller_sha256=_sha256(chosen),
+        controller_sha256=sha256_of(chosen.source),
         first_comparison=trials.first_seed("comparison"),
         episodes=trials.shares.comparison if changes else 0,
         stopped=stopped,
@@ -285,10 +285,6 @@ def _figures(member: Member[TaskCandidate]) -> MemberFigures:
         k=candidate.k,
         j=candidate.j,
         parent=None if parent is None else (parent.candidate.k, parent.candidate.j),
-        controller_sha256=_sha256(candidate),
+        controller_sha256=sha256_of(candidate.source),
         **{name: round(value, 6) for name, value in figures.items()},
     )
-
-
-def _sha256(candidate: TaskCandidate) -> str:
-    return sha256_of(candidate.source.encode("utf-8", "surrogatepass"))

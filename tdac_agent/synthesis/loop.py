@@ -156,7 +156,7 @@ def synthesize(
                 check_own(before)
                 return before
         start = partial(Recorder.start, task=task, template=template, given=start_from)
-        recorder = open_record(start, run, before, account, on_event, task.suite)
+        recorder = open_record(start, run, before, account, on_event)
         calls = Calls(
             recorder,
             account.budget,

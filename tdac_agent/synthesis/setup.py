@@ -19,15 +19,15 @@ from tdac_agent.models.ready import check_servers
 from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
 from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
 from tdac_agent.runs.journal_state import read_past
-from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, sign
+from tdac_agent.runs.ownership import remark_on
 from tdac_agent.runs.recorder import Event, Recorder
 from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, Run
 from tdac_agent.storage.files import clear_unfinished
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.journal import read_records, repair_end
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.installation import drawn_seed, lasting_secret
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.verify import suite_sha256
 
@@ -127,8 +127,8 @@ def new_run(
         optimizer=models[1].name,
         served_at={name: url for name, url in addresses.items() if url is not None},
         version=importlib.metadata.version("tdac"),
-        prompt_sha256=_hash(question),
-        given_sha256=None if start_from is None else _hash(start_from),
+        prompt_sha256=sha256_of(question),
+        given_sha256=None if start_from is None else sha256_of(start_from),
         cost=0.0,
         id=secrets.token_hex(8),
         started=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -193,7 +193,6 @@ def open_record(
     before: Run | None,
     account: Account,
     on_event: Event | None,
-    suite: Path | None = None,
 ) -> Recorder:
     """The recorder of a new or resumed run; recorded calls count in the budget.
 
@@ -204,23 +203,22 @@ def open_record(
         before: The record of an earlier process, if there was one.
         account: What the run may spend.
         on_event: Called with each journal record.
-        suite: The user's own tests, if there are any.
 
     Raises:
         RunError: The folder cannot be written.
     """
     budget = account.budget
     run.max_cost, run.max_tokens = budget.max_cost, budget.max_tokens
+    remark = "" if before is None else remark_on(before)
     facts = {
         "max_cost": budget.max_cost,
         "max_tokens": budget.max_tokens,
-        "notes": list(account.notes),
+        "notes": [*account.notes, *filter(None, [remark])],
     }
     if before is not None:
         run.id, run.started, run.prompt = before.id, before.started, before.prompt
         # Another installation's run gets no mark, even if it is trusted this time.
-        if is_own_folder(before):
-            run.mark = sign(run, run.folder / OWN_SUITE if suite else None)
+        run.mark = "" if remark else before.mark
     try:
         repair_end(run.folder / JOURNAL)
         past = read_past(read_records(run.folder / JOURNAL))
@@ -234,7 +232,3 @@ def open_record(
     except OSError as error:
         raise RunError(f"cannot write to {run.folder}: {error.strerror}") from error
     return recorder
-
-
-def _hash(text: str) -> str:
-    return sha256_of(text.encode("utf-8", "surrogatepass"))

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import hashlib
 import hmac
 import os
 import secrets
@@ -19,6 +18,7 @@ import tempfile
 from pathlib import Path
 
 from tdac_agent.sandbox.exposure import exposure
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_envs.core.trusted_folders import user_state
 
@@ -73,7 +73,7 @@ def seed_of(source: bytes, task: Task) -> int:
 
 def seed_from(source: bytes, task_sha256: str) -> int:
     """Like `seed_of`, for the hash of a task or task set."""
-    about = f"starts|{hashlib.sha256(source).hexdigest()}|{task_sha256}"
+    about = f"starts|{sha256_of(source)}|{task_sha256}"
     return int.from_bytes(keyed(about.encode())[: SEED_BITS // 8], "big")
 
 

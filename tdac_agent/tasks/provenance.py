@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib.metadata
 import platform
 from dataclasses import asdict
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.sandbox import Limits
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.task import Task
 
 VERSIONED = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
@@ -36,6 +36,7 @@ def origin(
         "left_out": task.setting.left_out,
         "map_sha256": task.setting.world_sha256(),
         "params_sha256": sha256_of(task.params.model_dump_json().encode()),
+        # raw read: our temporary folder
         "sensors_sha256": sha256_of((workdir / "sensors.py").read_bytes()),
         "controller_sha256": sha256_of(source),
         "sandbox": tier,
@@ -50,8 +51,3 @@ def versions() -> dict[str, str]:
     """Returns the versions of Python and of the packages a verdict may depend on."""
     packages = {name: importlib.metadata.version(name) for name in VERSIONED}
     return {"python": platform.python_version(), **packages}
-
-
-def sha256_of(data: bytes) -> str:
-    """Returns the hexadecimal SHA-256 of some bytes."""
-    return hashlib.sha256(data).hexdigest()

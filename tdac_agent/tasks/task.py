@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import functools
-import hashlib
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -13,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from tdac_agent.storage.hashes import sha256_of_json
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.environment import Environment
 from tdac_agent.tasks.first_run import compile_first
@@ -145,8 +144,7 @@ class Task:
     def sha256(self) -> str:
         """Returns the hash of all that determines an episode and the progress test."""
         facts = {**self.setting.facts(), "progress": self.spec.progress.model_dump()}
-        text = json.dumps(facts, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return sha256_of_json(facts)
 
 
 def read_task(
@@ -214,7 +212,7 @@ def write_workdir(folder: Path, task: Task) -> None:
     """
     folder.mkdir(parents=True, exist_ok=True)
     task.setting.write_files(folder)
-    (folder / "sensors.py").write_bytes(SENSORS_FILE.read_bytes())
+    (folder / "sensors.py").write_bytes(SENSORS_FILE.read_bytes())  # raw read: shipped
 
 
 def lay_out(task: Task, folder: Path) -> Path:

@@ -7,7 +7,6 @@ folder, or if the user gives the same flag or `--trust`.
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import json
 import shlex
@@ -16,9 +15,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TdacError
-from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 MOST_FILES, MOST_BYTES = 2000, 64 << 20
 """Limits of a suite."""
@@ -121,11 +120,6 @@ def asking(role: str, name: str) -> str:
     return f"ask {name} as its {role}"
 
 
-def file_sha256(path: Path) -> str:
-    """Returns the SHA-256 of a file."""
-    return hashlib.sha256(read_file(path, RECORD_BYTES)).hexdigest()
-
-
 def tree_sha256(folder: Path) -> str | None:
     """Returns the hash of all files below a folder, except byte code, which never runs.
 
@@ -146,5 +140,5 @@ def tree_sha256(folder: Path) -> str | None:
             size += path.stat().st_size
             if size > MOST_BYTES:
                 return None
-            hashes[str(inside)] = file_sha256(path)
-    return hashlib.sha256(json.dumps(hashes).encode()).hexdigest()
+            hashes[str(inside)] = sha256_of_file(path)
+    return sha256_of(json.dumps(hashes))

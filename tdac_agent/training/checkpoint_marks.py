@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import hmac
 import os
 from pathlib import Path
 
 from tdac_agent.storage.files import sync_folder, write_atomic
+from tdac_agent.storage.hashes import sha256_of_large_file
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.trust import Wish, permit
 from tdac_envs.core.intake import TEXT_BYTES, read_file
@@ -24,7 +24,7 @@ def install_checkpoint(draft: Path, file: Path) -> None:
     if lasting_secret() is not None:
         lines = [*_lines(marks)[1 - KEPT :], _mark(file.name, draft)]
         write_atomic(marks, "\n".join(lines) + "\n")
-    with draft.open("rb") as written:
+    with draft.open("rb") as written:  # raw read: only to flush our own file
         os.fsync(written.fileno())
     os.replace(draft, file)
     sync_folder(file.parent)
@@ -44,7 +44,7 @@ def check(folder: Path, *, trust: bool) -> None:
     permit(
         folder,
         [
-            Wish(f"load {file}, which can run any code", (), _sha256(file))
+            Wish(f"load {file}, which can run any code", (), sha256_of_large_file(file))
             for file in files
             if file.is_file() and not _is_own(file)
         ],
@@ -60,13 +60,7 @@ def _is_own(file: Path) -> bool:
 
 
 def _mark(name: str, file: Path) -> str:
-    return keyed(f"checkpoint|{name}|{_sha256(file)}".encode()).hex()
-
-
-def _sha256(file: Path) -> str:
-    """Hash of a file of any size; a replay buffer can take gigabytes."""
-    with file.open("rb") as content:
-        return hashlib.file_digest(content, "sha256").hexdigest()
+    return keyed(f"checkpoint|{name}|{sha256_of_large_file(file)}".encode()).hex()
 
 
 def _lines(marks: Path) -> list[str]:

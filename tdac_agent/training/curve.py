@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from tdac_agent.errors import RunError
+from tdac_agent.storage.csv_file import read_rows
 from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.errors import one_line_reason
-from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 CURVE_FILE = "learning_curve.csv"
 PLAN_FILE = "training.json"
@@ -62,14 +62,13 @@ def read_curve(folder: Path) -> list[Point]:
         RunError: The file cannot be read.
     """
     file = folder / CURVE_FILE
-    if not file.is_file():
-        return []
     try:
-        text = read_file(file, RECORD_BYTES).decode("utf-8")
-        rows = list(csv.DictReader(io.StringIO(text, newline="")))
+        rows = read_rows(file, [f.name for f in fields(Point)])
         return [
             Point(int(row["steps"]), *(float(row[f.name]) for f in fields(Point)[1:]))
             for row in rows
         ]
-    except (OSError, KeyError, TypeError, ValueError, csv.Error) as error:
+    except FileNotFoundError:
+        return []
+    except (OSError, ValueError) as error:
         raise RunError(f"cannot read {file}: {one_line_reason(error)}") from error

@@ -36,6 +36,7 @@ from tdac_agent.verification.store import (
     unfinished,
 )
 from tdac_envs.core.errors import TaskError
+from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,11 +192,13 @@ def _driven(
         facts = own.provenance(part, folder, request.sha256, ending.tier, limits)
         checks, clock = None, None
         if job.checks:
+            # raw read: our temporary folder
             content = (job.out / CHECKS_FILE).read_bytes()
             checks = Checks.model_validate_json(content)
         if own.cpu is not None and is_file:
             assert policy.file is not None
-            clock = clock_dependence(policy.file.read_bytes(), rows, own.cpu)
+            source = read_file(policy.file, RECORD_BYTES)
+            clock = clock_dependence(source, rows, own.cpu)
         report = summarise(
             EpisodeProvenance.model_validate(facts),
             rows,

@@ -59,8 +59,10 @@ def run_episodes(
 
 def _ending(path: Path, output: Path) -> JobEnding:
     try:
+        # raw read: our temporary folder
         ending = JobEnding.model_validate_json(path.read_text(encoding="utf-8"))
     except (OSError, ValidationError) as error:
+        # raw read: our temporary folder
         printed = output.read_text("utf-8", "replace") if output.is_file() else ""
         lines = [line.strip() for line in printed.splitlines() if line.strip()]
         last = " | ".join(lines[-4:]) or "no output"
@@ -92,7 +94,7 @@ class _Tail:
         """Reads the lines that are complete."""
         if not self.path.is_file():
             return
-        with self.path.open("rb") as file:
+        with self.path.open("rb") as file:  # raw read: our temporary folder
             file.seek(self._offset)
             new = file.read()
         whole = new[: new.rfind(b"\n") + 1]

@@ -13,9 +13,10 @@ from tdac_agent.episodes.trajectory import Trajectory, nominal_first
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.installation import seed_of
-from tdac_agent.tasks.provenance import origin, sha256_of, versions
+from tdac_agent.tasks.provenance import origin, versions
 from tdac_agent.tasks.task import Task, display_name, lay_out
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
@@ -229,6 +230,7 @@ def _run_judge(
     request = folder / "job.json"
     write_job(job, request)
     judge.run(request, DEADLINE_SECONDS, meanwhile)
+    # raw read: our temporary folder
     output = (folder / "output.txt").read_bytes().decode("utf-8", "replace")
     return output.replace(f"{folder}/", "")
 
@@ -260,6 +262,7 @@ def _hash_of_folder(folder: Path) -> str:
 
 def _hash_of_suites(suites: dict[str, Path]) -> str:
     hashes = {name: _file_hashes(folder) for name, folder in suites.items()}
+    # raw read: shipped
     hashes[SHIPPED][EVERY_TASK.name] = sha256_of(EVERY_TASK.read_bytes())
     return sha256_of(json.dumps(hashes, sort_keys=True).encode())
 
@@ -272,7 +275,8 @@ def _file_hashes(folder: Path) -> dict[str, str]:
 
 
 def _files_in(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.glob("*") if path.is_file()}
+    files = (path for path in folder.glob("*") if path.is_file())
+    return {path.name: read_file(path, RECORD_BYTES) for path in files}
 
 
 def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
@@ -283,6 +287,7 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
         for path in folder.glob(pattern):
             path.unlink()
     for path in sorted(results.glob("*.npz")):
+        # raw read: our temporary folder
         write_atomic(folder / path.name, path.read_bytes(), lasting=False)
     if not report.passed:
         from tdac_agent.verification.diagnosis.figures import (

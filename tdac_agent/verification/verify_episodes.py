@@ -11,9 +11,9 @@ from tdac_agent.errors import RunError
 from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.sandbox import Limits
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.drive_episodes import Request, drive
 from tdac_agent.verification.episode_report import EpisodeReport

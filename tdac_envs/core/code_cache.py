@@ -75,6 +75,7 @@ def _key() -> str:
     import llvmlite.binding as llvm
     from numba import config
 
+    # raw read: shipped
     texts = (file.read_bytes() for file in sorted(PACKAGE.rglob("*.py")))
     sources = [text for text in texts if b"compiled import" in text]
     settings = {

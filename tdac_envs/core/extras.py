@@ -38,6 +38,7 @@ def _pip() -> str:
 def _requirement(extra: str) -> list[str]:
     """Arguments of `pip install` for this package with an extra such as `[sb3]`."""
     try:
+        # raw read: shipped
         text = metadata.distribution(PACKAGE).read_text("direct_url.json")
     except metadata.PackageNotFoundError:
         text = None

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tdac_envs.core.intake import IMAGE_BYTES, read_file
 from tdac_envs.drawing.canvas import (
     AMBER,
     BLUE,
@@ -42,7 +43,11 @@ def load_sprite(file: Path, radius: float) -> Sprite | None:
     Returns:
         None if the file is missing or not an 8-bit picture.
     """
-    picture = cv2.imread(str(file), cv2.IMREAD_UNCHANGED) if file.is_file() else None
+    try:
+        data = np.frombuffer(read_file(file, IMAGE_BYTES), np.uint8)
+    except OSError:
+        return None
+    picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     if picture is None or picture.dtype != np.uint8:
         return None
     if picture.ndim == 2 or picture.shape[2] == 3:

@@ -134,7 +134,7 @@ def _remove_others(folder: Path) -> None:
 def _sources() -> str:
     """Hash of the code that makes worlds."""
     files = sorted(Path(__file__).parent.rglob("*.py"))
-    joined = b"".join(file.read_bytes() for file in files)
+    joined = b"".join(file.read_bytes() for file in files)  # raw read: shipped
     return hashlib.sha256(joined).hexdigest()[:16]
 
 
@@ -175,7 +175,7 @@ def _write(path: Path, task: Map2DTask, difficulty: Difficulty) -> None:
 def _mapped_task(path: Path, task_set: TaskSet, index: int) -> Map2DTask | None:
     """The task in a file; None if there is no such file, or if it is damaged."""
     try:
-        with path.open("rb") as file:
+        with path.open("rb") as file:  # raw read: our own cache
             data = memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ))
     except (OSError, ValueError):  # an empty file cannot be mapped
         return None

@@ -52,6 +52,7 @@ def bundled_map(name: str) -> BundledMap:
             f"no bundled map is called {name!r}{hint(name, names)}; the maps are "
             f"{', '.join(names)}"
         )
+    # raw read: shipped
     task = json.loads((_FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     return BundledMap(
         name=name,

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tdac_agent.environments.epuck.setting import WORLD_FILE
 from tdac_agent.errors import RunError
-from tdac_agent.runs.ownership import load_task
+from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.storage.printable_record import read_record
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.wbt.writer import write_world
 
@@ -36,6 +37,7 @@ class Project:
         tolerance: Distance at which the goal is reached, m.
         horizon: Maximum number of the controller's steps.
         verified_steps: Steps to the goal in the verification, if a report states them.
+        remark: Why the verification is only a claim; empty for an own run.
     """
 
     folder: Path
@@ -44,6 +46,7 @@ class Project:
     tolerance: float
     horizon: int
     verified_steps: int | None
+    remark: str = ""
 
 
 def export_webots(run_folder: Path, out: Path) -> Project:
@@ -81,6 +84,7 @@ def export_webots(run_folder: Path, out: Path) -> Project:
         task.nominal.goal_tolerance,
         task.nominal.horizon,
         _verified_steps(run_folder),
+        remark_on(run),
     )
     folder = project.controller.parent
     for new in (folder, project.world.parent):
@@ -88,7 +92,7 @@ def export_webots(run_folder: Path, out: Path) -> Project:
     write_atomic(folder / POLICY, source)
     for file, content in beside.items():
         write_atomic(folder / file, content)
-    write_atomic(project.controller, ADAPTER.read_bytes())
+    write_atomic(project.controller, ADAPTER.read_bytes())  # raw read: shipped
     write_atomic(project.world, _world(task.nominal, name))
     write_atomic(out / "README.md", _readme(task, name, source, project))
     return project
@@ -117,19 +121,18 @@ def _read(path: Path) -> bytes:
 
 def _verified_steps(run_folder: Path) -> int | None:
     """Returns the steps of the nominal episode according to the run's report."""
-    try:
-        raw = read_file(run_folder / "report.json", RECORD_BYTES)
-        report = Report.model_validate(parse_json(raw))
-    except (OSError, ValueError):
-        return None
-    steps = [e.steps for e in report.episodes if e.name == "nominal"]
+    report = read_record(Report, run_folder, "report.json")
+    episodes = () if report is None else report.episodes
+    steps = [e.steps for e in episodes if e.name == "nominal"]
     return steps[0] if steps else None
 
 
 def _readme(task: Task, name: str, source: bytes, project: Project) -> str:
-    digest = hashlib.sha256(source).hexdigest()
+    digest = sha256_of(source)
     steps = project.verified_steps
     verified = "" if steps is None else f"\nIt reached the goal there in {steps} steps."
+    if project.remark:
+        verified = "\nThis is only what the run claims, which is not known to be true."
     return f"""\
 # {task.name}: an e-puck controller for Webots
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections import Counter
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import Any
 
 from tdac_agent.environments.epuck.flat_world import flat_world
 from tdac_agent.environments.epuck.params import EPuckParams, params_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.setting import Original, Setting
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.units import METRES, Units
@@ -125,7 +125,7 @@ class EPuckSetting:
 
     def world_sha256(self) -> str:
         """Returns the hash of the flat world file."""
-        return hashlib.sha256(self.text.encode()).hexdigest()
+        return sha256_of(self.text)
 
     def write_files(self, folder: Path) -> None:
         """Writes `params.json` and `world.wbt`."""
@@ -210,7 +210,7 @@ def _setting(
         horizon=spec.horizon,
     )
     text = write_world(flat)
-    digest = hashlib.sha256(text.encode()).hexdigest()
+    digest = sha256_of(text)
     params = params_of(nominal, file.name, digest, world.notes)
     return EPuckSetting(params, nominal, text, file, left_out)
 

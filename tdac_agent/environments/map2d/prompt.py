@@ -60,7 +60,7 @@ def facts_of(task: Task) -> dict[str, Any]:
         "tolerance": nominal.goal_tolerance,
         "radius": nominal.body_radius,
         "sensors_text": needed_part(
-            SENSORS_FILE.read_text(encoding="utf-8"),
+            SENSORS_FILE.read_text(encoding="utf-8"),  # raw read: shipped
             CONVERSIONS if setting.view is None else (),
         ),
         "length": setting.task_units.length,

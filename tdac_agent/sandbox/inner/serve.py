@@ -95,7 +95,7 @@ class Server:
         return holder if name is None else getattr(holder, name)
 
     def _read_source(self) -> bytes:
-        with open(FILE_NAME, "rb") as file:
+        with open(FILE_NAME, "rb") as file:  # raw read: within the sandbox
             source = file.read()
         self._source = source.decode("utf-8", "replace")
         return source

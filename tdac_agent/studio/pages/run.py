@@ -31,13 +31,13 @@ from tdac_agent.studio.standing import (
     asked_by,
     candidates_of,
     episodes_driven,
-    is_from_elsewhere,
+    from_elsewhere,
     last_step,
     progress_of,
 )
 from tdac_envs.core.errors import TdacError
 
-ELSEWHERE = "This run was not begun here: its verdict is only what its files claim."
+ELSEWHERE = "{}: its verdict is only what its files claim."
 NOTHING = "use this machine: its candidates run in the sandbox"
 FIRST = "The first candidate appears here as soon as it has been tested."
 LETTERS = "k: iteration; j: number of the repair, 0 for the first version."
@@ -146,9 +146,10 @@ class Watching:
         if status == "selected":
             with self._wishes:
                 ui.label(SELECTED).classes("note text-sm")
-        if row and is_from_elsewhere(self._folder):
+        foreign = from_elsewhere(self._folder) if row else ""
+        if foreign:
             with self._wishes:
-                ui.label(ELSEWHERE).classes("note text-sm")
+                ui.label(ELSEWHERE.format(foreign)).classes("note text-sm")
         if not running and not row and job is not None:
             with self._wishes:
                 last = job.output().strip().splitlines()[-1:] or ["nothing was printed"]

@@ -129,7 +129,7 @@ def read_findings(results: Path, output: str) -> Findings:
         Fault: There are none, or they report a fault.
     """
     try:
-        raw = (results / "findings.json").read_bytes()
+        raw = (results / "findings.json").read_bytes()  # raw read: our temporary folder
         findings = Findings.model_validate_json(raw)
         for text in findings.diagnoses.values():
             Diagnosis.model_validate_json(text)
@@ -202,7 +202,7 @@ def verdict_of(tests: dict[str, str]) -> Verdict:
 def _read(path: Path) -> _Log:
     """Reads a report log; one that cannot be read is empty."""
     try:
-        lines = path.read_bytes().split(b"\n")
+        lines = path.read_bytes().split(b"\n")  # raw read: our temporary folder
     except OSError:
         return _Log([])
     return _Log([_record(line) for line in lines[: -1 if not lines[-1] else None]])

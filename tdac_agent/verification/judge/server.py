@@ -236,6 +236,7 @@ def do_job(
     later: contextlib.ExitStack,
 ) -> None:
     """Runs a job of any kind in its folder; the caller closes `later` after it."""
+    # raw read: our temporary folder
     job = json.loads(request.read_text(encoding="utf-8"))
     os.chdir(request.parent)
     if job["kind"] == SUITE:

@@ -23,7 +23,7 @@ def judge_suite(
     task = read_task(job.task)
     judge = Judge(
         task,
-        job.controller.read_bytes(),
+        job.controller.read_bytes(),  # raw read: our temporary folder
         job.task,
         tier=job.tier,
         seed=job.seed,

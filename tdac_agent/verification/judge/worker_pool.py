@@ -142,6 +142,7 @@ def _stay_on(cores: list[int]) -> None:
 
 def _core() -> int:
     """The core on which this process runs; see `man proc_pid_stat`."""
+    # raw read: of the kernel
     fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
     return int(fields[36])
 

@@ -35,8 +35,8 @@ from tdac_agent.evaluation.replay import drive_episode
 from tdac_agent.metrics.exact import sign_test
 from tdac_agent.problems.episodes import Part
 from tdac_agent.sandbox import ControllerFault
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.locks import LOCK_FILE, hold
-from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.diagnosis.measures import (
     shortest_path_length,
     spectral_arc_length,

@@ -15,6 +15,7 @@ from fault_server import OPENAI, answers
 from small import write_small_task
 
 from tdac_agent.models.prices import SHIPPED, load_prices
+from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.run_record import load_rules, load_run
 from tdac_agent.storage.journal import read_records
 
@@ -101,7 +102,7 @@ def steps(folder):
 def state(folder):
     """All that a run leaves, but for clock and identity."""
     run = load_run(folder)
-    apart = {"id", "started", "seconds", "cost_lost"}
+    apart = {"id", "started", "seconds", "cost_lost", "mark"}
     texts = {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))
@@ -159,7 +160,9 @@ def test_a_run_that_is_killed(model, task_folder, whole, tmp_path, kills):
     for kill_at, share in kills:
         assert start(model, task_folder, [folder], kill_at, share) is None
     assert load_run(folder).status == "running"
+    assert is_own_folder(load_run(folder))
     assert start(model, task_folder, [folder]) == ["verified"]
+    assert is_own_folder(load_run(folder))
     assert state(folder) == expected
     check_calls(model, folder, 0, kills=len(kills))
     run = load_run(folder)

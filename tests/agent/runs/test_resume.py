@@ -17,6 +17,7 @@ from tdac_agent.errors import Fault, RunError
 from tdac_agent.models.provider import PermanentFault, Reply
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.prompt import generate_prompt
+from tdac_agent.runs.ownership import mark_anew
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
@@ -131,6 +132,7 @@ def test_a_run_that_has_ended(once_verified, out, tdac):
     assert {path: path.stat().st_mtime_ns for path in out.rglob("*")} == before
     record = json.loads((out / "run.json").read_text())
     (out / "run.json").write_text(json.dumps(record | {"status": "not verified"}))
+    mark_anew(load_run(out))
     assert tdac("synth", "--resume", out)[0] == 1
 
 

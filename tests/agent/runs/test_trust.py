@@ -19,14 +19,21 @@ from tdac_agent.prompting.prompt import (
     generate_prompt,
     load_template,
 )
-from tdac_agent.runs.ownership import is_own, is_own_folder, sign
+from tdac_agent.runs.ownership import (
+    _earlier_facts,
+    has_earlier_mark,
+    is_own,
+    is_own_folder,
+    mark_verified,
+    sign,
+)
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.studio.standing import is_from_elsewhere
+from tdac_agent.studio.standing import from_elsewhere
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.setup import hold_folder
-from tdac_agent.tasks.installation import lasting_secret
+from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import display_name
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.trust import NotTrustedError, tree_sha256
@@ -109,14 +116,198 @@ def test_a_permission_holds_once(tdac, run):
         {"max_cost": 1000.0},
         {"mark": ""},
         {"mark": "é"},
+        {"mark": "own"},
+        {"mark": "2:0:"},
+        {"mark": f"2:0:{'0' * 64}"},
+        {"mark": f"2:{10**11}:{'0' * 64}"},
+        {"id": "0" * 16},
+        {"task": "maze"},
+        {"task_sha256": "0" * 64},
+        {"status": "interrupted"},
+        {"tau": 7},
+        {"attempts": []},
+        {"iterations": 100},
+        {"max_tokens": 1},
+        {"seconds": 0.0},
+        {"cost": None},
+        {"enough": Enough(max_tokens=3)},
     ],
     ids=str,
 )
-def test_a_change_of_what_may_run_makes_it_foreign(run, change):
-    """As does one of its template or its tests, and a mark of another run."""
+def test_a_change_of_its_record_makes_it_foreign(run, change):
+    """Whatever is changed: what may run, what it is about, and what it claims."""
     known = load_run(run)
     assert is_own_folder(known)
     assert not is_own_folder(known.model_copy(update=change))
+
+
+def record_of(folder):
+    return json.loads((folder / "run.json").read_text())
+
+
+def keep_the_mark(run, other):
+    """The whole record of one run, with the mark of another."""
+    (run / "run.json").write_text(
+        json.dumps(record_of(other) | {"mark": record_of(run)["mark"]})
+    )
+
+
+def swap_the_controller(run, other):
+    (run / "controller.py").write_text("def policy(obs):\n    return 0.0, 0.0\n")
+
+
+def remove_the_controller(run, other):
+    (run / "controller.py").unlink()
+
+
+def copy_the_journal(run, other):
+    shutil.copy(other / "journal.jsonl", run)
+    shutil.copy(other / "run.marks", run)
+
+
+def edit_the_journal(run, other):
+    text = (run / "journal.jsonl").read_text()
+    (run / "journal.jsonl").write_text(text.replace('"passed": true', '"passed": 1'))
+
+
+def add_to_the_journal(run, other):
+    with (run / "journal.jsonl").open("a") as file:
+        file.write('{"event": "prove.end", "seconds": 1}\n')
+
+
+def cut_the_journal(run, other):
+    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    (run / "journal.jsonl").write_bytes(b"".join(lines[:-1]))
+
+
+def remove_the_journal(run, other):
+    (run / "journal.jsonl").unlink()
+
+
+def end_the_unfinished(run, other):
+    """The mark and the status of a finished run on an unfinished one."""
+    ended = record_of(run)
+    shutil.copytree(other, run, dirs_exist_ok=True)
+    (run / "run.json").write_text(
+        json.dumps(record_of(other) | {k: ended[k] for k in ("mark", "status", "tau")})
+    )
+
+
+CHANGES = (
+    keep_the_mark,
+    swap_the_controller,
+    remove_the_controller,
+    copy_the_journal,
+    edit_the_journal,
+    add_to_the_journal,
+    cut_the_journal,
+    remove_the_journal,
+    end_the_unfinished,
+)
+
+
+@pytest.fixture(scope="module")
+def unfinished(tmp_path_factory, made, warm):
+    """A run of this installation that an interrupt ended before its first answer."""
+
+    class Interrupts:
+        name = "interrupts"
+        paid = False
+
+        def complete(self, request):
+            raise KeyboardInterrupt
+
+    task, out = load_task(made / "task.yaml"), tmp_path_factory.mktemp("half") / "run"
+    with pytest.raises(KeyboardInterrupt):
+        synthesize(task, Interrupts(), out=out, iterations=1, judge=warm)
+    return out
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
+def test_a_mark_holds_for_one_run(tdac, run, unfinished, change):
+    """A copied mark, or other files below it: its verdict is not believed."""
+    assert is_own_folder(load_run(unfinished))
+    change(run, unfinished)
+    assert not is_own_folder(load_run(run))
+    if load_run(run).finished:
+        code, _, err = tdac("synth", "--resume", run)
+        assert (code, err.count("\n")) == (2, 1)
+        assert "did not begin, or that was changed since" in err
+
+
+def test_a_torn_line_does_not_make_it_foreign(unfinished, tmp_path):
+    """A process that is killed while it writes leaves a run of this installation."""
+    run = Path(shutil.copytree(unfinished, tmp_path / "run"))
+    with (run / "journal.jsonl").open("a") as file:
+        file.write('{"event": "call.in')
+    assert is_own_folder(load_run(run))
+    (run / "journal.jsonl").write_bytes((run / "journal.jsonl").read_bytes()[:-19])
+    assert is_own_folder(load_run(run))
+
+
+def test_a_controller_is_replaced_at_any_moment(tmp_path):
+    """Killed before or after the file is written, the run is known."""
+    before = "x = 1\n"
+    begun = load_run(DEMO).model_copy(update={"folder": tmp_path, "mark": ""})
+    recorder = Recorder(begun)
+    recorder.begin(lambda _: None, ("task.yaml", "x: 1\n"), load_template("full"), None)
+    recorder.deliver(before)
+    recorder.run.tau = 1
+    recorder.save()
+    recorder.deliver("x = 2\n")
+    assert is_own_folder(load_run(tmp_path))
+    (tmp_path / "controller.py").write_text(before)
+    assert is_own_folder(load_run(tmp_path))
+    (tmp_path / "controller.py").write_text("x = 2\n")
+    recorder.save()
+    (tmp_path / "controller.py").write_text(before)
+    assert not is_own_folder(load_run(tmp_path))
+
+
+def test_a_report_that_was_changed_is_not_reused(tdac, run, tmp_path):
+    """The candidate of an unfinished run is tested again, and fails."""
+    recorder = Recorder(load_run(run))
+    report = run / "iterations" / "k01" / "j0" / "report.json"
+    assert recorder.vouches(report)
+    report.write_text(report.read_text().replace('"passed"', '"passed" '))
+    assert not recorder.vouches(report)
+
+
+def with_earlier_mark(run):
+    """A run as an earlier version left it: the mark covers what may run."""
+    known = load_run(run)
+    known.mark = keyed(_earlier_facts(known)).hex()
+    (run / "run.marks").unlink()
+    (run / "run.json").write_text(known.model_dump_json())
+    assert has_earlier_mark(load_run(run))
+    return run
+
+
+def test_a_run_of_an_earlier_version_is_marked_anew(tdac, run):
+    """One line says how; its tests need a permission until then."""
+    with_earlier_mark(run)
+    line = f"{run} is marked by an earlier version; `tdac verify {run}` marks it anew"
+    assert not is_own_folder(load_run(run))
+    assert tdac("synth", "--resume", run) == (2, "", f"error: {line}\n")
+    code, _, err = tdac("verify", run, "--trust")
+    assert code == 0
+    assert err.endswith(f"{run} is marked anew\n")
+    assert is_own_folder(load_run(run))
+    assert tdac("synth", "--resume", run)[0] == 0
+
+
+def test_an_earlier_mark_is_no_way_around(tdac, run):
+    """A controller that fails marks nothing, nor does one on another task."""
+    with_earlier_mark(run)
+    swap_the_controller(run, run)
+    assert tdac("verify", run, "--trust")[0] == 1
+    assert not is_own_folder(load_run(run))
+    known = load_run(run)
+    same, file = (known.task_sha256, known.profile), run / "controller.py"
+    assert mark_verified(file, "0" * 64, known.profile) == ""
+    assert mark_verified(file, known.task_sha256, "paper") == ""
+    assert mark_verified(run / "other.py", *same) == ""
+    assert mark_verified(file, *same) == f"{run} is marked anew"
 
 
 @pytest.mark.parametrize("file", ["prompt.j2", "suite/conftest.py", "suite/data.json"])
@@ -259,15 +450,15 @@ def test_a_run_that_begins_with_tests_and_a_template_is_known(tmp_path):
     def write(_):
         (folder / "suite").mkdir()
         (folder / "suite" / "test_own.py").write_text("")
-        seen.append(is_from_elsewhere(folder))
+        seen.append(from_elsewhere(folder))
 
     template = PromptTemplate("mine.j2", "text")
     with hold_folder(folder):
         Recorder(begun).begin(
             write, ("task.yaml", "name: x\n"), template, None, folder / "suite"
         )
-    assert seen == [False]
+    assert seen == [""]
     assert is_own_folder(load_run(folder))
     for unfinished in ("task.yaml", "prompt.j2"):
         (folder / unfinished).unlink()
-    assert is_from_elsewhere(folder)
+    assert from_elsewhere(folder)

@@ -43,7 +43,7 @@ from tdac_agent.studio.standing import (
     about_given,
     asked_by,
     episodes_driven,
-    is_from_elsewhere,
+    from_elsewhere,
     last_step,
 )
 from tdac_envs.worlds.bodies import BODY_RADIUS
@@ -251,13 +251,14 @@ def test_a_run_from_elsewhere_is_marked():
     """Such as the recorded run that `tdac demo` replays."""
     folder = Path(tdac_agent.__file__).parent / "runs" / "demo"
     assert load_run(folder).status == "verified"
-    assert is_from_elsewhere(folder)
+    assert "did not begin" in from_elsewhere(folder)
 
 
-def test_a_run_from_elsewhere_always_asks():
+def test_a_run_from_elsewhere_always_asks(tmp_path):
     """Also one that wants nothing special; the limit that it suggests is named."""
     plain = load_run(DEMO).model_copy(
         update={"learner": "builtin", "optimizer": "builtin", "seed": None}
+        | {"folder": tmp_path}
     )
     assert asked_by(plain) == []
     more = plain.model_copy(update={"enough": Enough(max_cost=0.7)})

@@ -15,7 +15,7 @@ import yaml
 
 import tdac_agent
 from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.tasks.provenance import sha256_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.episode_report import EpisodeReport, clock_dependence
 from tdac_agent.verification.judge.set_checks import static_checks
 from tdac_agent.verification.judge.set_files import level_params, write_files

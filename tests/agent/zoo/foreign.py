@@ -289,6 +289,32 @@ def verdict_of_its_own(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
+@attack("claims to be verified: test it with tdac verify", works=False)
+def verdict_with_a_copied_mark(place: Place) -> list[str | Path]:
+    (place.run / "controller.py").write_text(STILL)
+    place.change(status="verified", id="0" * 16)
+    return ["synth", "--resume", place.run]
+
+
+@attack("claims to be verified: test it with tdac verify", works=False)
+def controller_below_a_mark(place: Place) -> list[str | Path]:
+    (place.run / "controller.py").write_text(STILL)
+    return ["synth", "--resume", place.run]
+
+
+@attack("claims to be verified: test it with tdac verify", works=False)
+def cases_below_a_mark(place: Place) -> list[str | Path]:
+    place.change(status="verified", attempts=[], cost=0.0)
+    return ["synth", "--resume", place.run]
+
+
+@attack("claims to be verified: test it with tdac verify", works=False)
+def journal_below_a_mark(place: Place) -> list[str | Path]:
+    with (place.run / "journal.jsonl").open("a") as file:
+        file.write('{"event": "prove.end", "seconds": 1}\n')
+    return ["synth", "--resume", place.run]
+
+
 @attack("not verified", code=1, works=False)
 def report_of_its_own(place: Place) -> list[str | Path]:
     """A forged report on a controller that does not move, which nobody tests again."""
