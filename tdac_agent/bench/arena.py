@@ -22,7 +22,12 @@ from tdac_agent.verification.episode_report import EpisodeReport, named
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.salt import SEALED
-from tdac_agent.verification.store import ROWS_FILE, TRAJECTORIES, kept_report
+from tdac_agent.verification.store import (
+    ROWS_FILE,
+    TRAJECTORIES,
+    is_marked,
+    kept_report,
+)
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet
@@ -214,13 +219,12 @@ def sealed_episodes(folder: Path, sha256: str) -> tuple[EpisodeRow, ...]:
         DrivenElsewhere: They are not there.
     """
     path = folder / SEALED / ROWS_FILE
-    try:
-        lines = read_file(path, RECORD_BYTES).splitlines()
-    except OSError:
+    if not is_marked(path, hidden=True):
         raise DrivenElsewhere(
             f"the file {sha256[:8]} was driven on these hidden worlds before, and its "
             f"episodes are not in {folder}; tdac bench show puts the folders together"
-        ) from None
+        )
+    lines = read_file(path, RECORD_BYTES).splitlines()
     return tuple(map(EpisodeRow.model_validate_json, lines))
 
 

@@ -33,10 +33,14 @@ from tdac_agent.verification.store import (
     keep_report,
     keep_sealed,
     keep_trajectories,
+    mark_rows,
     unfinished,
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
+
+MARKING = 20.0
+"""Time between two marks of what has been driven, relative to that of making one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +192,8 @@ def _driven(
             rows=None if kept is None else lasting / ROWS_FILE,
             trajectories=lasting / TRAJECTORIES if keeps else None,
         )
-        rows, ending = run_episodes(job, own.longest, judge, watch)
+        seen = watch if kept is None else _Marking(kept, watch)
+        rows, ending = run_episodes(job, own.longest, judge, seen)
         facts = own.provenance(part, folder, request.sha256, ending.tier, limits)
         checks, clock = None, None
         if job.checks:
@@ -215,3 +220,27 @@ def _driven(
         elif out is not None:
             keep_sealed(rows, out)
     return report
+
+
+@dataclass(slots=True)
+class _Marking:
+    """Marks the rows of an unfinished call, in a small part of the time.
+
+    Attributes:
+        kept: Its folder.
+        watch: Called with the numbers of episodes and successes so far.
+    """
+
+    kept: Path
+    watch: Watch | None
+    _next: float = 0.0
+
+    def __call__(self, count: int, successes: int) -> None:
+        """Takes over the numbers."""
+        began = time.monotonic()
+        if began >= self._next:
+            mark_rows(self.kept)
+            ended = time.monotonic()
+            self._next = ended + MARKING * (ended - began)
+        if self.watch is not None:
+            self.watch(count, successes)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import hmac
 import json
 import shutil
 from collections.abc import Generator, Sequence
@@ -10,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
@@ -22,6 +26,7 @@ EARLIER_FILES = ("set.json", "robust.json")
 ROWS_FILE = "episodes.jsonl"
 TRAJECTORIES = "trajectories"
 UNFINISHED, ABOUT = "unfinished", "about.json"
+MARK = ".mark"
 WRITTEN = REPORT_FILE, UNFINISHED, TRAJECTORIES, SEALED
 _MOST_BYTES = 512 << 20
 
@@ -29,7 +34,40 @@ _MOST_BYTES = 512 << 20
 def keep_report(report: EpisodeReport, out: Path) -> None:
     """Writes `episodes.json`."""
     out.mkdir(parents=True, exist_ok=True)
-    write_atomic(out / REPORT_FILE, report.model_dump_json(indent=2) + "\n")
+    _write_marked(out / REPORT_FILE, report.model_dump_json(indent=2) + "\n")
+
+
+def _write_marked(path: Path, text: str) -> None:
+    """Writes a file, and beside it the mark that it was written here."""
+    write_atomic(path, text)
+    write_atomic(path.with_suffix(MARK), _mark(b"file", text.encode()))
+
+
+def is_marked(path: Path, *, hidden: bool = False) -> bool:
+    """Whether a file is as this installation wrote it.
+
+    Where no secret can be kept, only results on hidden worlds are distrusted.
+
+    Args:
+        path: The file.
+        hidden: Whether it has results on hidden worlds.
+    """
+    if lasting_secret() is None:
+        return not hidden
+    try:
+        content = read_file(path, _MOST_BYTES)
+        known = read_file(path.with_suffix(MARK), TEXT_BYTES)
+    except (OSError, ValueError):
+        return False
+    return hmac.compare_digest(known, _mark(b"file", content).encode())
+
+
+def _mark(*parts: bytes) -> str:
+    """A mark that only this installation can make; empty without a secret."""
+    if lasting_secret() is None:
+        return ""
+    hashes = [sha256_of(part).encode() for part in parts]
+    return keyed(b"kept|" + b"|".join(hashes)).hex()
 
 
 def read_report(folder: Path) -> EpisodeReport | None:
@@ -64,8 +102,33 @@ def unfinished(out: Path | None, about: dict[str, Any]) -> Generator[Path | None
         folder.mkdir(parents=True)
         folder.chmod(0o700)
         write_atomic(folder / ABOUT, text)
+    _forget_unmarked(folder, text.encode())
     yield folder
     shutil.rmtree(folder)
+
+
+def mark_rows(folder: Path) -> None:
+    """Marks the rows of an unfinished call; those without a mark are driven again."""
+    rows, about = folder / ROWS_FILE, read_file(folder / ABOUT, TEXT_BYTES)
+    content = read_file(rows, _MOST_BYTES) if rows.is_file() else b""
+    whole = content[: content.rfind(b"\n") + 1]
+    text = f"{len(whole)} {_mark(about, whole)}"
+    write_atomic(rows.with_suffix(MARK), text, lasting=False)
+
+
+def _forget_unmarked(folder: Path, about: bytes) -> None:
+    """Cuts off the rows that this installation did not write."""
+    rows = folder / ROWS_FILE
+    if not rows.is_file() or lasting_secret() is None:
+        return
+    content, size = read_file(rows, _MOST_BYTES), 0
+    with contextlib.suppress(OSError, ValueError):
+        written = read_file(rows.with_suffix(MARK), TEXT_BYTES).decode()
+        number, _, mark = written.partition(" ")
+        own = _mark(about, content[: int(number)])
+        if hmac.compare_digest(mark.encode(), own.encode()):
+            size = int(number)
+    write_atomic(rows, content[:size])
 
 
 def kept_report(
@@ -79,7 +142,8 @@ def kept_report(
         numbers: Numbers of the episodes; those of hidden worlds are only counted.
     """
     report = read_report(folder)
-    if report is None:
+    hidden = report is not None and report.provenance.salt_sha256 is not None
+    if report is None or not is_marked(folder / REPORT_FILE, hidden=hidden):
         return None
     own = report.provenance
     same = own.versions == dict(versions()) and all(
@@ -119,4 +183,4 @@ def keep_sealed(episodes: Sequence[EpisodeRow], out: Path) -> None:
     folder.mkdir(0o700, parents=True, exist_ok=True)
     folder.chmod(0o700)
     rows = "".join(f"{episode.model_dump_json()}\n" for episode in episodes)
-    write_atomic(folder / ROWS_FILE, rows)
+    _write_marked(folder / ROWS_FILE, rows)
