@@ -243,7 +243,7 @@ def test_hidden_worlds_are_told_in_sums_alone(judge, set_yaml, tmp_path):
     assert report.episodes == ()
     assert report.told == ()
     files = sorted(path.name for path in (tmp_path / "out").iterdir())
-    assert files == ["episodes.json", "sealed"]
+    assert files == ["episodes.json", "episodes.mark", "sealed"]
     text = (tmp_path / "out" / "episodes.json").read_text()
     assert SALT.decode() not in text
     assert SALT.hex() not in text
@@ -257,7 +257,7 @@ def test_the_rows_of_hidden_worlds_are_sealed(judge, set_yaml, tmp_path):
     verify_episodes(
         STILL, set_yaml(), 2, split="hidden", salt_file=salt, judge=judge, out=out
     )
-    (rows,) = (out / "sealed").iterdir()
+    (rows,) = (out / "sealed").glob("*.jsonl")
     assert stat.S_IMODE((out / "sealed").stat().st_mode) == 0o700
     figures = [json.loads(line) for line in rows.read_text().splitlines()]
     assert [each["index"] for each in figures] == [0, 1]
