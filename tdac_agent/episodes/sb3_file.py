@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from tdac_agent.episodes.torch_file import Weights, read_weights
 from tdac_agent.errors import ControllerFileError
@@ -21,6 +21,7 @@ from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.errors import first_problem, one_line_reason
 from tdac_envs.core.extras import install_command
 from tdac_envs.core.intake import TEXT_BYTES, one_line, parse_json, read_file, read_zip
+from tdac_envs.core.strict_model import StrictModel
 
 METADATA = "tdac.json"
 WEIGHTS = "policy.pth"
@@ -39,10 +40,8 @@ Layers = Annotated[list[Annotated[int, Field(ge=1, le=4096)]], Field(max_length=
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
-class SavedPolicy(BaseModel):
+class SavedPolicy(StrictModel):
     """`tdac.json` in a policy's zip file, or beside it as `NAME.json`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     schema_version: Literal[1] = 1
     algo: str = Field(description="Training algorithm: ppo, sac, …")
@@ -55,10 +54,8 @@ class SavedPolicy(BaseModel):
     seed: int | None = None
 
 
-class Settings(BaseModel):
+class Settings(StrictModel):
     """`policy_kwargs` that define the network, except those only training needs."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     net_arch: Layers | dict[Literal["pi", "vf", "qf"], Layers] | None = None
     activation_fn: str | None = Field(None, pattern=f"^{ACTIVATION}$")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.units import Place
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
@@ -45,11 +45,7 @@ def goals_text(reached: int, count: int) -> str:
     return f"the goal reached in {reached} of {count} disturbed episodes"
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class MemberFigures(_Record):
+class MemberFigures(StrictRecord):
     """A verified candidate in the disturbed episodes of the search."""
 
     k: int
@@ -67,7 +63,7 @@ class MemberFigures(_Record):
     )
 
 
-class PairedChange(_Record):
+class PairedChange(StrictRecord):
     """Means of both controllers in the same episodes, and their difference.
 
     The interval is that of a paired bootstrap over episodes, with 95 % confidence.
@@ -96,7 +92,7 @@ class PairedChange(_Record):
         )
 
 
-class TaskImprovement(_Record):
+class TaskImprovement(StrictRecord):
     """The search for a better controller, after the first verified one."""
 
     schema_version: int = 1

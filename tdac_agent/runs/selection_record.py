@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import ConfigDict, Field, ValidationError
 
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import PrintableRecord, StrictRecord
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 SELECTION_FILE = "report.json"
@@ -14,11 +14,7 @@ HIDDEN_FILE = "hidden.json"
 """Report on the selected controller on hidden worlds: sums alone."""
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Scores(_Record):
+class Scores(StrictRecord):
     """Means over a fixed number of worlds, each in [0, 1]."""
 
     success: float
@@ -27,7 +23,7 @@ class Scores(_Record):
     barn: float = Field(description="The metric of BARN, at most 0.5.")
 
 
-class CandidateFigures(_Record):
+class CandidateFigures(StrictRecord):
     """How a candidate drove, in numbers of worlds of `dev`."""
 
     k: int
@@ -45,7 +41,7 @@ class CandidateFigures(_Record):
     )
 
 
-class Improvement(_Record):
+class Improvement(StrictRecord):
     """The selected controller beside what it improves, on worlds that decided nothing.
 
     Both drove on the same worlds. The interval is that of a paired bootstrap over
@@ -66,7 +62,7 @@ class Improvement(_Record):
     )
 
 
-class Selection(_Record):
+class Selection(StrictRecord):
     """`report.json` of a run on a task set: what was selected, and from what.
 
     The figures of the selected candidate are optimistic: it was chosen by them.

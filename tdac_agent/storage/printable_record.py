@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, model_validator
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from tdac_agent.storage.plain import printable
 
@@ -22,6 +22,12 @@ class PrintableRecord(BaseModel):
 
     def __setattr__(self, name: str, value: Any) -> None:
         super().__setattr__(name, _filtered(value))
+
+
+class StrictRecord(PrintableRecord):
+    """An immutable one without unknown fields."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def _filtered(value: Any) -> Any:

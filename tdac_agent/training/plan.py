@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from tdac_agent.errors import RunError
 from tdac_agent.runs.ownership import load_task
@@ -25,6 +25,7 @@ from tdac_agent.training.hyperparameters import (
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
+from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.learning.wrappers import check_wrappers
 from tdac_envs.learning.wrapping import FOR_RL
 
@@ -36,10 +37,8 @@ MOST_SEED = 2**31
 """Largest seed of a training."""
 
 
-class TrainingPlan(BaseModel):
+class TrainingPlan(StrictModel):
     """`training.json` of a training's folder."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     schema_version: Literal[1] = 1
     algo: Algo

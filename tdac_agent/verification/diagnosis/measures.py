@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from tdac_agent.episodes.trajectory import Outcome, Rollout
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.setting import Nominal
 from tdac_envs.grid.plan import path_length
 
@@ -18,13 +18,11 @@ _HIGHEST, _FAINT, _PADDING = 10.0, 0.05, 4
 _DIGITS = 6
 
 
-class Measured(PrintableRecord):
+class Measured(StrictRecord):
     """Measures of one episode of an evaluation; lengths in px, for the e-puck in m.
 
     Measures of path and smoothness are None unless the episode succeeded.
     """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     seed: int
     outcome: Outcome

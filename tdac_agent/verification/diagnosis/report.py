@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.units import Place
 
 Group = Literal["static", "unit", "end to end", "user", "judge"]
@@ -32,11 +32,7 @@ Cause = Literal[
 ]
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Diagnosis(_Record):
+class Diagnosis(StrictRecord):
     """What happened in an episode, computed from its trajectory.
 
     Distances and positions are in px, for the e-puck in m; None if they do not apply.
@@ -69,7 +65,7 @@ class Diagnosis(_Record):
     d_min: float | None = Field(None, description="Least remaining path.")
 
 
-class Failure(_Record):
+class Failure(StrictRecord):
     """One expected test that did not pass."""
 
     test: str = Field(description="Test id, as pytest prints it.")
@@ -78,7 +74,7 @@ class Failure(_Record):
     diagnosis: Diagnosis | None = None
 
 
-class Episode(_Record):
+class Episode(StrictRecord):
     """Figures of one judged episode; distances in px, for the e-puck in m."""
 
     # JSON has no infinity: a report with one could not be read back.
@@ -100,7 +96,7 @@ class Episode(_Record):
     error: str | None = None
 
 
-class Provenance(_Record):
+class Provenance(StrictRecord):
     """What was verified, and under which conditions."""
 
     task: str
@@ -128,7 +124,7 @@ class Provenance(_Record):
     versions: dict[str, str]
 
 
-class Verdict(_Record):
+class Verdict(StrictRecord):
     """Passed means: exactly the expected tests ran and each one passed."""
 
     passed: bool
@@ -137,7 +133,7 @@ class Verdict(_Record):
     failed_tests: int
 
 
-class Report(_Record):
+class Report(StrictRecord):
     """One verification."""
 
     schema_version: Literal[1] = 1

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.verification.diagnosis.report import OWN, Report
 from tdac_agent.verification.suite.privileged import REFERENCE
@@ -19,11 +19,7 @@ from tdac_agent.verification.suite.privileged import REFERENCE
 CLOCK = frozenset({"call_ms_mean", "call_ms_p99"})
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ProofRow(_Record):
+class ProofRow(StrictRecord):
     """Results of one controller."""
 
     controller: str
@@ -34,7 +30,7 @@ class ProofRow(_Record):
     seconds: float
 
 
-class SuiteCheck(_Record):
+class SuiteCheck(StrictRecord):
     """Verdict on a suite, for one task, seed and profile."""
 
     schema_version: Literal[1] = 1
