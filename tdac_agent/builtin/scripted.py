@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from tdac_agent.builtin.parameters import names_of
 from tdac_agent.builtin.provider import template_of
+from tdac_agent.builtin.template import names_of
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import Kind, Reply, Request

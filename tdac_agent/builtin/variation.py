@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tdac_agent.builtin.parameters import P
+from tdac_agent.builtin.template import P
 
 STEP = 0.15
 """Standard deviation of a change of a parameter, as a part of its range."""

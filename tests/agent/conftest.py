@@ -15,7 +15,7 @@ from small import QUICK, write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.cli.main import main
-from tdac_agent.environments.map2d.builtin import Parameters, render_controller
+from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.verification.judge.warm import WarmJudge
 
 
@@ -29,7 +29,7 @@ def small_task(tmp_path_factory):
 def good_source(small_task):
     """A controller that is verified on the small task."""
     task = small_task
-    return render_controller(Parameters(), task.params.robot, task.nominal.dt)
+    return template_for(task.params.robot, task.nominal.dt).render(MapParameters())
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,7 @@ import pytest
 
 from tdac_agent import load_task
 from tdac_agent.cli.play import drive_disturbed
-from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.builtin import EPuckParameters, template_for
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.pictures import reaches
 from tdac_agent.episodes.pictures import pictures_of
@@ -42,7 +42,7 @@ def task():
 
 @pytest.fixture(scope="module")
 def source(task):
-    return render_epuck(EPuckParameters(), task=task.nominal)
+    return template_for(task.nominal).render(EPuckParameters())
 
 
 @pytest.fixture

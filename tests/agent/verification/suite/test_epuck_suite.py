@@ -10,7 +10,7 @@ from functools import partial
 import pytest
 
 from tdac_agent import load_task
-from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.builtin import EPuckParameters, template_for
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.verification.verify import verify
 
@@ -183,7 +183,7 @@ def task():
 
 @pytest.fixture(scope="module")
 def source(task):
-    return render_epuck(EPuckParameters(), task=task.nominal)
+    return template_for(task.nominal).render(EPuckParameters())
 
 
 @pytest.fixture(scope="module")
