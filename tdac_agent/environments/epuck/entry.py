@@ -81,7 +81,7 @@ class EPuck(Environment):
         from tdac_agent.environments.epuck.pictures import WorldPictures
         from tdac_agent.environments.epuck.setting import world_setting
 
-        return WorldPictures(world_setting(setting))
+        return WorldPictures(world_setting(setting).nominal)
 
     def surroundings(self, task: Nominal) -> WorldSurroundings:
         """Returns the world with the queries of a diagnosis."""

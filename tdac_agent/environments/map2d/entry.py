@@ -82,7 +82,8 @@ class Map2D(Environment):
         from tdac_agent.environments.map2d.pictures import MapPictures
         from tdac_agent.environments.map2d.setting import map_setting
 
-        return MapPictures(map_setting(setting))
+        own = map_setting(setting)
+        return MapPictures(own.nominal, own.robot_image, own.shown_in)
 
     def surroundings(self, task: Nominal) -> MapSurroundings:
         """Returns the map with the queries of a diagnosis."""

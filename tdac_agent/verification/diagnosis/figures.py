@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -31,42 +31,27 @@ from tdac_envs.drive.task import Pose
 MAX_FACT = 240
 
 
-class Figures(Protocol):
-    """Figures of an episode."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def held_out(self) -> bool:
-        """Whether its start is held out."""
-
-    @property
-    def outcome(self) -> str:
-        """How it ended."""
-
-    @property
-    def d0(self) -> float:
-        """Remaining path at the start, px or m."""
-
-    @property
-    def d_min(self) -> float:
-        """Least remaining path, px or m."""
-
-
 class EpisodeFigures(NamedTuple):
-    """Figures of an episode whose start is not held out; see `Figures`."""
+    """Figures of a failed episode for its picture.
+
+    Attributes:
+        name: Its name.
+        outcome: How it ended.
+        d0: Remaining path at the start, px or m.
+        d_min: Least remaining path, px or m.
+        held_out: Whether its start is held out.
+    """
 
     name: str
     outcome: str
     d0: float
     d_min: float
+    held_out: bool = False
 
-    @property
-    def held_out(self) -> bool:
-        """See `Figures`."""
-        return False
+
+def figures_of(episode: Episode) -> EpisodeFigures:
+    """The figures of an episode of a report."""
+    return EpisodeFigures(*(getattr(episode, name) for name in EpisodeFigures._fields))
 
 
 def draw_trajectories(
@@ -107,7 +92,11 @@ def draw_failures(
         background = background or pictures_of(task.setting).backdrop()
         diagnosis = diagnosis_of(report, episode)
         event = event_of(
-            task.nominal, trajectory, episode, diagnosis, task.setting.shown
+            task.nominal,
+            trajectory,
+            figures_of(episode),
+            diagnosis,
+            task.setting.shown,
         )
         picture = run_picture(background, trajectory.poses, event)
         files.append(folder / f"{file_stem(episode.name)}.png")
@@ -142,7 +131,7 @@ def file_stem(name: str) -> str:
 def event_of(
     task: Nominal,
     trajectory: Trajectory,
-    episode: Figures,
+    episode: EpisodeFigures,
     diagnosis: Diagnosis | None,
     units: Units | None = None,
 ) -> Event:

@@ -13,10 +13,11 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.figures import (
-    Figures,
+    EpisodeFigures,
     diagnosis_of,
     event_of,
     failed_episodes,
+    figures_of,
 )
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 from tdac_envs.drawing.backdrop import Backdrop
@@ -59,14 +60,14 @@ def failure_picture(
     """
     for episode, trajectory in failed_episodes(report, trajectories):
         if not episode.held_out and trajectory.steps:
-            found = diagnosis_of(report, episode)
-            return episode_picture(task, episode, found, trajectory, side)
+            figures, diagnosis = figures_of(episode), diagnosis_of(report, episode)
+            return episode_picture(task, figures, diagnosis, trajectory, side)
     return None
 
 
 def episode_picture(
     task: Task,
-    episode: Figures,
+    episode: EpisodeFigures,
     diagnosis: Diagnosis | None,
     trajectory: Trajectory,
     side: int,
