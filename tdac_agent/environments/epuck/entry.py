@@ -11,9 +11,9 @@ from tdac_agent.tasks.units import METRES, Point
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template
+    from tdac_agent.environments.epuck.oracle import WorldOracle
     from tdac_agent.environments.epuck.pictures import WorldPictures
     from tdac_agent.environments.epuck.surroundings import WorldSurroundings
-    from tdac_agent.environments.epuck.world_copies import WorldOracle
     from tdac_agent.tasks.first_run import CodePart
     from tdac_agent.tasks.task import Task
     from tdac_agent.tasks.task_file import TaskFile
@@ -91,7 +91,7 @@ class EPuck(Environment):
 
     def oracle(self) -> WorldOracle:
         """Returns an oracle for grids and worlds."""
-        from tdac_agent.environments.epuck.world_copies import WorldOracle
+        from tdac_agent.environments.epuck.oracle import WorldOracle
 
         return WorldOracle()
 

@@ -19,8 +19,7 @@ from tdac_agent.builtin.provider import Builtin, template_of
 from tdac_agent.builtin.template import read_parameters
 from tdac_agent.environments.epuck.builtin import EPuckParameters, template_for
 from tdac_agent.environments.epuck.entry import EPUCK
-from tdac_agent.environments.epuck.oracle import occupied_at
-from tdac_agent.environments.epuck.world_copies import WorldOracle
+from tdac_agent.environments.epuck.oracle import WorldOracle, occupied_at
 from tdac_agent.episodes.episode import Record
 from tdac_agent.models.provider import Request
 from tdac_agent.prompting.extract import extract_source

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from driving import drive
 
-from tdac_agent.environments.map2d.touch import nearest_corner, nearest_touch
+from tdac_agent.environments.map2d.surroundings import nearest_corner, nearest_touch
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.touch import side_of, where_on_the_wall
 from tdac_envs.drive.task import Pose
