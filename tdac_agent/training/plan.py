@@ -26,8 +26,9 @@ from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 from tdac_envs.core.strict_model import StrictModel
+from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 from tdac_envs.learning.wrappers import check_wrappers
-from tdac_envs.learning.wrapping import FOR_RL
+from tdac_envs.learning.wrapping import FOR_RL, wrap_for_rl
 
 Variation = Literal["nominal", "jitter", "mixed", "random"]
 EVALUATIONS, EPISODES = 12, 100
@@ -188,23 +189,39 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
         TaskError: A task has changed since the plan was made, or cannot be used.
     """
     from tdac_envs.learning.sb3 import SB3VecEnv
-    from tdac_envs.learning.wrapping import wrap_for_rl
 
-    each = []
     tasks = tasks_of(plan)
-    own = plan.env_kwargs if training else {}
-    for task in tasks:
-        options = task.disturbed_options(plan.disturbance)
-        varied = {**options, "variation": plan.variation, **own}
-        each.append({**task.env_kwargs(), **varied})
+    own = {"variation": plan.variation, **(plan.env_kwargs if training else {})}
+    each = [
+        task.env_kwargs() | task.disturbed_options(plan.disturbance) | own
+        for task in tasks
+    ]
+    make = load_env_creator(str(gym.spec(tasks[0].spec.env).vector_entry_point))
+    return SB3VecEnv(wrapped_batch(plan, make, count, "SameStep", each=each))
+
+
+def wrapped_batch(
+    plan: TrainingPlan, make: Any, count: int, mode: str, **kwargs: Any
+) -> WrappedVectorEnv:
+    """Makes a batch of robots with a plan's wrappers.
+
+    Args:
+        plan: Plan of the training.
+        make: Entry point of the batch.
+        count: Number of robots.
+        mode: When robots are reset.
+        kwargs: Further arguments of the entry point.
+
+    Raises:
+        TaskError: An argument is unknown.
+    """
     try:
-        name = str(gym.spec(tasks[0].spec.env).vector_entry_point)
-        make: Any = load_env_creator(name)
-        batch = make(count, autoreset_mode="SameStep", each=each)
+        batch = make(count, autoreset_mode=mode, **kwargs)
     except TypeError as error:
         reason = str(error).partition("() ")[2]
         raise TaskError(f"env_kwargs of the hyperparameters: {reason}") from error
-    return SB3VecEnv(wrap_for_rl(batch, plan.wrappers))
+    wrapped: WrappedVectorEnv = wrap_for_rl(batch, plan.wrappers)
+    return wrapped
 
 
 def _env_kwargs(

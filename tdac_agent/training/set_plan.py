@@ -17,6 +17,7 @@ from tdac_agent.training.plan import (
     MOST_ROBOTS,
     TrainingPlan,
     policy_class,
+    wrapped_batch,
 )
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
@@ -133,15 +134,5 @@ def _batch(
     plan: TrainingPlan, count: int, split: str, mode: str, own: dict[str, Any]
 ) -> WrappedVectorEnv:
     set_of(plan)
-    try:
-        batch = make_batch(
-            count,
-            autoreset_mode=mode,
-            level=str(plan.set),
-            split=split,
-            **own,
-        )
-    except TypeError as error:
-        reason = str(error).partition("() ")[2]
-        raise TaskError(f"env_kwargs of the hyperparameters: {reason}") from error
-    return wrap_for_rl(batch, plan.wrappers)
+    facts = {"level": str(plan.set), "split": split, **own}
+    return wrapped_batch(plan, make_batch, count, mode, **facts)
