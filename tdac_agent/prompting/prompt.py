@@ -15,12 +15,10 @@ import jinja2
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from tdac_agent.prompting.context import context_of
-from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.rule_answer import MAX_OPERATIONS
 from tdac_agent.prompting.rules import MAX_RULE_CHARS, RepairRule, render_block
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
@@ -177,38 +175,6 @@ def _render(
         raise PromptError(f"the prompt {template.name}: {error}") from error
 
 
-def repair_prompt(
-    kind: str,
-    prompt: str,
-    controller: str,
-    report: Report,
-    *,
-    earlier: tuple[str, ...] = (),
-    rules: tuple[RepairRule, ...] = (),
-    unchanged: bool = False,
-) -> str:
-    """Returns the prompt to edit a controller or to summarise its failures as rules.
-
-    Args:
-        kind: `edit` or `summarise`.
-        prompt: The prompt for a new controller, with the current rules.
-        controller: Source of the failed controller.
-        report: Its report.
-        earlier: Earlier attempts, one line each.
-        rules: The rules in force, with their effects.
-        unchanged: Whether the last edit returned the same code.
-    """
-    return repair_question(
-        kind,
-        prompt,
-        controller,
-        render_feedback(report),
-        earlier=earlier,
-        rules=rules,
-        unchanged=unchanged,
-    )
-
-
 def repair_question(
     kind: str,
     prompt: str,
@@ -222,7 +188,7 @@ def repair_question(
     aim: str = "",
     picture: NamedPicture | None = None,
 ) -> str:
-    """Like `repair_prompt`, from the text of the feedback.
+    """Returns the prompt to edit a controller, to improve it, or to learn rules.
 
     Args:
         kind: `edit`, `summarise` or `improve`.

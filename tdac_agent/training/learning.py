@@ -118,8 +118,8 @@ def evaluate_batch(model: Any, envs: VecMonitor, seed: int | Sequence[int]) -> P
 
 def _point(*columns: Any) -> Point:
     """The results of an evaluation whose steps and seconds are not known yet."""
-    means = (round(float(np.mean(values)), 6) for values in columns)
-    return Point(0, 0.0, *means, train_success_rate=float("nan"))
+    reached, hit, gained, steps = (round(float(np.mean(each)), 6) for each in columns)
+    return Point(0, 0.0, reached, hit, gained, steps, float("nan"))
 
 
 class _Evaluations(BaseCallback):
