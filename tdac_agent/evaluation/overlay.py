@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.evaluation.evaluation_report import Result
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import write_png
@@ -81,7 +80,7 @@ def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
     The first policy is on top; a dot marks a contact. Moving obstacles are those at
     the end of the first policy's first episode.
     """
-    chart = pictures_of(task.setting).backdrop().whole()
+    chart = task.pictures().backdrop().whole()
     canvas, movers = chart.canvas, overlays[0].movers.astype(np.float64)
     draw_movers(canvas, [discs_on(chart, discs) for discs in movers])
     for number, overlay in reversed(list(enumerate(overlays))):

@@ -19,8 +19,13 @@ from tdac_agent.tasks.provenance import origin, sha256_of, versions
 from tdac_agent.tasks.task import Task, display_name, lay_out
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
-from tdac_agent.verification.diagnosis.report import OWN, SHIPPED, Provenance, Report
-from tdac_agent.verification.diagnosis.shown import in_units
+from tdac_agent.verification.diagnosis.report import (
+    OWN,
+    SHIPPED,
+    Provenance,
+    Report,
+    in_units,
+)
 from tdac_agent.verification.judge.jobs import Findings, Job, write_job
 from tdac_agent.verification.judge.report_log import (
     read_findings,

@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.setting import Nominal
@@ -61,7 +60,7 @@ def draw_trajectories(
     path: Path,
 ) -> None:
     """Writes a PNG of the map or world with trajectories and outcomes by episode."""
-    picture = pictures_of(task.setting).trajectories(
+    picture = task.pictures().trajectories(
         [trajectory.poses for trajectory in trajectories.values()],
         [outcomes.get(name, "") for name in trajectories],
         list(trajectories),
@@ -89,7 +88,7 @@ def draw_failures(
     """
     background, files = None, []
     for episode, trajectory in failed_episodes(report, trajectories):
-        background = background or pictures_of(task.setting).backdrop()
+        background = background or task.pictures().backdrop()
         diagnosis = diagnosis_of(report, episode)
         event = event_of(
             task.nominal,

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from PIL import Image as PilImage
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
@@ -83,7 +82,7 @@ def episode_picture(
     """
     units = task.setting.units
     event = event_of(task.nominal, trajectory, episode, diagnosis, units)
-    background = pictures_of(task.setting).backdrop()
+    background = task.pictures().backdrop()
     return picture_of_event(background, trajectory, event, units, side)
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
 from tdac_agent.storage.printable_record import StrictRecord
-from tdac_agent.tasks.units import Place
+from tdac_agent.tasks.units import Place, Units
 
 Group = Literal["static", "unit", "end to end", "user", "judge"]
 GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
@@ -180,3 +181,36 @@ def group_of(test: str) -> Group:
         "test_end_to_end.py": "end to end",
     }
     return files.get(test.partition("::")[0], "user")
+
+
+_PIXELS = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?) px\b")
+# Other tests compare with grids of their own, which have no scale.
+_ON_THE_MAP = "end to end"
+
+
+def in_units(report: Report, units: Units) -> Report:
+    """A copy whose failures read in the user's units; it is not stored.
+
+    Figures stay in the units of the environment (`Provenance.unit`).
+
+    Args:
+        report: The report of a verification.
+        units: As from `Setting.shown`.
+    """
+    if units.shown is None:
+        return report
+    failures = tuple(_failure(failure, units) for failure in report.failures)
+    return report.model_copy(update={"failures": failures})
+
+
+def _failure(failure: Failure, units: Units) -> Failure:
+    changes: dict[str, object] = {}
+    if failure.group == _ON_THE_MAP:
+        changes["message"] = _PIXELS.sub(
+            lambda found: units.far(float(found[1])), failure.message
+        )
+    diagnosis = failure.diagnosis
+    if diagnosis is not None and diagnosis.shown is not None:
+        text = {"text": diagnosis.shown}
+        changes["diagnosis"] = diagnosis.model_copy(update=text)
+    return failure.model_copy(update=changes)

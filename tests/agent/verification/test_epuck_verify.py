@@ -14,7 +14,6 @@ from tdac_agent.cli.play import drive_disturbed
 from tdac_agent.environments.epuck.builtin import EPuckParameters, template_for
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.pictures import reaches
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.evaluation.policy import load_controller
 from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.runs.run_record import load_run
@@ -101,7 +100,7 @@ def test_feedback_is_in_millimetres(task, warm):
 
 def test_a_trajectory_picture_has_each_run(task):
     """A run goes through the picture where it went through the world, y up."""
-    pictures, view = pictures_of(task.setting), pictures_of(task.setting).backdrop()
+    pictures, view = task.pictures(), task.pictures().backdrop()
     poses = np.array([(-0.6, 0.0, 0.0), (-0.6, 0.4, 1.5), (-0.2, 0.4, 0.0)])
     image = pictures.trajectories([poses], ["out of time"], ["one"])
     (u, v), (left, _), (_, low) = view.whole().at(
@@ -118,7 +117,7 @@ def test_frames_show_what_the_sensors_read(task, warm, tmp_path):
     """A video's frames are of one size, and a ray ends where its reading says."""
     verify(RAM, task, profile="policy", judge=warm, out=tmp_path)
     rollout = drive_disturbed(task, RAM.encode(), 0, Disturbance(), "auto").rollout
-    frames = list(pictures_of(task.setting).frames(rollout, 2))
+    frames = list(task.pictures().frames(rollout, 2))
     assert len({frame.shape for frame in frames}) == 1
     assert len(frames) == (rollout.trajectory.steps + 1) // 2 + 1
     assert np.allclose(reaches(TABLE[:, 1].astype(np.float32)), TABLE[:, 0], atol=1e-6)
