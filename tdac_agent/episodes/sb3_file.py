@@ -166,14 +166,14 @@ def load_weights(weights: dict[str, Weights]) -> Any:
         "Half": torch.float16,
         "BFloat16": torch.bfloat16,
     }
-    found = {}
+    tensors = {}
     for name, saved in weights.items():
         # A copy, since torch writes to what it is given.
         flat = torch.frombuffer(bytearray(saved.data), dtype=kinds[saved.kind])
-        found[name] = flat.to(torch.float32).reshape(saved.shape)
-        if not bool(torch.isfinite(found[name]).all()):
+        tensors[name] = flat.to(torch.float32).reshape(saved.shape)
+        if not bool(torch.isfinite(tensors[name]).all()):
             raise ControllerFileError("the policy's weights are not all finite numbers")
-    return found
+    return tensors
 
 
 def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
@@ -193,15 +193,15 @@ def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
 def _network(data: bytes) -> tuple[str, Settings]:
     """Returns the module of the network's class, and its settings."""
     try:
-        found = json.loads(data.decode("utf-8"))
-        module = str((found.get("policy_class") or {}).get("__module__"))
-        given = dict(found.get("policy_kwargs") or {})
-        given.setdefault("use_sde", found.get("use_sde") or False)
+        parsed = json.loads(data.decode("utf-8"))
+        module = str((parsed.get("policy_class") or {}).get("__module__"))
+        arguments = dict(parsed.get("policy_kwargs") or {})
+        arguments.setdefault("use_sde", parsed.get("use_sde") or False)
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"its `{DATA}` is damaged: {one_line(error)}") from None
     kept = {
         key: value
-        for key, value in given.items()
+        for key, value in arguments.items()
         if not key.startswith(":") and key not in _FOR_TRAINING
     }
     for key, value in kept.items():

@@ -65,7 +65,7 @@ class PromptTemplate:
 FULL = PromptTemplate()
 
 
-def load_template(given: str) -> PromptTemplate:
+def load_template(name: str) -> PromptTemplate:
     """Returns a shipped variant by its name, or the template in a file.
 
     A file may use all variables of `context_of` and `{% include %}` the shipped
@@ -74,15 +74,15 @@ def load_template(given: str) -> PromptTemplate:
     Raises:
         PromptError: There is no such variant or file.
     """
-    if given in VARIANTS:
-        return PromptTemplate(given)
+    if name in VARIANTS:
+        return PromptTemplate(name)
     try:
-        return PromptTemplate(given, read_file(given, TEXT_BYTES).decode("utf-8"))
+        return PromptTemplate(name, read_file(name, TEXT_BYTES).decode("utf-8"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
         known = ", ".join(VARIANTS)
         raise PromptError(
-            f"no prompt {given!r}: {reason}; expected a template file or {known}"
+            f"no prompt {name!r}: {reason}; expected a template file or {known}"
         ) from error
 
 
@@ -184,7 +184,7 @@ def repair_question(
     earlier: tuple[str, ...] = (),
     rules: tuple[RepairRule, ...] = (),
     unchanged: bool = False,
-    about: str = ONE_TASK,
+    scope: str = ONE_TASK,
     aim: str = "",
     picture: NamedPicture | None = None,
 ) -> str:
@@ -198,7 +198,7 @@ def repair_question(
         earlier: Earlier attempts, one line each.
         rules: The rules in force, with their effects.
         unchanged: Whether the last edit returned the same code.
-        about: What the scope `task` of a rule means.
+        scope: What the scope `task` of a rule means.
         aim: What an improved controller shall do better.
         picture: The picture that goes with the question.
     """
@@ -212,7 +212,7 @@ def repair_question(
             earlier=earlier,
             rules=rules,
             unchanged=unchanged,
-            about=about,
+            scope=scope,
             aim=aim,
             picture=picture,
             most_operations=MAX_OPERATIONS,

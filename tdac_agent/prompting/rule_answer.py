@@ -100,8 +100,8 @@ def parse_operations(reply: str) -> list[Add | Edit | Drop]:
     if not blocks and reply.lstrip().startswith("["):
         blocks = [reply]
     if len(blocks) != 1:
-        found = f"{len(blocks)} blocks" if blocks else "no block"
-        raise RuleAnswerError(f"expected one fenced ```json block, got {found}")
+        count = f"{len(blocks)} blocks" if blocks else "no block"
+        raise RuleAnswerError(f"expected one fenced ```json block, got {count}")
     try:
         return _Operations.validate_python(json.loads(blocks[0]))
     except ValidationError as error:

@@ -114,8 +114,8 @@ def make_plan(
     disturbance = disturbance or Disturbance(0.0, 0.0, 0.0, 0)
     for task in loaded:
         task.disturbed_options(disturbance)
-    given = read_hyperparameters(config or config_file(algo), loaded[0].spec.env)
-    chosen = FOR_RL if given.wrappers is None else given.wrappers
+    defaults = read_hyperparameters(config or config_file(algo), loaded[0].spec.env)
+    chosen = FOR_RL if defaults.wrappers is None else defaults.wrappers
     names = chosen if wrappers is None else wrappers
     check_wrappers(names)
     if len(loaded) > 1 and "goal-relative" not in names:
@@ -123,21 +123,21 @@ def make_plan(
             "several tasks need --wrapper goal-relative: positions on one map mean "
             "nothing on another"
         )
-    count = n_envs or given.n_envs
-    wanted = steps or given.steps
+    count = n_envs or defaults.n_envs
+    wanted = steps or defaults.steps
     return TrainingPlan(
         algo=algo,
         tasks=tuple(map(_lasting_name, tasks)),
         task_sha256=tuple(task.sha256() for task in loaded),
         wrappers=names,
         variation=variation or "jitter",
-        env_kwargs=_env_kwargs(given, variation, loaded[0]),
+        env_kwargs=_env_kwargs(defaults, variation, loaded[0]),
         disturbance=disturbance,
         steps=wanted,
         seed=seed,
         n_envs=max(count, len(tasks)),
-        policy=policy_class(given, names),
-        hyperparameters=given.model,
+        policy=policy_class(defaults, names),
+        hyperparameters=defaults.model,
         evaluate_every=max(wanted // EVALUATIONS, 1),
         episodes=max(episodes, len(tasks)),
     )
@@ -225,22 +225,22 @@ def wrapped_batch(
 
 
 def _env_kwargs(
-    given: Hyperparameters, variation: Variation | None, task: Task
+    defaults: Hyperparameters, variation: Variation | None, task: Task
 ) -> dict[str, Any]:
     """Arguments of the training environments.
 
     Raises:
         TaskError: The task sets one of them.
     """
-    for name in given.env:
+    for name in defaults.env:
         if name in task.env_kwargs():
             raise TaskError(f"env_kwargs: {name} is set by the task; leave it out")
-    return given.env | ({} if variation is None else {"variation": variation})
+    return defaults.env | ({} if variation is None else {"variation": variation})
 
 
-def policy_class(given: Hyperparameters, wrappers: tuple[str, ...]) -> str:
+def policy_class(defaults: Hyperparameters, wrappers: tuple[str, ...]) -> str:
     """The policy class, for observations of one array or of several."""
-    flat = given.policy.replace("MultiInput", "Mlp")
+    flat = defaults.policy.replace("MultiInput", "Mlp")
     return flat if "flatten" in wrappers else flat.replace("Mlp", "MultiInput")
 
 

@@ -21,14 +21,16 @@ FACTS = "policy.json"
 LEARNERS = ("stable_baselines3", "sb3_contrib", "torch")
 
 
-def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> None:
+def write_policy(
+    model: Any, folder: Path, plan: TrainingPlan, evaluation: Point
+) -> None:
     """Writes `policy.zip`, which `tdac evaluate` reads, and `policy.json`.
 
     Args:
         model: Model of stable-baselines3.
         folder: Folder of the training.
         plan: Plan of the training.
-        found: Evaluation of the model.
+        evaluation: Evaluation of the model.
     """
     saved = SavedPolicy(
         algo=plan.algo,
@@ -37,7 +39,7 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> 
         set_sha256=plan.set_sha256,
         wrappers=plan.wrappers,
         variation=plan.env_kwargs.get("variation", plan.variation),
-        steps=found.steps,
+        steps=evaluation.steps,
         seed=plan.seed,
     )
     draft = folder / f".{POLICY}"
@@ -47,9 +49,9 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> 
     facts = {
         **plan.model_dump(mode="json"),
         "steps_planned": plan.steps,
-        "steps": found.steps,
-        "seconds": found.seconds,
-        "evaluation": asdict(found),
+        "steps": evaluation.steps,
+        "seconds": evaluation.seconds,
+        "evaluation": asdict(evaluation),
         "cores": os.cpu_count(),
         "versions": {**versions(), **_learner_versions()},
     }

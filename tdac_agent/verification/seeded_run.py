@@ -141,8 +141,8 @@ def _ending(path: Path, output: Path) -> JobEnding:
     except (OSError, ValidationError) as error:
         printed = output.read_text("utf-8", "replace") if output.is_file() else ""
         lines = [line.strip() for line in printed.splitlines() if line.strip()]
-        said = " | ".join(lines[-4:]) or "no output"
-        raise Fault(f"the judge did not finish the episodes: {said}") from error
+        last = " | ".join(lines[-4:]) or "no output"
+        raise Fault(f"the judge did not finish the episodes: {last}") from error
     if ending.fault is not None:
         raise Fault(ending.fault)
     if ending.problem is not None:

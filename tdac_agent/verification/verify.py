@@ -107,10 +107,10 @@ def verify(
             metres=task.setting.shown != task.setting.units,
         )
         _prepare(job, task, source, suites)
-        given = _files_in(job.task)
+        files = _files_in(job.task)
         output = _run_judge(job, folder, warm, meanwhile)
         findings = read_findings(job.out, output)
-        if _files_in(job.task) != given:
+        if _files_in(job.task) != files:
             raise Fault("the suite changed the task's files, so there is no verdict")
         tests, failures = read_outcomes(job.out / "report.jsonl", findings, output)
         report = Report(
@@ -142,7 +142,7 @@ def kept_report(
         report = Report.model_validate(parse_json(content))
     except (OSError, ValueError):
         return None
-    about = report.provenance
+    provenance = report.provenance
     wanted = {
         "controller_sha256": sha256_of(raw),
         "task_sha256": task.sha256(),
@@ -152,7 +152,7 @@ def kept_report(
         "seed": seed_of(raw, task) if seed is None else seed,
         "versions": versions(),
     }
-    same = all(getattr(about, name) == value for name, value in wanted.items())
+    same = all(getattr(provenance, name) == value for name, value in wanted.items())
     return report if same else None
 
 

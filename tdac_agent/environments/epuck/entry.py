@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tdac_envs.epuck.task import EPuckTask
 
 
-class EPuck(Environment):
+class EPuckEnvironment(Environment):
     """E-pucks in Webots worlds, in m. See `Environment`."""
 
     id = "TDAC-EPuck-v0"
@@ -137,4 +137,4 @@ def _own(task: Nominal) -> EPuckTask:
     return task
 
 
-EPUCK = EPuck()
+EPUCK = EPuckEnvironment()

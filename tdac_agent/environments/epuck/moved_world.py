@@ -120,8 +120,8 @@ def turned_groups(text: str, angle: float) -> str:
 def _turned(node: str, angle: float) -> str:
     back = Motion(-angle, 0.0, 0.0)
 
-    def pose(found: re.Match[str]) -> str:
-        space, x, y, z, yaw = found.groups()
+    def pose(match: re.Match[str]) -> str:
+        space, x, y, z, yaw = match.groups()
         u, v = back.point(float(x), float(y))
         turn = float(yaw or 0.0) - angle
         return (

@@ -28,7 +28,7 @@ class EPuckRobot(StrictModel):
     )
 
 
-class EPuckParams(StrictModel):
+class WorldParams(StrictModel):
     """Contents of `params.json`; metres, headings counter-clockwise from +x, rad."""
 
     schema_version: Literal[1] = 1
@@ -44,7 +44,7 @@ class EPuckParams(StrictModel):
     notes: tuple[str, ...] = Field((), description="Assumptions of the world reader.")
 
     @classmethod
-    def read(cls, written: Any) -> EPuckParams:
+    def read(cls, written: Any) -> WorldParams:
         """The parameters of a file's contents.
 
         Raises:
@@ -55,7 +55,7 @@ class EPuckParams(StrictModel):
 
 def params_of(
     task: EPuckTask, source: str, digest: str, notes: tuple[str, ...]
-) -> EPuckParams:
+) -> WorldParams:
     """Returns the contents of the file for a task.
 
     Args:
@@ -64,7 +64,7 @@ def params_of(
         digest: Hash of the flat world file.
         notes: Assumptions of the world reader.
     """
-    return EPuckParams(
+    return WorldParams(
         source=source,
         source_sha256=digest,
         start=task.start[:2],

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tdac_envs.map2d.task import Map2DTask
 
 
-class Map2D(Environment):
+class Map2DEnvironment(Environment):
     """Disc-shaped robots with range rays on maps, in px. See `Environment`."""
 
     id = "TDAC-Map2D-v0"
@@ -133,4 +133,4 @@ def _own(task: Nominal) -> Map2DTask:
     return task
 
 
-MAP2D = Map2D()
+MAP2D = Map2DEnvironment()

@@ -148,10 +148,10 @@ def nearest_touch(task: Map2DTask, pose: Pose, reach: float) -> Touch | None:
         pose: Pose of the body.
         reach: Largest distance from the centre of the body, px.
     """
-    found = _nearest_square(task, pose.x, pose.y, reach)
-    if found is None:
+    nearest = _nearest_square(task, pose.x, pose.y, reach)
+    if nearest is None:
         return None
-    wall, border = found
+    wall, border = nearest
     bearing = math.atan2(wall[1] - pose.y, wall[0] - pose.x) - pose.heading
     return Touch(
         wall=wall,

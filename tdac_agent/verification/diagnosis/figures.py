@@ -118,8 +118,10 @@ def failed_episodes(
 
 def diagnosis_of(report: Report, episode: Episode) -> Diagnosis | None:
     """The diagnosis of an episode, if there is one."""
-    found = (failure.diagnosis for failure in report.failures)
-    return next((d for d in found if d is not None and d.episode == episode.name), None)
+    diagnoses = (failure.diagnosis for failure in report.failures)
+    return next(
+        (d for d in diagnoses if d is not None and d.episode == episode.name), None
+    )
 
 
 def file_stem(name: str) -> str:

@@ -152,11 +152,11 @@ class Report(StrictRecord):
         passed = sum(outcome == "passed" for outcome in self.tests.values())
         counts = (len(self.tests), passed, len(self.tests) - passed)
         verdict = self.verdict
-        given = (verdict.expected, verdict.passed_tests, verdict.failed_tests)
+        stated = (verdict.expected, verdict.passed_tests, verdict.failed_tests)
         failed = {name for name, outcome in self.tests.items() if outcome != "passed"}
-        if given != counts or {failure.test for failure in self.failures} != failed:
+        if stated != counts or {failure.test for failure in self.failures} != failed:
             raise ValueError(
-                f"expected counts {counts} and their failures, got {given}"
+                f"expected counts {counts} and their failures, got {stated}"
             )
         if verdict.passed != (0 < passed == len(self.tests)):
             raise ValueError(f"passed={verdict.passed} contradicts counts {counts}")
@@ -207,7 +207,7 @@ def _failure(failure: Failure, units: Units) -> Failure:
     changes: dict[str, object] = {}
     if failure.group == _ON_THE_MAP:
         changes["message"] = _PIXELS.sub(
-            lambda found: units.far(float(found[1])), failure.message
+            lambda match: units.far(float(match[1])), failure.message
         )
     diagnosis = failure.diagnosis
     if diagnosis is not None and diagnosis.shown is not None:

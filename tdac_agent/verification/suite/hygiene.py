@@ -170,5 +170,5 @@ HYGIENE: dict[str, Callable[[ast.Module], Iterator[str]]] = {
 
 def hygiene_error(tree: ast.Module, pattern: str) -> str | None:
     """Names the lines with an unstable pattern; None without one."""
-    found = list(HYGIENE[pattern](tree))
-    return f"{pattern.replace('_', ' ')}: {'; '.join(found[:8])}" if found else None
+    uses = list(HYGIENE[pattern](tree))
+    return f"{pattern.replace('_', ' ')}: {'; '.join(uses[:8])}" if uses else None

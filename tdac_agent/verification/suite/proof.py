@@ -106,7 +106,7 @@ def verdict_on_suite(
         rows: One row per controller.
         seconds: Duration of the check, s.
     """
-    about = reference.provenance
+    provenance = reference.provenance
     problems = [problem for row in rows for problem in problems_of(row)]
     failed = {test for row in rows for test in row.failures}
     notes = [
@@ -116,13 +116,13 @@ def verdict_on_suite(
     ]
     return SuiteCheck(
         proven=not problems,
-        task=about.task,
-        task_sha256=about.task_sha256,
-        suite=about.suite,
-        suite_sha256=about.suite_sha256,
-        profile=about.profile,
-        seed=about.seed,
-        sandbox=about.sandbox,
+        task=provenance.task,
+        task_sha256=provenance.task_sha256,
+        suite=provenance.suite,
+        suite_sha256=provenance.suite_sha256,
+        profile=provenance.profile,
+        seed=provenance.seed,
+        sandbox=provenance.sandbox,
         rows=tuple(rows),
         problems=tuple(problems),
         notes=tuple(notes),
