@@ -153,9 +153,7 @@ def check_kind(saved: SavedNetwork) -> None:
         raise ControllerFileError(str(fault)) from fault
     shapes = {name: weights.shape for name, weights in saved.weights.items()}
     odd = sorted(first.keys() ^ shapes.keys())
-    odd += [
-        name for name in shapes if not odd and _differs(name, first, second, shapes)
-    ]
+    odd = odd or [name for name in shapes if _differs(name, first, second, shapes)]
     if odd:
         raise ControllerFileError(
             f"the policy's weights do not fit its settings: {one_line(odd[0])[:80]}"

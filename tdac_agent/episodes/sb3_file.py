@@ -102,7 +102,9 @@ def read_policy(file: Path) -> SavedNetwork:
         ControllerFileError: It is not a stable-baselines3 policy, or is invalid.
     """
     try:
-        parts = _parts(read_file(file, MOST_BYTES))
+        content = read_file(file, MOST_BYTES)
+        most = min(MOST_BYTES, _MOST_GROWTH * len(content) + _SLACK_BYTES)
+        parts = read_zip(content, most, {DATA, WEIGHTS, METADATA})
         if not {DATA, WEIGHTS} <= parts.keys():
             raise ValueError(f"it has no `{DATA}` or no `{WEIGHTS}`")
     except (OSError, ValueError) as error:
@@ -117,25 +119,6 @@ def read_policy(file: Path) -> SavedNetwork:
         message = f"the policy {str(file)!r} cannot be used: {one_line_reason(error)}"
         raise ControllerFileError(message) from error
     return SavedNetwork(saved, METADATA in parts, module, settings, weights)
-
-
-def _parts(content: bytes) -> dict[str, bytes]:
-    """Returns the parts of a policy file that are used, by name.
-
-    Raises:
-        ValueError: It is damaged, or much larger when unpacked.
-    """
-    most = min(MOST_BYTES, _MOST_GROWTH * len(content) + _SLACK_BYTES)
-    return read_zip(content, most, {DATA, WEIGHTS, METADATA})
-
-
-def read_metadata(file: Path) -> SavedPolicy | None:
-    """Reads the metadata of a policy file; None if it has none.
-
-    Raises:
-        ControllerFileError: It is not a stable-baselines3 policy, or is invalid.
-    """
-    return read_policy(file).saved
 
 
 def write_metadata(file: Path, saved: SavedPolicy) -> None:

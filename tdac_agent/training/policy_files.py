@@ -21,16 +21,14 @@ FACTS = "policy.json"
 LEARNERS = ("stable_baselines3", "sb3_contrib", "torch")
 
 
-def write_policy(
-    model: Any, folder: Path, plan: TrainingPlan, evaluation: Point
-) -> None:
+def write_policy(model: Any, folder: Path, plan: TrainingPlan, point: Point) -> None:
     """Writes `policy.zip`, which `tdac evaluate` reads, and `policy.json`.
 
     Args:
         model: Model of stable-baselines3.
         folder: Folder of the training.
         plan: Plan of the training.
-        evaluation: Evaluation of the model.
+        point: Evaluation of the model.
     """
     saved = SavedPolicy(
         algo=plan.algo,
@@ -39,7 +37,7 @@ def write_policy(
         set_sha256=plan.set_sha256,
         wrappers=plan.wrappers,
         variation=plan.env_kwargs.get("variation", plan.variation),
-        steps=evaluation.steps,
+        steps=point.steps,
         seed=plan.seed,
     )
     draft = folder / f".{POLICY}"
@@ -49,9 +47,9 @@ def write_policy(
     facts = {
         **plan.model_dump(mode="json"),
         "steps_planned": plan.steps,
-        "steps": evaluation.steps,
-        "seconds": evaluation.seconds,
-        "evaluation": asdict(evaluation),
+        "steps": point.steps,
+        "seconds": point.seconds,
+        "evaluation": asdict(point),
         "cores": os.cpu_count(),
         "versions": {**versions(), **_learner_versions()},
     }
