@@ -118,6 +118,19 @@ def quick():
     return QUICK
 
 
+@pytest.fixture
+def alarm():
+    """Interrupts the test so many seconds after it is called; 0 for never."""
+
+    def late(number, frame):
+        raise TimeoutError("still at work")
+
+    before = signal.signal(signal.SIGALRM, late)
+    yield signal.alarm
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
 def mentioning(text: str) -> list[int]:
     """Running processes with a text in their command line, environment or folder."""
     found = []
