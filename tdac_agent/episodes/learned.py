@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -105,15 +105,9 @@ class Learned:
 class _Spaces:
     """Observation and action space; compared by text, as keys of a cache."""
 
-    observation: Space[Any]
-    action: Space[Any]
+    observation: Space[Any] = field(compare=False)
+    action: Space[Any] = field(compare=False)
     text: str
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Spaces) and self.text == other.text
-
-    def __hash__(self) -> int:
-        return hash(self.text)
 
 
 @lru_cache(maxsize=4)

@@ -244,7 +244,7 @@ def _provenance(
     return Provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
         called=display_name(task),
-        own_suite=_own_suite_hash(suites),
+        own_suite=_hash_of_files(suites[OWN])[:8] if OWN in suites else "",
         suite=" + ".join(_suite_name(task, folder) for folder in suites.values()),
         suite_sha256=_hash_of_suites(suites),
         profile=job.profile,
@@ -253,13 +253,7 @@ def _provenance(
     )
 
 
-def _own_suite_hash(suites: dict[str, Path]) -> str:
-    """Short hash of the suite that is not shipped; empty without one."""
-    own = suites.get(OWN)
-    return _hash_of_folder(own)[:8] if own else ""
-
-
-def _hash_of_folder(folder: Path) -> str:
+def _hash_of_files(folder: Path) -> str:
     return sha256_of(json.dumps(_file_hashes(folder), sort_keys=True).encode())
 
 
