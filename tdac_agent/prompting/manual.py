@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from gymnasium import spaces
@@ -62,7 +62,12 @@ def _sections(env: type) -> dict[str, str]:
 def _observation(space: spaces.Space[Any], text: str) -> str:
     """Returns the docstring's rows for the keys of the space, with shape and range."""
     assert isinstance(space, spaces.Dict)
-    documented = dict(_rows(text))
+    # The key and the other cells of each row of the docstring's table.
+    documented = {
+        match[1]: [cell.strip() for cell in match[2].split("|")]
+        for match in map(_ROW.match, text.splitlines())
+        if match
+    }
     unknown = [key for key in space if key not in documented]
     if unknown:
         raise ManualError(f"the docstring has no row for {', '.join(unknown)}")
@@ -76,14 +81,6 @@ def _observation(space: spaces.Space[Any], text: str) -> str:
             )
     _, _, rest = text.rpartition("|\n")
     return "\n".join([*rows, "", rest.strip()]).rstrip()
-
-
-def _rows(text: str) -> Iterator[tuple[str, list[str]]]:
-    """Yields the key and the other cells of each row of the docstring's table."""
-    for line in text.splitlines():
-        match = _ROW.match(line)
-        if match:
-            yield match[1], [cell.strip() for cell in match[2].split("|")]
 
 
 def _limits(box: spaces.Box) -> str:

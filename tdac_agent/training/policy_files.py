@@ -44,27 +44,20 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, point: Point) -> 
     model.save(draft)
     write_metadata(draft, saved)
     os.replace(draft, folder / POLICY)
+    # JSON has no nan; the training success rate is nan until an episode has ended.
+    evaluation = {
+        key: None if math.isnan(value) else value
+        for key, value in asdict(point).items()
+    }
+    learners = {name: importlib.metadata.version(name) for name in LEARNERS}
     facts = {
         **plan.model_dump(mode="json"),
         "steps_planned": plan.steps,
         "steps": point.steps,
         "seconds": point.seconds,
-        "evaluation": asdict(point),
+        "evaluation": evaluation,
         "cores": os.cpu_count(),
-        "versions": {**versions(), **_learner_versions()},
+        "versions": {**versions(), **learners},
     }
-    # JSON has no nan; the training success rate is nan until an episode has ended.
-    text = json.dumps(_without_nan(facts), indent=2, allow_nan=False)
+    text = json.dumps(facts, indent=2, allow_nan=False)
     write_atomic(folder / FACTS, text + "\n")
-
-
-def _learner_versions() -> dict[str, str]:
-    return {name: importlib.metadata.version(name) for name in LEARNERS}
-
-
-def _without_nan(facts: dict[str, Any]) -> dict[str, Any]:
-    evaluation = {
-        key: None if math.isnan(value) else value
-        for key, value in facts["evaluation"].items()
-    }
-    return {**facts, "evaluation": evaluation}

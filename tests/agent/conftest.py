@@ -15,6 +15,7 @@ from small import QUICK, write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.cli.main import main
+from tdac_agent.environments.epuck import builtin as epuck
 from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.verification.judge.warm import WarmJudge
 
@@ -30,6 +31,18 @@ def good_source(small_task):
     """A controller that is verified on the small task."""
     task = small_task
     return template_for(task.params.robot, task.nominal.dt).render(MapParameters())
+
+
+@pytest.fixture(scope="session")
+def crates():
+    """A rectangular world for the e-puck that is soon crossed."""
+    return load_task("epuck-crates")
+
+
+@pytest.fixture(scope="session")
+def crates_source(crates):
+    """A controller that is verified there."""
+    return epuck.template_for(crates.nominal).render(epuck.EPuckParameters())
 
 
 @pytest.fixture(scope="session")

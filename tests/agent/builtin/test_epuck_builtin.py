@@ -42,15 +42,9 @@ TUNED = EPuckParameters(
 )
 
 
-@pytest.fixture(scope="module")
-def crates():
-    return load_task("epuck-crates")
-
-
 @pytest.fixture
-def module(crates, tmp_path, monkeypatch):
-    source = template_for(crates.nominal).render(EPuckParameters())
-    return import_into(crates, source, tmp_path, monkeypatch)
+def module(crates, crates_source, tmp_path, monkeypatch):
+    return import_into(crates, crates_source, tmp_path, monkeypatch)
 
 
 def test_constants(tmp_path):

@@ -73,12 +73,6 @@ def assert_proven(check, repeats):
         assert bool(row.failures) != (row.controller == REFERENCE)
 
 
-@pytest.fixture(scope="module")
-def crates():
-    """A world that is soon crossed."""
-    return load_task("epuck-crates")
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("profile", ["paper", "policy"])
 def test_the_shipped_suite_proves_itself(task, profile, warm):
