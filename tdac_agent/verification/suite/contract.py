@@ -87,16 +87,20 @@ def _bindings(body: list[ast.stmt]) -> Iterator[tuple[str, ast.stmt]]:
             # An annotation without a value binds nothing.
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             for target in targets if node.value is not None else ():
-                yield from ((name, node) for name in _stored_names(target))
+                yield from ((name, node) for name in _target_names(target))
         else:
             for block in ("body", "orelse", "finalbody"):
                 yield from _bindings(getattr(node, block, []))
 
 
-def _stored_names(target: ast.expr) -> list[str]:
-    """Returns the names in a target, without those of `a` in `a.b` or `a[0]`."""
-    names = [node for node in ast.walk(target) if isinstance(node, ast.Name)]
-    return [node.id for node in names if isinstance(node.ctx, ast.Store)]
+def _target_names(target: ast.expr) -> list[str]:
+    if isinstance(target, ast.Name):
+        return [target.id]
+    if isinstance(target, ast.Starred):
+        return _target_names(target.value)
+    if isinstance(target, ast.Tuple | ast.List):
+        return [name for item in target.elts for name in _target_names(item)]
+    return []
 
 
 def import_error(tree: ast.Module, without: Collection[str] = ()) -> str | None:

@@ -128,8 +128,8 @@ def unseeded_randomness(tree: ast.Module) -> Iterator[str]:
         else:
             continue
         seeds = [*node.args, *(keyword.value for keyword in node.keywords)]
-        none = [isinstance(s, ast.Constant) and s.value is None for s in seeds]
-        if name not in SEEDED or all(none):
+        nones = [isinstance(s, ast.Constant) and s.value is None for s in seeds]
+        if name not in SEEDED or all(nones):
             yield f"line {node.lineno}: {_spelled(function)}()"
 
 
