@@ -6,7 +6,7 @@ from pathlib import Path
 
 from benchmarks.mutants import Original, originals_in
 from tdac_agent import load_task
-from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.builtin import EPuckParameters, template_for
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile
@@ -31,8 +31,8 @@ def good_drivers(task: Task) -> list[Original]:
     assert isinstance(task.nominal, EPuckTask)
     tuned = EPuckParameters(inflation_margin=0.01, slow_dist=0.03, unstick_after=120.0)
     texts = {
-        "builtin": render_epuck(EPuckParameters(), task=task.nominal),
-        "builtin_tuned": render_epuck(tuned, task=task.nominal),
+        "builtin": template_for(task.nominal).render(EPuckParameters()),
+        "builtin_tuned": template_for(task.nominal).render(tuned),
     }
     built = [Original(name, "paper", text, "epuck") for name, text in texts.items()]
     return [*built, *originals_in(ZOO / "good", "epuck")]

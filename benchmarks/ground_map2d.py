@@ -10,7 +10,7 @@ import yaml
 
 from benchmarks.mutants import Original, originals_in
 from tdac_agent import load_task
-from tdac_agent.environments.map2d.builtin import Parameters, render_controller
+from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.tasks.task import Task
 from tdac_envs.grid.grid import BoolGrid
 
@@ -51,9 +51,9 @@ def small_task() -> Task:
 def good_controllers(task: Task) -> list[Original]:
     """The template with two sets of parameters, and the zoo's good controllers."""
     robot, dt = task.params.robot, task.nominal.dt
-    tuned = Parameters(inflation_margin=3.0, lookahead=60.0, unstick_after=80.0)
+    tuned = MapParameters(inflation_margin=3.0, lookahead=60.0, unstick_after=80.0)
     originals = [
-        Original("builtin", "paper", render_controller(Parameters(), robot, dt)),
-        Original("builtin_tuned", "paper", render_controller(tuned, robot, dt)),
+        Original("builtin", "paper", template_for(robot, dt).render(MapParameters())),
+        Original("builtin_tuned", "paper", template_for(robot, dt).render(tuned)),
     ]
     return [*originals, *originals_in(ZOO)]

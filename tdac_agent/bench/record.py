@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from tdac_agent.metrics.paired import Estimate
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 
 Kind = Literal["builtin", "planner", "controller", "learned", "privileged"]
 """What an entrant is."""
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Interval(_Record):
+class Interval(StrictRecord):
     """A value with its 95 % interval."""
 
     value: float
@@ -30,7 +26,7 @@ class Interval(_Record):
         return cls(value=found.value, low=found.low, high=found.high)
 
 
-class BenchSet(_Record):
+class BenchSet(StrictRecord):
     """The worlds of a set, the same for all entrants."""
 
     name: str
@@ -40,7 +36,7 @@ class BenchSet(_Record):
     salt_sha256: str | None = Field(description="Of hidden worlds.")
 
 
-class BenchFile(_Record):
+class BenchFile(StrictRecord):
     """A file of an entrant: one, or one for each seed of a training."""
 
     sha256: str
@@ -49,7 +45,7 @@ class BenchFile(_Record):
     )
 
 
-class BenchRow(_Record):
+class BenchRow(StrictRecord):
     """An entrant on a set. Figures are None if it did not drive."""
 
     set: str
@@ -84,7 +80,7 @@ class BenchRow(_Record):
     clock_dependent: str | None = None
 
 
-class BenchOverall(_Record):
+class BenchOverall(StrictRecord):
     """An entrant over all sets, each with equal weight; only if it drove on all."""
 
     entrant: str
@@ -93,7 +89,7 @@ class BenchOverall(_Record):
     success: float
 
 
-class BenchPair(_Record):
+class BenchPair(StrictRecord):
     """Two entrants on the same worlds of a set, or over all sets."""
 
     set: str | None = Field(description="None: over all sets.")
@@ -112,7 +108,7 @@ class BenchPair(_Record):
     )
 
 
-class Bench(_Record):
+class Bench(StrictRecord):
     """Entrants on the same worlds of task sets, by the same judge."""
 
     schema_version: Literal[1] = 1

@@ -6,9 +6,8 @@ import json
 from typing import Any, Generic
 
 from tdac_agent.builtin.level import LevelController
-from tdac_agent.builtin.parameters import P, read_parameters
 from tdac_agent.builtin.repair import learn_bounds, read_rules, repair, write_rules
-from tdac_agent.builtin.template import Template
+from tdac_agent.builtin.template import P, Template, read_parameters
 from tdac_agent.builtin.variation import varied, varied_parameters
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options

@@ -9,14 +9,20 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tdac_agent.builtin.parameters import P, Tuned, about, names_of
-from tdac_agent.builtin.remedies import MARGIN, MarginBounds
+from tdac_agent.builtin.template import (
+    MARGIN,
+    MarginBounds,
+    P,
+    Tuned,
+    metadata_of,
+    names_of,
+)
 from tdac_agent.prompting.rules import MAX_RULE_CHARS
 from tdac_agent.verification.diagnosis.report import Cause, Report
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ParameterChange:
     """A parameter change, with the failed test that led to it."""
 
     test: str
@@ -37,7 +43,7 @@ _CAUSES_BY_TEST: Mapping[str, Cause] = {
 
 def repair(
     parameters: P, report: Report, bounds: MarginBounds, attempt: int
-) -> tuple[P, list[Change]]:
+) -> tuple[P, list[ParameterChange]]:
     """Applies the remedies for all failures; returns the parameters and the changes.
 
     If no remedy can change anything, a seeded random step is taken, so that the loop
@@ -49,7 +55,7 @@ def repair(
         bounds: Margins not yet known to fail.
         attempt: Seed of the random step.
     """
-    changes: dict[str, Change] = {}
+    changes: dict[str, ParameterChange] = {}
     tests = first_tests(report)
     for cause, remedy in parameters.remedies.items():
         if cause in tests:
@@ -65,10 +71,14 @@ def repair(
     return parameters.changed(**after), list(changes.values())
 
 
-def _compare(parameters: P, wanted: P, test: str, cause: Cause) -> list[Change]:
+def _compare(
+    parameters: P, wanted: P, test: str, cause: Cause
+) -> list[ParameterChange]:
     names = names_of(type(parameters))
     pairs = [(n, getattr(parameters, n), getattr(wanted, n)) for n in names]
-    return [Change(test, cause, n, was, now) for n, was, now in pairs if was != now]
+    return [
+        ParameterChange(test, cause, n, was, now) for n, was, now in pairs if was != now
+    ]
 
 
 def first_tests(report: Report) -> dict[Cause, str]:
@@ -99,7 +109,10 @@ def _random_step(parameters: P, seed: int) -> P:
 
 
 def write_rules(
-    parameters: Tuned, changes: Iterable[Change], bounds: MarginBounds, iteration: int
+    parameters: Tuned,
+    changes: Iterable[ParameterChange],
+    bounds: MarginBounds,
+    iteration: int,
 ) -> list[str]:
     """Returns rules that state the parameters, for people and for `read_rules`.
 
@@ -142,7 +155,7 @@ def _packed(clauses: list[str], ending: str) -> list[str]:
 def _clause(
     kind: type[Tuned], verb: str, name: str, relation: str, value: float
 ) -> str:
-    unit = about(kind, name)["unit"]
+    unit = metadata_of(kind, name)["unit"]
     number = f"{value:.5f}".rstrip("0").rstrip(".")
     return f"{verb} {name.upper()} {relation} {number} {unit}".rstrip()
 

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from tdac_agent.builtin.parameters import names_of
 from tdac_agent.builtin.provider import template_of
+from tdac_agent.builtin.template import names_of
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import Kind, Reply, Request
@@ -26,16 +26,13 @@ from tdac_agent.storage.yaml_file import read_yaml
 from tdac_agent.tasks.setting import Setting
 from tdac_envs.core.errors import hint
 from tdac_envs.core.intake import TEXT_BYTES, read_file
+from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.ladder.task_sets import TaskSet
 
 _KINDS: tuple[Kind, ...] = ("generate", "edit")
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Choice(_Strict):
+class Choice(StrictModel):
     """A controller of a script: the template of `builtin`, or a file."""
 
     weight: float = Field(1.0, gt=0, description="Relative probability of a draw.")
@@ -49,7 +46,7 @@ class Choice(_Strict):
         return self
 
 
-class Script(_Strict):
+class Script(StrictModel):
     """Contents of a script, schema 1."""
 
     schema_version: Literal[1] = Field(1, alias="schema")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tdac_agent.builtin.parameters import P
+from tdac_agent.builtin.template import P
 
 STEP = 0.15
 """Standard deviation of a change of a parameter, as a part of its range."""
@@ -61,14 +61,14 @@ def varied(source: str, seed: tuple[int, ...]) -> tuple[str, tuple[str, ...]]:
         source and no notes if it has no constants.
     """
     random = np.random.default_rng(seed)
-    found = list(_constants(source))
-    if not found:
+    constants = list(_constants(source))
+    if not constants:
         return source, ()
-    count = min(len(found), 1 + int(random.integers(MOST_CHANGED)))
-    chosen = sorted(random.choice(len(found), count, replace=False).tolist())
+    count = min(len(constants), 1 + int(random.integers(MOST_CHANGED)))
+    chosen = sorted(random.choice(len(constants), count, replace=False).tolist())
     lines, notes = source.encode().splitlines(keepends=True), list[str]()
     for number in reversed(chosen):  # from the end, so that columns stay valid
-        constant = found[number]
+        constant = constants[number]
         value, line = _other(constant.value, random), lines[constant.line]
         text = line[: constant.first] + value.encode() + line[constant.end :]
         lines[constant.line] = text

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.choice import OFFLINE, check_name
@@ -15,6 +15,7 @@ from tdac_agent.set_synthesis.synthesize import EPISODES, FEEDBACK_EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.storage.shipped import shipped, shipped_names
 from tdac_agent.storage.yaml_file import read_yaml
+from tdac_envs.core.strict_model import StrictModel
 
 SAME = "same"
 """Optimizer name for the learner itself."""
@@ -26,10 +27,8 @@ class CampaignError(RunError):
     """A campaign cannot be run with the given file or flags."""
 
 
-class CampaignConfig(BaseModel):
+class CampaignConfig(StrictModel):
     """Contents of a campaign file, schema 1."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     schema_version: Literal[1] = Field(1, alias="schema")
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]*$")

@@ -14,7 +14,6 @@ from tdac_agent.cli.flags import TaskFlags, check_tier
 from tdac_agent.cli.printed import show_printed
 from tdac_agent.cli.robust_flags import DisturbanceFlags, require_flag
 from tdac_agent.cli.verify import controller_and_task
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.evaluation.policies import Entrant
 from tdac_agent.evaluation.replay import drive_episode
@@ -61,7 +60,7 @@ def run(
         task.disturbed_options(disturbance)
         driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
         rollout = driven.rollout
-    pictures = pictures_of(task.setting)
+    pictures = task.pictures()
     return show(rollout, partial(pictures.frames, rollout), task.name, video, speed)
 
 

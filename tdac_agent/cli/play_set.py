@@ -9,8 +9,8 @@ from pathlib import Path
 
 from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.play import check_video, show
-from tdac_agent.environments.epuck import pictures as on_worlds
-from tdac_agent.environments.map2d import pictures as on_maps
+from tdac_agent.environments.epuck.pictures import WorldPictures
+from tdac_agent.environments.map2d.pictures import MapPictures
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.evaluation.policies import entrants_of, fitted
 from tdac_agent.evaluation.replay import check_shown, drive_episode
@@ -56,5 +56,5 @@ def _file_of(controller: str, tasks: TaskSet, folder: str) -> str:
 
 def _frames(task: AnyTask, rollout: Rollout, stride: int) -> Iterator[Image]:
     if isinstance(task, Map2DTask):
-        return on_maps.frames_of(task, rollout, stride)
-    return on_worlds.frames_of(task, rollout, stride)
+        return MapPictures(task).frames(rollout, stride)
+    return WorldPictures(task).frames(rollout, stride)

@@ -16,8 +16,7 @@ from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.episodes.trajectory import nominal_first
 from tdac_agent.prompting.feedback import Group, cut, group_failures
 from tdac_agent.tasks.units import UNITS, Units
-from tdac_agent.verification.diagnosis.report import Failure, Report
-from tdac_agent.verification.diagnosis.shown import in_units
+from tdac_agent.verification.diagnosis.report import Failure, Report, in_units
 
 MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -105,15 +105,9 @@ class Learned:
 class _Spaces:
     """Observation and action space; compared by text, as keys of a cache."""
 
-    observation: Space[Any]
-    action: Space[Any]
+    observation: Space[Any] = field(compare=False)
+    action: Space[Any] = field(compare=False)
     text: str
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Spaces) and self.text == other.text
-
-    def __hash__(self) -> int:
-        return hash(self.text)
 
 
 @lru_cache(maxsize=4)
@@ -151,9 +145,9 @@ def check_kind(saved: SavedNetwork) -> None:
         first, second = _shapes(saved, 4), _shapes(saved, 5)
     except ControllerFault as fault:
         raise ControllerFileError(str(fault)) from fault
-    found = {name: weights.shape for name, weights in saved.weights.items()}
-    odd = sorted(first.keys() ^ found.keys())
-    odd += [name for name in found if not odd and _differs(name, first, second, found)]
+    shapes = {name: weights.shape for name, weights in saved.weights.items()}
+    odd = sorted(first.keys() ^ shapes.keys())
+    odd = odd or [name for name in shapes if _differs(name, first, second, shapes)]
     if odd:
         raise ControllerFileError(
             f"the policy's weights do not fit its settings: {one_line(odd[0])[:80]}"
@@ -170,11 +164,11 @@ def _shapes(saved: SavedNetwork, size: int) -> _Shapes:
     return {name: tuple(held.shape) for name, held in network.state_dict().items()}
 
 
-def _differs(name: str, first: _Shapes, second: _Shapes, found: _Shapes) -> bool:
+def _differs(name: str, first: _Shapes, second: _Shapes, shapes: _Shapes) -> bool:
     """Whether a size is wrong, apart from those that depend on the observation."""
-    if len(found[name]) != len(first[name]):
+    if len(shapes[name]) != len(first[name]):
         return True
-    rows = zip(first[name], second[name], found[name], strict=True)
+    rows = zip(first[name], second[name], shapes[name], strict=True)
     return any(one == other != size for one, other, size in rows)
 
 
@@ -204,15 +198,15 @@ def _without_memory() -> Iterator[None]:
             self, function: Any, types: Any, args: Any = (), kwargs: Any = None
         ) -> Any:
             del types
-            given = kwargs or {}
+            keywords = kwargs or {}
             if function is torch.empty:
-                shape = torch.empty(*args, **given | {"device": "meta"})
+                shape = torch.empty(*args, **keywords | {"device": "meta"})
                 if shape.numel() > _SMALL:
                     return shape
             # stable-baselines3 moves all tensors to where the first one is.
             elif function is torch.Tensor.to:
                 return args[0]
-            return function(*args, **given)
+            return function(*args, **keywords)
 
     with Shapes():
         yield
@@ -251,11 +245,11 @@ def _policy_kwargs(saved: SavedNetwork) -> dict[str, Any]:
     from torch import nn
 
     kwargs = saved.settings.model_dump(exclude_unset=True)
-    found = re.fullmatch(ACTIVATION, kwargs.pop("activation_fn", None) or "")
-    if found is not None:
-        kwargs["activation_fn"] = getattr(nn, found[1], None)
-        if found[1] not in _ACTIVATIONS:
-            raise ControllerFault(f"unknown activation {found[1][:80]}", "import")
+    match = re.fullmatch(ACTIVATION, kwargs.pop("activation_fn", None) or "")
+    if match is not None:
+        kwargs["activation_fn"] = getattr(nn, match[1], None)
+        if match[1] not in _ACTIVATIONS:
+            raise ControllerFault(f"unknown activation {match[1][:80]}", "import")
     if saved.module == _WITHOUT_SDE:
         kwargs.pop("use_sde")
     elif saved.module != _SAC:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from tdac_agent.episodes.torch_file import Weights, read_weights
 from tdac_agent.errors import ControllerFileError
@@ -21,6 +21,7 @@ from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.errors import first_problem, one_line_reason
 from tdac_envs.core.extras import install_command
 from tdac_envs.core.intake import TEXT_BYTES, one_line, parse_json, read_file, read_zip
+from tdac_envs.core.strict_model import StrictModel
 
 METADATA = "tdac.json"
 WEIGHTS = "policy.pth"
@@ -39,10 +40,8 @@ Layers = Annotated[list[Annotated[int, Field(ge=1, le=4096)]], Field(max_length=
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
-class SavedPolicy(BaseModel):
+class SavedPolicy(StrictModel):
     """`tdac.json` in a policy's zip file, or beside it as `NAME.json`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     schema_version: Literal[1] = 1
     algo: str = Field(description="Training algorithm: ppo, sac, …")
@@ -55,10 +54,8 @@ class SavedPolicy(BaseModel):
     seed: int | None = None
 
 
-class Settings(BaseModel):
+class Settings(StrictModel):
     """`policy_kwargs` that define the network, except those only training needs."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     net_arch: Layers | dict[Literal["pi", "vf", "qf"], Layers] | None = None
     activation_fn: str | None = Field(None, pattern=f"^{ACTIVATION}$")
@@ -105,7 +102,9 @@ def read_policy(file: Path) -> SavedNetwork:
         ControllerFileError: It is not a stable-baselines3 policy, or is invalid.
     """
     try:
-        parts = _parts(read_file(file, MOST_BYTES))
+        content = read_file(file, MOST_BYTES)
+        most = min(MOST_BYTES, _MOST_GROWTH * len(content) + _SLACK_BYTES)
+        parts = read_zip(content, most, {DATA, WEIGHTS, METADATA})
         if not {DATA, WEIGHTS} <= parts.keys():
             raise ValueError(f"it has no `{DATA}` or no `{WEIGHTS}`")
     except (OSError, ValueError) as error:
@@ -120,25 +119,6 @@ def read_policy(file: Path) -> SavedNetwork:
         message = f"the policy {str(file)!r} cannot be used: {one_line_reason(error)}"
         raise ControllerFileError(message) from error
     return SavedNetwork(saved, METADATA in parts, module, settings, weights)
-
-
-def _parts(content: bytes) -> dict[str, bytes]:
-    """Returns the parts of a policy file that are used, by name.
-
-    Raises:
-        ValueError: It is damaged, or much larger when unpacked.
-    """
-    most = min(MOST_BYTES, _MOST_GROWTH * len(content) + _SLACK_BYTES)
-    return read_zip(content, most, {DATA, WEIGHTS, METADATA})
-
-
-def read_metadata(file: Path) -> SavedPolicy | None:
-    """Reads the metadata of a policy file; None if it has none.
-
-    Raises:
-        ControllerFileError: It is not a stable-baselines3 policy, or is invalid.
-    """
-    return read_policy(file).saved
 
 
 def write_metadata(file: Path, saved: SavedPolicy) -> None:
@@ -170,14 +150,14 @@ def load_weights(weights: dict[str, Weights]) -> Any:
         "Half": torch.float16,
         "BFloat16": torch.bfloat16,
     }
-    found = {}
+    tensors = {}
     for name, saved in weights.items():
         # A copy, since torch writes to what it is given.
         flat = torch.frombuffer(bytearray(saved.data), dtype=kinds[saved.kind])
-        found[name] = flat.to(torch.float32).reshape(saved.shape)
-        if not bool(torch.isfinite(found[name]).all()):
+        tensors[name] = flat.to(torch.float32).reshape(saved.shape)
+        if not bool(torch.isfinite(tensors[name]).all()):
             raise ControllerFileError("the policy's weights are not all finite numbers")
-    return found
+    return tensors
 
 
 def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
@@ -197,15 +177,15 @@ def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
 def _network(data: bytes) -> tuple[str, Settings]:
     """Returns the module of the network's class, and its settings."""
     try:
-        found = json.loads(data.decode("utf-8"))
-        module = str((found.get("policy_class") or {}).get("__module__"))
-        given = dict(found.get("policy_kwargs") or {})
-        given.setdefault("use_sde", found.get("use_sde") or False)
+        parsed = json.loads(data.decode("utf-8"))
+        module = str((parsed.get("policy_class") or {}).get("__module__"))
+        arguments = dict(parsed.get("policy_kwargs") or {})
+        arguments.setdefault("use_sde", parsed.get("use_sde") or False)
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"its `{DATA}` is damaged: {one_line(error)}") from None
     kept = {
         key: value
-        for key, value in given.items()
+        for key, value in arguments.items()
         if not key.startswith(":") and key not in _FOR_TRAINING
     }
     for key, value in kept.items():

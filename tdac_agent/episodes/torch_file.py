@@ -61,21 +61,21 @@ def read_weights(file: bytes) -> dict[str, Weights]:
     if parts.get(f"{folder.removesuffix('data')}byteorder", b"little") != b"little":
         raise ValueError("its numbers are not little-endian")
     try:
-        found = _Reader(parts, folder).read(parts[pickles[0]])
+        tensors = _PickleReader(parts, folder).read(parts[pickles[0]])
     # An invalid pickle may raise anything.
     except Exception as error:
         raise ValueError(one_line(error)) from None
-    return _checked(found, len(file))
+    return _checked(tensors, len(file))
 
 
-def _checked(found: Any, most: int) -> dict[str, Weights]:
-    if not isinstance(found, dict):
+def _checked(tensors: Any, most: int) -> dict[str, Weights]:
+    if not isinstance(tensors, dict):
         raise ValueError("expected tensors by name")
-    if not all(isinstance(tensor, Weights) for tensor in found.values()):
+    if not all(isinstance(tensor, Weights) for tensor in tensors.values()):
         raise ValueError("its weights are not tensors by name")
-    if sum(len(tensor.data) for tensor in found.values()) > most:
+    if sum(len(tensor.data) for tensor in tensors.values()) > most:
         raise ValueError("its tensors together are larger than the file")
-    return found
+    return tensors
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class _Storage:
     data: memoryview
 
 
-class _Reader:
+class _PickleReader:
     """Carries out the operations with which torch describes tensors, and no others.
 
     Only strings, names and tensors can be used again, and dictionaries keep nothing but

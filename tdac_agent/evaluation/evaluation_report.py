@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from tdac_agent.episodes.trajectory import Outcome
 from tdac_agent.metrics.exact import sign_test
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.units import Place
 from tdac_agent.verification.episode_report import EpisodeReport, Interval
 from tdac_agent.verification.judge.drivers import Kind
@@ -28,11 +28,7 @@ MOST_REASONS = 3
 _DIGITS = 6
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class EvaluatedProblem(_Record):
+class EvaluatedProblem(StrictRecord):
     """A task or a task set of the evaluation."""
 
     name: str
@@ -43,7 +39,7 @@ class EvaluatedProblem(_Record):
     unit: Place = Field(description="Unit of lengths.")
 
 
-class EvaluatedPolicy(_Record):
+class EvaluatedPolicy(StrictRecord):
     """A policy of the evaluation."""
 
     name: str
@@ -52,7 +48,7 @@ class EvaluatedPolicy(_Record):
     sha256: str | None = Field(None, description="Hash of its file, if any.")
 
 
-class PolicyRow(_Record):
+class PolicyRow(StrictRecord):
     """One policy on one problem. Medians over successes are None without a success."""
 
     task: str = Field(description="The task or the task set.")
@@ -92,7 +88,7 @@ class PolicyRow(_Record):
     note: str | None = None
 
 
-class PairedComparison(_Record):
+class PairedComparison(StrictRecord):
     """Two policies in the same episodes: exact McNemar test, two-sided.
 
     Under the null hypothesis, either policy wins half of the episodes in which exactly
@@ -112,7 +108,7 @@ class PairedComparison(_Record):
     p: float
 
 
-class Timing(_Record):
+class Timing(StrictRecord):
     """Wall time of the calls of a policy; differs between evaluations."""
 
     task: str
@@ -146,13 +142,12 @@ class Result:
         return self.report.episodes
 
 
-class Evaluation(_Record):
+class Evaluation(StrictRecord):
     """Policies in the same episodes of the same problems, by the same judge.
 
     The JSON form depends on the arguments only, not on wall times.
     """
 
-    model_config = ConfigDict(arbitrary_types_allowed=True)
     schema_version: Literal[2] = 2
     variation: str | None = Field(description="Of the starts of tasks.")
     seed: int | None = Field(description="Of the episodes of tasks.")

@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.evaluation.evaluation_report import Result
 from tdac_agent.tasks.task import Task
@@ -82,7 +81,7 @@ def overlay_picture(task: Task, overlays: Sequence[Overlay]) -> Image:
     The first policy is on top; a dot marks a contact. Moving obstacles are those at
     the end of the first policy's first episode.
     """
-    chart = pictures_of(task.setting).backdrop().whole()
+    chart = task.pictures().backdrop().whole()
     canvas, movers = chart.canvas, overlays[0].movers
     draw_movers(canvas, [discs_on(chart, discs) for discs in movers])
     for number, overlay in reversed(list(enumerate(overlays))):

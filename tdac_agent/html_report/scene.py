@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.tasks.task import Task
 from tdac_envs.drawing.backdrop import Backdrop, Chart
 from tdac_envs.drawing.canvas import Image as Picture
@@ -55,7 +54,7 @@ class TaskPicture:
 
 def scene_of(task: Task) -> TaskPicture:
     """Draws the map or world with start, goal and shortest path."""
-    return picture_of(pictures_of(task.setting).backdrop())
+    return picture_of(task.pictures().backdrop())
 
 
 def picture_of(backdrop: Backdrop) -> TaskPicture:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tdac_agent.environments.epuck import pictures as on_worlds
-from tdac_agent.environments.map2d import pictures as on_maps
+from tdac_agent.environments.epuck.pictures import WorldPictures
+from tdac_agent.environments.map2d.pictures import MapPictures
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.mcp.answers import ChooseAnswer, EpisodeAnswer, Judged, Left, Refused
@@ -183,14 +183,14 @@ def _picture(task: AnyTask, trajectory: Trajectory, figures: EpisodeRow) -> Imag
         contact=contact_of(task, trajectory, figures.outcome),
         movers=trajectory.ghosts(trajectory.steps),
     )
-    if isinstance(task, Map2DTask):
-        return run_picture(on_maps.backdrop_of(task), trajectory.poses, event)
-    return run_picture(on_worlds.backdrop_of(task), trajectory.poses, event)
+    return run_picture(_pictures_of(task).backdrop(), trajectory.poses, event)
 
 
 def _whole(task: AnyTask, trajectory: Trajectory, outcome: str, name: str) -> Image:
-    poses, ended, names = [trajectory.poses], [outcome], [name]
-    if isinstance(task, Map2DTask):
-        movers = trajectory.ghosts(trajectory.steps)
-        return on_maps.trajectories_of(task, poses, ended, names, movers)
-    return on_worlds.trajectories_of(task, poses, ended, names)
+    movers = trajectory.ghosts(trajectory.steps)
+    pictures = _pictures_of(task)
+    return pictures.trajectories([trajectory.poses], [outcome], [name], movers)
+
+
+def _pictures_of(task: AnyTask) -> MapPictures | WorldPictures:
+    return MapPictures(task) if isinstance(task, Map2DTask) else WorldPictures(task)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.mcp.answers import ChooseAnswer, EpisodeAnswer, Judged, Left, Refused
@@ -75,7 +74,7 @@ class OnTask:
         except RunError as error:
             raise Refused(f"there is no record of {name}") from error
         movers = trajectory.ghosts(trajectory.steps)
-        pictures = pictures_of(self.tests.task.setting)
+        pictures = self.tests.task.pictures()
         outcome = known[name].outcome
         return png(pictures.trajectories([trajectory.poses], [outcome], [name], movers))
 

@@ -15,11 +15,12 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from tdac_agent.errors import RunError
 from tdac_agent.storage.journal import append_record, read_records_from
 from tdac_agent.storage.locks import wait_for
+from tdac_envs.core.strict_model import StrictModel
 
 ROUNDING = 1e-9
 MOST_USD, MOST_TOKENS = 1e6, 10**12
@@ -55,10 +56,8 @@ NOTHING = Amount()
 Limit = Literal["--max-cost", "--max-tokens"]
 
 
-class Enough(BaseModel):
+class Enough(StrictModel):
     """A limit with which a run can go on after its budget has ended it."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     max_cost: float | None = Field(None, gt=0, le=MOST_USD, description="USD.")
     max_tokens: int | None = Field(None, gt=0, le=MOST_TOKENS)

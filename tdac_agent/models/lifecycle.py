@@ -8,17 +8,17 @@ from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from tdac_envs.core.strict_model import StrictModel
 
 FILE = Path(__file__).parent / "lifecycle.yaml"
 SOON_DAYS = 90
 URGENT_DAYS = 30
 
 
-class Lifecycle(BaseModel):
+class Lifecycle(StrictModel):
     """Contents of `lifecycle.yaml`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     dated: date
     source: str

@@ -7,11 +7,12 @@ from datetime import date
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from tdac_agent.models.provider import Reply
 from tdac_agent.storage.yaml_file import read_yaml
 from tdac_envs.core.errors import TdacError
+from tdac_envs.core.strict_model import StrictModel
 
 SHIPPED = Path(__file__).parent / "prices.yaml"
 FREE = frozenset({"builtin", "replay", "scripted"})
@@ -22,11 +23,7 @@ class PriceError(TdacError):
     """A price file cannot be used."""
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Price(_Strict):
+class Price(StrictModel):
     """Prices of one model, USD per million tokens."""
 
     input: float = Field(ge=0)
@@ -52,7 +49,7 @@ class Price(_Strict):
         ) / 1e6
 
 
-class PriceList(_Strict):
+class PriceList(StrictModel):
     """Contents of a price file, schema 1."""
 
     schema_version: Literal[1] = Field(1, alias="schema")

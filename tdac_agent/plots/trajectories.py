@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.plots.style import (
@@ -51,7 +50,7 @@ def plot_trajectories(
     Raises:
         RunError: An array has another shape.
     """
-    chart = pictures_of(task.setting).backdrop().whole()
+    chart = task.pictures().backdrop().whole()
     picture = chart.canvas.image[: chart.canvas.strip_top]
     left, right, low, high = extent = _extent(chart)
     shape = abs((high - low) / (right - left))

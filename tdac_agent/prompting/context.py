@@ -34,11 +34,7 @@ def _of_any(task: Task) -> dict[str, Any]:
         "env_description": interface.description,
         "observation_table": interface.observation,
         "action_text": interface.action,
-        "allowed_imports": " ".join(sorted(ALLOWED_IMPORTS - {"__future__"})),
-        "forbidden_calls": ", ".join(sorted(FORBIDDEN_CALLS)),
-        "forbidden_attributes": ", ".join(sorted(FORBIDDEN_ATTRIBUTES)),
-        "savers": ", ".join(sorted(SAVERS)),
-        "surfaces": ", ".join(sorted(SURFACES)),
+        **allowed_code({"__future__"}),
         "names": task.environment.names,
         "dt": f"{nominal.dt:g}",
         "dt_ms": f"{1000 * nominal.dt:g}",
@@ -59,6 +55,21 @@ def _of_any(task: Task) -> dict[str, Any]:
         "straight": math.dist(nominal.start[:2], nominal.goal),
         "shortest": nominal.shortest,
         "instructions": task.spec.instructions.strip(),
+    }
+
+
+def allowed_code(not_supplied: set[str]) -> dict[str, str]:
+    """Returns the template variables of what a controller may import and call.
+
+    Args:
+        not_supplied: Allowed modules that it does not get, or need not import.
+    """
+    return {
+        "allowed_imports": " ".join(sorted(ALLOWED_IMPORTS - not_supplied)),
+        "forbidden_calls": ", ".join(sorted(FORBIDDEN_CALLS)),
+        "forbidden_attributes": ", ".join(sorted(FORBIDDEN_ATTRIBUTES)),
+        "savers": ", ".join(sorted(SAVERS)),
+        "surfaces": ", ".join(sorted(SURFACES)),
     }
 
 

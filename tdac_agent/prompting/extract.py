@@ -99,9 +99,8 @@ def read_answer(
     if spoken is None:
         return Answer(None, "its thinking has no end, so the answer itself is missing")
     if not spoken.strip():
-        thought = text.strip() and "nothing follows its thinking"
-        return Answer(None, thought or "it is empty")
-    answer = Answer(None)
+        empty = "nothing follows its thinking" if text.strip() else "it is empty"
+        return Answer(None, empty)
     for reading in readings(spoken):
         answer = _read(reading, frozenset(contract), ended=ended)
         if answer.source is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tdac_agent.storage.plain import plain
@@ -56,7 +57,7 @@ class Group:
     @property
     def held_out(self) -> bool:
         """Whether its details must not be revealed."""
-        return any(_is_held_out(failure) for failure in self.members)
+        return "held out" in (f.diagnosis.cause for f in self.members if f.diagnosis)
 
     @property
     def happened(self) -> list[str]:
@@ -106,7 +107,7 @@ def group_failures(report: Report) -> tuple[list[Group], list[Failure]]:
             not_run.append(failure)
         else:
             members.setdefault(_root(failure), []).append(failure)
-    groups = [Group(cause, tuple(found)) for cause, found in members.items()]
+    groups = [Group(cause, tuple(each)) for cause, each in members.items()]
     return sorted(groups, key=lambda g: GROUPS.index(g.members[0].group)), not_run
 
 
@@ -117,11 +118,6 @@ def choose(groups: list[Group]) -> list[Group]:
     others = [group for group in groups if group not in firsts]
     kept = [*firsts, *others][:MAX_GROUPS]
     return [group for group in groups if group in kept]
-
-
-def tell_attempt(k: int, j: int, report: Report) -> str:
-    """Describes a failed attempt in one line: number of tests, causes, figures."""
-    return f"k={k} j={j}: {_in_one_line(report)}"
 
 
 def _in_one_line(report: Report) -> str:
@@ -158,7 +154,7 @@ def _root(failure: Failure) -> str:
 
 
 def _describe(group: Group) -> str:
-    lines = [_names(list(group.members)), *group.messages]
+    lines = [_names(group.members), *group.messages]
     lines += [f"What happened: {line}" for line in group.happened]
     return "\n   ".join(lines)
 
@@ -167,28 +163,26 @@ def _lines(groups: list[Group], report: Report) -> list[str]:
     """Returns a line for each cause: tests and error; the last ones by name only."""
     unit = report.provenance.unit
     lines = [
-        f"- {_names(list(group.members))}: {_short(group, unit, LINE_CHARS)}"
+        f"- {_names(group.members)}: {_short(group, unit, LINE_CHARS)}"
         for group in groups[:MAX_LINES]
     ]
-    rest = [failure for group in groups[MAX_LINES:] for failure in group.members]
-    return [" ".join(line.split()) for line in lines] + (
-        [f"- and {', '.join(failure.test for failure in rest)}"] if rest else []
-    )
+    lines = [" ".join(line.split()) for line in lines]
+    rest = [failure.test for group in groups[MAX_LINES:] for failure in group.members]
+    return [*lines, f"- and {', '.join(rest)}"] if rest else lines
 
 
 def _first(texts: list[str]) -> list[str]:
     """Returns the first different texts, shortened, and the number of others."""
     texts = list(dict.fromkeys(texts))
     more = len(texts) - MAX_MESSAGES
-    return [cut(text) for text in texts[:MAX_MESSAGES]] + (
-        [f"… and {more} more like these"] if more > 0 else []
-    )
+    first = [cut(text) for text in texts[:MAX_MESSAGES]]
+    return [*first, f"… and {more} more like these"] if more > 0 else first
 
 
-def _names(failures: list[Failure]) -> str:
-    names = [failure.test for failure in failures]
-    more = len(names) - MAX_NAMES
-    return ", ".join(names[:MAX_NAMES]) + (f" and {more} more" if more > 0 else "")
+def _names(failures: Sequence[Failure]) -> str:
+    names = ", ".join(failure.test for failure in failures[:MAX_NAMES])
+    more = len(failures) - MAX_NAMES
+    return f"{names} and {more} more" if more > 0 else names
 
 
 def _short(group: Group, unit: str, limit: int = 100) -> str:
@@ -210,7 +204,3 @@ def _figures(diagnosis: Diagnosis, unit: str) -> str:
         left = f"{diagnosis.d_min:.4g} of {diagnosis.d0:.4g} {unit}"
         words.append(f"with {left} left at best")
     return " ".join(words)
-
-
-def _is_held_out(failure: Failure) -> bool:
-    return failure.diagnosis is not None and failure.diagnosis.cause == "held out"

@@ -19,6 +19,7 @@ OTHER |= frozenset({"c", "cpp", "cmake", "dockerfile", "go", "java", "javascript
 OTHER |= frozenset({"latex", "log", "lua", "make", "math", "matlab", "mermaid"})
 OTHER |= frozenset({"patch", "plaintext", "pseudo", "pseudocode", "pycon", "rust"})
 OTHER |= frozenset({"jsonc", "jsonl", "sql", "tex", "tool_code", "ts", "typescript"})
+_FENCE = re.compile(r"[ \t]*+(`{3,}+|~{3,}+)([^`]*)\Z")
 _FILE_NAME = re.compile(r"[\w./-]*\w\.py:?")
 
 
@@ -77,16 +78,8 @@ class Block(NamedTuple):
 
 def find_fences(lines: list[str]) -> list[Fence]:
     """Returns the fences, in linear time for any text."""
-    found = []
-    for number, line in enumerate(lines):
-        text = line.lstrip(" \t")
-        sign = text[:1]
-        if sign and sign in "`~":
-            info = text.lstrip(sign)
-            run = text[: len(text) - len(info)]
-            if len(run) >= 3 and "`" not in info:
-                found.append(Fence(number, run, info.strip()))
-    return found
+    matches = ((number, _FENCE.match(line)) for number, line in enumerate(lines))
+    return [Fence(n, match[1], match[2].strip()) for n, match in matches if match]
 
 
 def find_blocks(lines: list[str], fences: list[Fence]) -> list[Block]:
@@ -127,16 +120,16 @@ def find_blocks(lines: list[str], fences: list[Fence]) -> list[Block]:
 def fenced_blocks(text: str, languages: frozenset[str]) -> list[str]:
     """Returns the blocks in some languages; the first closing fence ends one."""
     lines = text.split("\n")
-    found: list[str] = []
+    blocks: list[str] = []
     opening: Fence | None = None
     for fence in find_fences(lines):
         if opening is None:
             opening = fence
         elif fence.closes(opening) or fence.closes_with_text(opening):
             if opening.language in languages:
-                found.append("\n".join(lines[opening.line + 1 : fence.line]))
+                blocks.append("\n".join(lines[opening.line + 1 : fence.line]))
             opening = None
-    return found
+    return blocks
 
 
 def _is_doubled(lines: list[str], fences: list[Fence], index: int) -> bool:
@@ -162,8 +155,7 @@ def _block(
         if fences[number].closes_with_text(opening)
     ]
     if opening.is_other:
-        ends = sorted([*closings[:1], *ragged[:1]])
-        closing, tree = (ends or [0])[0], None
+        closing, tree = min([*closings[:1], *ragged[:1]], default=0), None
     else:
         closing, tree = _longest(lines, fences, index, closings)
         for number in ragged if tree is None else ():
@@ -181,13 +173,13 @@ def _block(
 def _closings(fences: list[Fence], index: int) -> list[int]:
     """Returns the nearby fences that may close a fence, or the first one beyond."""
     near = index + 2 + MAX_INNER_FENCES
-    found: list[int] = []
+    closings: list[int] = []
     for number in range(index + 1, len(fences)):
-        if number >= near and found:
+        if number >= near and closings:
             break
         if fences[number].closes(fences[index]):
-            found.append(number)
-    return found
+            closings.append(number)
+    return closings
 
 
 def _longest(
@@ -212,14 +204,13 @@ def source_of(lines: list[str]) -> str:
     If that one is only the name of the file, it becomes empty.
     """
     at = next((n for n, line in enumerate(lines) if line.strip()), None)
-    if at is None:
-        return "".join(f"{line}\n" for line in lines)
-    text = lines[at]
-    margin = text[: len(text) - len(text.lstrip(" \t"))]
-    source = [line.removeprefix(margin) for line in lines]
-    if _FILE_NAME.fullmatch(source[at].strip()):
-        source[at] = ""
-    return "".join(f"{line}\n" for line in source)
+    if at is not None:
+        text = lines[at]
+        margin = text[: len(text) - len(text.lstrip(" \t"))]
+        lines = [line.removeprefix(margin) for line in lines]
+        if _FILE_NAME.fullmatch(lines[at].strip()):
+            lines[at] = ""
+    return "".join(f"{line}\n" for line in lines)
 
 
 def _tree(source: str) -> tuple[ast.Module | None, int]:

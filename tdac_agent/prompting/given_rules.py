@@ -6,6 +6,7 @@ is for people. Without a scope, the rule is about the environment.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -67,10 +68,7 @@ def given_book(lines: Iterable[str]) -> RuleBook:
     Raises:
         ValueError: A line is not allowed.
     """
-    book = RuleBook()
-    for line in lines:
-        book = _with(book, f"- {line}")
-    return book
+    return functools.reduce(_with, (f"- {line}" for line in lines), RuleBook())
 
 
 def given_lines(book: RuleBook) -> tuple[str, ...]:
@@ -84,10 +82,10 @@ def _with(book: RuleBook, line: str) -> RuleBook:
     Raises:
         ValueError: The rule is not allowed.
     """
-    found = _RULE.match(line.rstrip())
-    if found is None:
+    match = _RULE.match(line.rstrip())
+    if match is None:
         return book
-    rule, scope = checked_rule(found[2]), found[1] or "environment"
+    rule, scope = checked_rule(match[2]), match[1] or "environment"
     if book.double_of(rule) is not None:
         return book
     return book.add(rule, scope, GIVEN, ())  # type: ignore[arg-type]

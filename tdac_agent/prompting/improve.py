@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 MOST_TRIED = 6
@@ -17,12 +18,12 @@ class Tried(NamedTuple):
     Attributes:
         diff: Its unified diff.
         rank: Its figures, the most important one first; empty if it has none.
-        told: What came of it.
+        result: What came of it.
     """
 
     diff: str
     rank: tuple[float, ...]
-    told: str
+    result: str
 
 
 def improve_text(
@@ -41,19 +42,16 @@ def improve_text(
     if tried:
         lines += ["", "### What was tried with it"]
         for each in _shown(tried):
-            lines += [f"{each.told}:", "```diff", *_changes(each.diff), "```"]
+            lines += [f"{each.result}:", "```diff", *_changes(each.diff), "```"]
     return "\n".join(lines)
 
 
 def _shown(tried: Sequence[Tried]) -> list[Tried]:
     """The best half and the latest ones, best first."""
-    best = sorted(tried, key=_rank, reverse=True)[: MOST_TRIED // 2]
+    by_rank = sorted(tried, key=attrgetter("rank"), reverse=True)
+    best = by_rank[: MOST_TRIED // 2]
     latest = [each for each in tried if each not in best][-(MOST_TRIED // 2) :]
-    return sorted([*best, *latest], key=_rank, reverse=True)
-
-
-def _rank(tried: Tried) -> tuple[float, ...]:
-    return tried.rank
+    return sorted([*best, *latest], key=attrgetter("rank"), reverse=True)
 
 
 def _changes(diff: str) -> list[str]:

@@ -1,10 +1,11 @@
-"""Description of an environment's interface, from its spaces and its docstring."""
+"""Descriptions of an environment's interface and of `sensors.py`, from their source."""
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
-from collections.abc import Iterator
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from gymnasium import spaces
@@ -61,7 +62,12 @@ def _sections(env: type) -> dict[str, str]:
 def _observation(space: spaces.Space[Any], text: str) -> str:
     """Returns the docstring's rows for the keys of the space, with shape and range."""
     assert isinstance(space, spaces.Dict)
-    documented = dict(_rows(text))
+    # The key and the other cells of each row of the docstring's table.
+    documented = {
+        match[1]: [cell.strip() for cell in match[2].split("|")]
+        for match in map(_ROW.match, text.splitlines())
+        if match
+    }
     unknown = [key for key in space if key not in documented]
     if unknown:
         raise ManualError(f"the docstring has no row for {', '.join(unknown)}")
@@ -75,14 +81,6 @@ def _observation(space: spaces.Space[Any], text: str) -> str:
             )
     _, _, rest = text.rpartition("|\n")
     return "\n".join([*rows, "", rest.strip()]).rstrip()
-
-
-def _rows(text: str) -> Iterator[tuple[str, list[str]]]:
-    """Yields the key and the other cells of each row of the docstring's table."""
-    for line in text.splitlines():
-        match = _ROW.match(line)
-        if match:
-            yield match[1], [cell.strip() for cell in match[2].split("|")]
 
 
 def _limits(box: spaces.Box) -> str:
@@ -101,3 +99,32 @@ def _action(space: spaces.Space[Any], text: str) -> str:
     if not text.startswith(real):
         raise ManualError(f"the section Action Space must begin with {real}")
     return text
+
+
+FOR_PEOPLE = ("Graphics", "show")
+"""Names in `sensors.py` that only draw; a signature and docstring are enough."""
+
+
+def needed_part(source: str, without: Collection[str] = ()) -> str:
+    """Returns the part of `sensors.py` that a controller may use, verbatim.
+
+    Args:
+        source: The file.
+        without: Functions of no use for the task.
+    """
+    lines, kept = source.splitlines(), []
+    module = ast.parse(source)
+    for node in module.body:
+        first, last = node.lineno, node.end_lineno
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            if node.name.startswith("_") or node.name in without:
+                continue
+            kept.append("\n")
+            if node.name in FOR_PEOPLE:
+                last = node.body[0].end_lineno
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        kept.append("\n".join(lines[first - 1 : last]))
+        if getattr(node, "name", "") in FOR_PEOPLE:
+            kept.append("    ...")
+    return "\n".join(kept)

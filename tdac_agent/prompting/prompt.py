@@ -15,12 +15,10 @@ import jinja2
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from tdac_agent.prompting.context import context_of
-from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.rule_answer import MAX_OPERATIONS
 from tdac_agent.prompting.rules import MAX_RULE_CHARS, RepairRule, render_block
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
@@ -67,7 +65,7 @@ class PromptTemplate:
 FULL = PromptTemplate()
 
 
-def load_template(given: str) -> PromptTemplate:
+def load_template(name: str) -> PromptTemplate:
     """Returns a shipped variant by its name, or the template in a file.
 
     A file may use all variables of `context_of` and `{% include %}` the shipped
@@ -76,15 +74,15 @@ def load_template(given: str) -> PromptTemplate:
     Raises:
         PromptError: There is no such variant or file.
     """
-    if given in VARIANTS:
-        return PromptTemplate(given)
+    if name in VARIANTS:
+        return PromptTemplate(name)
     try:
-        return PromptTemplate(given, read_file(given, TEXT_BYTES).decode("utf-8"))
+        return PromptTemplate(name, read_file(name, TEXT_BYTES).decode("utf-8"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
         known = ", ".join(VARIANTS)
         raise PromptError(
-            f"no prompt {given!r}: {reason}; expected a template file or {known}"
+            f"no prompt {name!r}: {reason}; expected a template file or {known}"
         ) from error
 
 
@@ -177,38 +175,6 @@ def _render(
         raise PromptError(f"the prompt {template.name}: {error}") from error
 
 
-def repair_prompt(
-    kind: str,
-    prompt: str,
-    controller: str,
-    report: Report,
-    *,
-    earlier: tuple[str, ...] = (),
-    rules: tuple[RepairRule, ...] = (),
-    unchanged: bool = False,
-) -> str:
-    """Returns the prompt to edit a controller or to summarise its failures as rules.
-
-    Args:
-        kind: `edit` or `summarise`.
-        prompt: The prompt for a new controller, with the current rules.
-        controller: Source of the failed controller.
-        report: Its report.
-        earlier: Earlier attempts, one line each.
-        rules: The rules in force, with their effects.
-        unchanged: Whether the last edit returned the same code.
-    """
-    return repair_question(
-        kind,
-        prompt,
-        controller,
-        render_feedback(report),
-        earlier=earlier,
-        rules=rules,
-        unchanged=unchanged,
-    )
-
-
 def repair_question(
     kind: str,
     prompt: str,
@@ -218,11 +184,11 @@ def repair_question(
     earlier: tuple[str, ...] = (),
     rules: tuple[RepairRule, ...] = (),
     unchanged: bool = False,
-    about: str = ONE_TASK,
+    scope: str = ONE_TASK,
     aim: str = "",
     picture: NamedPicture | None = None,
 ) -> str:
-    """Like `repair_prompt`, from the text of the feedback.
+    """Returns the prompt to edit a controller, to improve it, or to learn rules.
 
     Args:
         kind: `edit`, `summarise` or `improve`.
@@ -232,7 +198,7 @@ def repair_question(
         earlier: Earlier attempts, one line each.
         rules: The rules in force, with their effects.
         unchanged: Whether the last edit returned the same code.
-        about: What the scope `task` of a rule means.
+        scope: What the scope `task` of a rule means.
         aim: What an improved controller shall do better.
         picture: The picture that goes with the question.
     """
@@ -246,7 +212,7 @@ def repair_question(
             earlier=earlier,
             rules=rules,
             unchanged=unchanged,
-            about=about,
+            scope=scope,
             aim=aim,
             picture=picture,
             most_operations=MAX_OPERATIONS,

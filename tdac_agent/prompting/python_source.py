@@ -9,7 +9,6 @@ import tokenize
 import warnings
 from collections.abc import Collection, Iterator
 from contextlib import suppress
-from typing import TypeGuard
 
 from tdac_agent.verification.suite.contract import top_level_names
 
@@ -108,32 +107,30 @@ def left_out(source: str, contract: Collection[str] = ()) -> str | None:
         tree = parse(source)
     except UNPARSABLE:
         tree = None
-    found = list(_placeholders(source, whole=_is_whole(tree, contract)))
-    if found and tree is not None:
+    whole = _is_whole(tree, contract)
+    # The lines that look like comments in the place of code.
+    matches = [
+        match
+        for match in _COMMENT.finditer(source)
+        if _PLACEHOLDER.match(match[1]) or (not whole and _HEADING.match(match[1]))
+    ]
+    if matches and tree is not None:
         comments = _comments(source)
-        found = [match for match in found if match[1].strip() in comments]
-    if found:
-        return found[0][0].strip()[:80]
-    for statement in _ellipses(tree) if tree is not None else ():
-        return f"line {statement.lineno}: ..."
-    return None
-
-
-def _placeholders(source: str, *, whole: bool) -> Iterator[re.Match[str]]:
-    """Yields the lines that look like comments in the place of code."""
-    for match in _COMMENT.finditer(source):
-        if _PLACEHOLDER.match(match[1]) or (not whole and _HEADING.match(match[1])):
-            yield match
+        matches = [match for match in matches if match[1].strip() in comments]
+    if matches:
+        return matches[0][0].strip()[:80]
+    ellipsis = None if tree is None else next(_ellipses(tree), None)
+    return None if ellipsis is None else f"line {ellipsis.lineno}: ..."
 
 
 def _comments(source: str) -> set[str]:
     """Returns the beginnings of the comments, without lines of strings."""
-    found = set()
+    comments = set()
     with suppress(tokenize.TokenError, SyntaxError):
         for token in tokenize.generate_tokens(io.StringIO(source).readline):
             if token.type == tokenize.COMMENT:
-                found.add(token.string[1:201].strip())
-    return found
+                comments.add(token.string[1:201].strip())
+    return comments
 
 
 def _is_whole(tree: ast.Module | None, contract: Collection[str]) -> bool:
@@ -142,9 +139,13 @@ def _is_whole(tree: ast.Module | None, contract: Collection[str]) -> bool:
         return False
     return not any(
         isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-        and all(isinstance(each, ast.Pass) or _is_text(each) for each in node.body)
+        and all(map(_does_nothing, node.body))
         for node in ast.walk(tree)
     )
+
+
+def _does_nothing(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Pass) or isinstance(_constant_of(node), str)
 
 
 def _ellipses(tree: ast.Module) -> Iterator[ast.stmt]:
@@ -156,7 +157,7 @@ def _ellipses(tree: ast.Module) -> Iterator[ast.stmt]:
     while bodies:
         body = bodies.pop()
         for node in ast.iter_child_nodes(body):
-            if _is_ellipsis(node):
+            if isinstance(node, ast.stmt) and _constant_of(node) is ...:
                 if not isinstance(body, ast.ClassDef):
                     yield node
             elif isinstance(node, _BODIES) and not _may_be_stub(node):
@@ -171,17 +172,9 @@ def _may_be_stub(node: ast.AST) -> bool:
     return False
 
 
-def _is_text(node: ast.stmt) -> bool:
-    return (
-        isinstance(node, ast.Expr)
-        and isinstance(node.value, ast.Constant)
-        and isinstance(node.value.value, str)
-    )
-
-
-def _is_ellipsis(node: ast.AST) -> TypeGuard[ast.Expr]:
-    return (
-        isinstance(node, ast.Expr)
-        and isinstance(node.value, ast.Constant)
-        and node.value.value is ...
-    )
+def _constant_of(node: ast.AST) -> object:
+    """Returns the constant that is the whole statement; None for other statements."""
+    match node:
+        case ast.Expr(value=ast.Constant(value=constant)):
+            return constant
+    return None

@@ -8,8 +8,6 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
     TypeAdapter,
     ValidationError,
@@ -25,6 +23,7 @@ from tdac_agent.prompting.rules import (
     clean,
 )
 from tdac_envs.core.errors import first_problem
+from tdac_envs.core.strict_model import StrictModel
 
 MAX_OPERATIONS = 3
 _FOREIGN = re.compile(r"```|~~~|https?://")
@@ -49,11 +48,7 @@ def checked_rule(text: str) -> str:
 Text = Annotated[str, AfterValidator(checked_rule)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class Add(_Strict):
+class Add(StrictModel, strict=True):
     """A new rule."""
 
     op: Literal["add"]
@@ -61,7 +56,7 @@ class Add(_Strict):
     text: Text
 
 
-class Edit(_Strict):
+class Edit(StrictModel, strict=True):
     """A new text for a rule in force."""
 
     op: Literal["edit"]
@@ -69,7 +64,7 @@ class Edit(_Strict):
     text: Text
 
 
-class Drop(_Strict):
+class Drop(StrictModel, strict=True):
     """Permanent removal of a rule in force."""
 
     op: Literal["drop"]
@@ -105,8 +100,8 @@ def parse_operations(reply: str) -> list[Add | Edit | Drop]:
     if not blocks and reply.lstrip().startswith("["):
         blocks = [reply]
     if len(blocks) != 1:
-        found = f"{len(blocks)} blocks" if blocks else "no block"
-        raise RuleAnswerError(f"expected one fenced ```json block, got {found}")
+        count = f"{len(blocks)} blocks" if blocks else "no block"
+        raise RuleAnswerError(f"expected one fenced ```json block, got {count}")
     try:
         return _Operations.validate_python(json.loads(blocks[0]))
     except ValidationError as error:

@@ -10,10 +10,10 @@ import re
 import unicodedata
 from typing import Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from tdac_agent.models.tokens import estimate_tokens
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 
 BEGIN, END = "AUTO_REPAIR_RULES_BEGIN", "AUTO_REPAIR_RULES_END"
 _MARKER = re.compile(f"{BEGIN}|{END}")
@@ -27,11 +27,7 @@ Scope = Literal["task", "environment", "code"]
 Status = Literal["in force", "dropped", "made room"]
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class RepairRule(_Record):
+class RepairRule(StrictRecord):
     """A rule and its history."""
 
     id: str = Field(
@@ -100,7 +96,7 @@ class RepairRule(_Record):
         return self.status == "dropped" or (not self.in_force and self.benefit < 0)
 
 
-class RuleBook(_Record):
+class RuleBook(StrictRecord):
     """`rules.json`: all rules of a run, including those no longer in force."""
 
     schema_version: Literal[1] = 1

@@ -92,74 +92,79 @@ def _readings(file: SetFile) -> dict[str, tuple[str, str, str, str]]:
 def disturbance_lines(file: SetFile) -> Iterator[str]:
     """Yields a line for each disturbance of the set: its distribution and size."""
     own = file.disturbances
-    if own.wheel_gains:
-        low, high = 1.0 - own.wheel_gains, 1.0 + own.wheel_gains
-        yield (
+    low, high = 1.0 - own.wheel_gains, 1.0 + own.wheel_gains
+    steps = "1 step" if own.delay == 1 else f"{own.delay} steps"
+    sizes_and_lines: list[tuple[float, str]] = [
+        (
+            own.wheel_gains,
             "Hidden wheel gains: each wheel turns at the command times "
             f"a gain of their own, each uniform in [{low:g}, {high:g}], drawn anew for "
-            "each episode and constant in it; never faster than max_wheel_speed."
-        )
-    if own.axle_error:
-        yield (
+            "each episode and constant in it; never faster than max_wheel_speed.",
+        ),
+        (
+            own.axle_error,
             "Hidden axle length: axle_length times 1 + e, e uniform within "
-            f"±{own.axle_error:g}, constant in an episode."
-        )
-    if own.wheel_slip:
-        yield (
+            f"±{own.axle_error:g}, constant in an episode.",
+        ),
+        (
+            own.wheel_slip,
             "Slip: in each step, the speed of each wheel over ground is multiplied by "
             f"a normal number with mean 1 and SD {file.slip:.3g}; again never faster "
-            "than max_wheel_speed."
-        )
-    if own.motor_lag:
-        yield (
+            "than max_wheel_speed.",
+        ),
+        (
+            own.motor_lag,
             f"Lag: wheel speeds follow the commands with a time constant of "
-            f"{own.motor_lag:g} s."
-        )
-    if own.delay:
-        steps = "1 step" if own.delay == 1 else f"{own.delay} steps"
-        yield (
+            f"{own.motor_lag:g} s.",
+        ),
+        (
+            own.delay,
             f"Delay: an action takes effect {steps} late; until the first one does, "
-            "the wheels stand still."
-        )
-    if own.range_noise:
-        yield (
+            "the wheels stand still.",
+        ),
+        (
+            own.range_noise,
             "Noise of the ranges: each ray in each step times a normal number with "
-            f"mean 1 and SD {own.range_noise:g}, limited to [0, range_max]."
-        )
-    if own.range_dropout:
-        yield (
+            f"mean 1 and SD {own.range_noise:g}, limited to [0, range_max].",
+        ),
+        (
+            own.range_dropout,
             f"Dropouts: each ray reads range_max with probability "
-            f"{own.range_dropout:g} in each step."
-        )
-    if own.odometry_scale:
-        yield (
+            f"{own.range_dropout:g} in each step.",
+        ),
+        (
+            own.odometry_scale,
             "Scale errors of the odometry: distance and turn are each multiplied by "
             f"1 + e, e normal with SD {own.odometry_scale:g}, one for distance and one "
-            "for turn, drawn for each episode and constant in it."
-        )
-    if own.odometry_noise:
-        yield (
+            "for turn, drawn for each episode and constant in it.",
+        ),
+        (
+            own.odometry_noise,
             "Noise of the odometry: distance and turn of each step are each multiplied "
-            f"by a normal number with mean 1 and SD {own.odometry_noise:g}."
-        )
+            f"by a normal number with mean 1 and SD {own.odometry_noise:g}.",
+        ),
+    ]
     if isinstance(file.robot, EPuckParams):
-        yield from _epuck_errors(file.robot)
+        sizes_and_lines += _epuck_errors(file.robot)
+    return (line for size, line in sizes_and_lines if size)
 
 
-def _epuck_errors(robot: EPuckParams) -> Iterator[str]:
-    if robot.wheel_radius_error:
-        yield (
+def _epuck_errors(robot: EPuckParams) -> list[tuple[float, str]]:
+    listed = ", ".join(
+        f"{1e3 * distance:g}: {robot.sensor_noise * spread:.2g}"
+        for distance, _, spread in TABLE.tolist()
+    )
+    return [
+        (
+            robot.wheel_radius_error,
             "Hidden wheel radii: each wheel's radius is wheel_radius times 1 + e, e "
             f"uniform within ±{robot.wheel_radius_error:g}, drawn for each wheel, "
-            "constant in an episode; `encoders` do not show it."
-        )
-    if robot.sensor_noise:
-        listed = ", ".join(
-            f"{1e3 * distance:g}: {robot.sensor_noise * spread:.2g}"
-            for distance, _, spread in TABLE.tolist()
-        )
-        yield (
+            "constant in an episode; `encoders` do not show it.",
+        ),
+        (
+            robot.sensor_noise,
             "Noise of the infra-red sensors: each reading in each step times a normal "
             "number with mean 1 and an SD that follows from the length of the ray "
-            f"(mm: SD): {listed}, linearly in between; limited to [0, {LARGEST:g}]."
-        )
+            f"(mm: SD): {listed}, linearly in between; limited to [0, {LARGEST:g}].",
+        ),
+    ]

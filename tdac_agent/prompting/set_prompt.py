@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from tdac_agent.prompting.context import allowed_code
 from tdac_agent.prompting.prompt import PromptError, PromptTemplate, fill_in
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.prompting.set_observations import (
@@ -13,13 +14,6 @@ from tdac_agent.prompting.set_observations import (
 )
 from tdac_agent.sandbox import Limits
 from tdac_agent.verification.judge.set_files import level_params
-from tdac_agent.verification.suite.contract import ALLOWED_IMPORTS
-from tdac_agent.verification.suite.hygiene import (
-    FORBIDDEN_ATTRIBUTES,
-    FORBIDDEN_CALLS,
-    SAVERS,
-    SURFACES,
-)
 from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.infrared import PLACES, TABLE
 from tdac_envs.ladder.generators.plates import Plates
@@ -28,8 +22,6 @@ from tdac_envs.ladder.task_sets import TaskSet
 
 SET_TEMPLATE = "set"
 """Name of the shipped template, `full` to the user."""
-NOT_SUPPLIED = {"__future__", "sensors"}
-"""Modules that a controller for a task set does not get, or need not import."""
 
 
 def set_prompt(
@@ -82,11 +74,7 @@ def set_context(tasks: TaskSet) -> dict[str, Any]:
         "observation_rows": list(observation_rows(tasks)),
         "disturbances": list(disturbance_lines(file)),
         "params_text": json.dumps(level_params(file), indent=2),
-        "allowed_imports": " ".join(sorted(ALLOWED_IMPORTS - NOT_SUPPLIED)),
-        "forbidden_calls": ", ".join(sorted(FORBIDDEN_CALLS)),
-        "forbidden_attributes": ", ".join(sorted(FORBIDDEN_ATTRIBUTES)),
-        "savers": ", ".join(sorted(SAVERS)),
-        "surfaces": ", ".join(sorted(SURFACES)),
+        **allowed_code({"__future__", "sensors"}),
         "memory": f"{limits.memory_bytes >> 30}",
         "wall_seconds": f"{limits.call_seconds:g}",
         "instructions": "",

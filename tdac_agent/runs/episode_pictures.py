@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Rollout, Trajectory
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.task import Task
@@ -72,7 +71,7 @@ def _scene(problem: Task | TaskSet, number: int) -> tuple[Nominal, Units, Backdr
     """The task of an episode, the units of its diagnosis, and the background."""
     if isinstance(problem, Task):
         setting = problem.setting
-        return problem.nominal, setting.units, pictures_of(setting).backdrop()
+        return problem.nominal, setting.units, problem.pictures().backdrop()
     task = problem.task("dev", number)
     return task, shown_units(problem.file, task), backdrop_of(task)
 

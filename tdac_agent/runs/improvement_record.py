@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from tdac_agent.storage.printable_record import FrozenRecord, read_record
+from tdac_agent.storage.printable_record import StrictRecord, read_record
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.units import Place
 
@@ -44,7 +44,7 @@ def goals_text(reached: int, count: int) -> str:
     return f"the goal reached in {reached} of {count} disturbed episodes"
 
 
-class MemberFigures(FrozenRecord):
+class MemberFigures(StrictRecord):
     """A verified candidate in the disturbed episodes of the search."""
 
     k: int
@@ -62,7 +62,7 @@ class MemberFigures(FrozenRecord):
     )
 
 
-class PairedChange(FrozenRecord):
+class PairedChange(StrictRecord):
     """Means of both controllers in the same episodes, and their difference.
 
     The interval is that of a paired bootstrap over episodes, with 95 % confidence.
@@ -91,7 +91,7 @@ class PairedChange(FrozenRecord):
         )
 
 
-class TaskImprovement(FrozenRecord):
+class TaskImprovement(StrictRecord):
     """The search for a better controller, after the first verified one."""
 
     schema_version: int = 1

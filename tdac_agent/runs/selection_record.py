@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pydantic import ConfigDict, Field
 
-from tdac_agent.storage.printable_record import FrozenRecord, read_record
+from tdac_agent.storage.printable_record import StrictRecord, read_record
 from tdac_agent.verification.judge.episode_row import Scores
 
 SELECTION_FILE = "report.json"
@@ -14,7 +14,7 @@ HIDDEN_FILE = "hidden.json"
 """Report on the selected controller on hidden worlds: sums alone."""
 
 
-class CandidateFigures(FrozenRecord):
+class CandidateFigures(StrictRecord):
     """How a candidate drove, in numbers of worlds of `dev`."""
 
     k: int
@@ -32,7 +32,7 @@ class CandidateFigures(FrozenRecord):
     )
 
 
-class Improvement(FrozenRecord):
+class Improvement(StrictRecord):
     """The selected controller beside what it improves, on worlds that decided nothing.
 
     Both drove on the same worlds. The interval is that of a paired bootstrap over
@@ -53,7 +53,7 @@ class Improvement(FrozenRecord):
     )
 
 
-class Selection(FrozenRecord):
+class Selection(StrictRecord):
     """`report.json` of a run on a task set: what was selected, and from what.
 
     The figures of the selected candidate are optimistic: it was chosen by them.
@@ -93,7 +93,7 @@ def read_selection(folder: Path) -> Selection | None:
     return read_record(Selection, folder, SELECTION_FILE)
 
 
-class HiddenCounts(FrozenRecord):
+class HiddenCounts(StrictRecord):
     """How often the selected controller reached the goal on hidden worlds."""
 
     model_config = ConfigDict(extra="ignore")

@@ -29,7 +29,7 @@ class PrintableRecord(BaseModel):
         super().__setattr__(name, _filtered(value))
 
 
-class FrozenRecord(PrintableRecord):
+class StrictRecord(PrintableRecord):
     """A record that nothing changes, with no other fields than its own."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)

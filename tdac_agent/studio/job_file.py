@@ -6,20 +6,18 @@ import hmac
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, Field
 
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.installation import keyed
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 
 Word = Annotated[str, Field(max_length=4096)]
 
 
-class JobFile(PrintableRecord):
+class JobFile(StrictRecord):
     """What was started; fields as in `Job`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     words: tuple[Word, ...] = Field(min_length=1, max_length=1000)
     started: AwareDatetime

@@ -250,7 +250,7 @@ class Dialogue:
             earlier=self.earlier[:-1][-MAX_EARLIER:],
             rules=self.book.in_force,
             unchanged=self._unchanged,
-            about=self.about,
+            scope=self.about,
             picture=self._named(images, picture),
         )
         stable = _stable(question)

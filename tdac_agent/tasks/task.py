@@ -15,6 +15,7 @@ from tdac_agent.storage.hashes import sha256_of_json
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.environment import Environment
 from tdac_agent.tasks.first_run import compile_first
+from tdac_agent.tasks.parts import Pictures
 from tdac_agent.tasks.registry import environment, own_environments
 from tdac_agent.tasks.setting import JudgedEnv, Nominal, Params, Setting
 from tdac_agent.tasks.task_file import (
@@ -101,6 +102,10 @@ class Task:
     def make_env(self, **options: Any) -> JudgedEnv:
         """Constructs this task's environment; `options` override its arguments."""
         return self.setting.make_env(**options)
+
+    def pictures(self) -> Pictures:
+        """Returns an object that draws this task's episodes."""
+        return self.environment.pictures(self.setting)
 
     def start_check(self) -> Callable[[Pose], bool]:
         """Returns a function: whether an episode may begin at a feasible start.

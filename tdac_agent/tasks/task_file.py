@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
@@ -19,6 +18,7 @@ from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
 from tdac_envs.core.arguments import MOST_STEPS, in_radians
 from tdac_envs.core.errors import TaskError, first_problem, hint
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
+from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.mapping.params import MOST_RAYS, FrameName, Length, Place
 from tdac_envs.movers.spec import AnySpec, Spec, read_specs
 
@@ -51,11 +51,7 @@ def _movers_of(given: Any) -> tuple[AnySpec, ...]:
         raise ValueError(str(error).removeprefix("movers: ")) from None
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class RobotSpec(_Strict):
+class RobotSpec(StrictModel):
     """Properties of the robot that differ from the default."""
 
     radius: Length | None = Field(None, description="px")
@@ -67,7 +63,7 @@ class RobotSpec(_Strict):
     image: Path | None = Field(None, description="Picture of the robot, facing +x.")
 
 
-class ProgressSpec(_Strict):
+class ProgressSpec(StrictModel):
     """The progress test: d_min <= fraction * d0 within `steps` steps."""
 
     fraction: float = Field(0.7, gt=0, lt=1)
@@ -81,7 +77,7 @@ def _faces(start: tuple[float, ...] | None) -> tuple[float, ...] | None:
     return start
 
 
-class TaskFile(_Strict):
+class TaskFile(StrictModel):
     """Contents of `task.yaml`, schema 1."""
 
     schema_version: Literal[1] = Field(1, alias="schema")

@@ -88,16 +88,16 @@ def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
     Raises:
         TaskError: A schedule or type of noise is not supported.
     """
-    found = {key: _scheduled(key, value) for key, value in model.items()}
-    kind, spread = found.pop("noise_type", None), found.pop("noise_std", 0.0)
+    arguments = {key: _scheduled(key, value) for key, value in model.items()}
+    kind, spread = arguments.pop("noise_type", None), arguments.pop("noise_std", 0.0)
     if kind is not None and kind != "normal":
         raise TaskError(f"expected noise_type: normal, got {kind!r}")
     if kind is not None:
         from stable_baselines3.common.noise import NormalActionNoise
 
         zeros = np.zeros(2)  # one per wheel
-        found["action_noise"] = NormalActionNoise(zeros, zeros + float(spread))
-    return found
+        arguments["action_noise"] = NormalActionNoise(zeros, zeros + float(spread))
+    return arguments
 
 
 def _wrapper_names(paths: list[str] | str) -> tuple[str, ...] | None:

@@ -27,8 +27,7 @@ from tdac_agent.training.hyperparameters import model_arguments
 from tdac_agent.training.plan import TrainingPlan, make_batch
 from tdac_agent.training.policy_files import write_policy
 from tdac_agent.training.set_plan import make_set_batch, make_trials
-from tdac_agent.training.set_trials import evaluate_on_worlds
-from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
+from tdac_envs.learning.wrapped_vector import Seen, WrappedVectorEnv
 
 ALGOS = {"ppo": PPO, "recurrent-ppo": RecurrentPPO, "sac": SAC, "td3": TD3}
 POLICIES = {f"{MemoryPolicy.__module__}.{MemoryPolicy.__qualname__}": MemoryPolicy}
@@ -109,18 +108,18 @@ def evaluate_batch(model: Any, envs: VecMonitor, seed: int | Sequence[int]) -> P
             ended[i] = ended[i] or infos[i]
     episodes = [info for info in ended if info is not None]
 
-    def mean(values: list[Any]) -> float:
-        return round(float(np.mean(values)), 6)
-
-    return Point(
-        0,
-        0.0,
-        mean([info["is_success"] for info in episodes]),
-        mean([info["collision"] for info in episodes]),
-        mean([info["episode"]["r"] for info in episodes]),
-        mean([info["episode"]["l"] for info in episodes]),
-        float("nan"),
+    return _point(
+        [info["is_success"] for info in episodes],
+        [info["collision"] for info in episodes],
+        [info["episode"]["r"] for info in episodes],
+        [info["episode"]["l"] for info in episodes],
     )
+
+
+def _point(*columns: Any) -> Point:
+    """The results of an evaluation whose steps and seconds are not known yet."""
+    reached, hit, gained, steps = (round(float(np.mean(each)), 6) for each in columns)
+    return Point(0, 0.0, reached, hit, gained, steps, float("nan"))
 
 
 class _Evaluations(BaseCallback):
@@ -160,13 +159,13 @@ class _Evaluations(BaseCallback):
 
     def _evaluate(self, steps: int) -> None:
         if isinstance(self._trials, WrappedVectorEnv):
-            found = evaluate_on_worlds(self.model, self._trials)
+            result = evaluate_on_worlds(self.model, self._trials)
         else:
             seed = EVALUATION_SEED + self._plan.seed
-            found = evaluate_batch(self.model, self._trials, seed)
+            result = evaluate_batch(self.model, self._trials, seed)
         seen = [info["is_success"] for info in self.model.ep_info_buffer or ()]
         point = replace(
-            found,
+            result,
             steps=steps,
             seconds=round(time.perf_counter() - self._began, 3),
             train_success_rate=round(float(np.mean(seen)), 6) if seen else float("nan"),
@@ -188,13 +187,10 @@ def _model(plan: TrainingPlan, folder: Path, envs: VecMonitor) -> Any:
         log = str(folder / "tensorboard")
     file = folder / CHECKPOINT
     if not file.is_file():
-        given = model_arguments(plan.hyperparameters)
+        chosen = {"seed": plan.seed, "device": "cpu", "tensorboard_log": log}
+        chosen |= model_arguments(plan.hyperparameters)
         try:
-            return kind(
-                POLICIES.get(plan.policy, plan.policy),
-                envs,
-                **{"seed": plan.seed, "device": "cpu", "tensorboard_log": log, **given},
-            )
+            return kind(POLICIES.get(plan.policy, plan.policy), envs, **chosen)
         except (TypeError, ValueError, AssertionError) as error:
             reason = " ".join(str(error).split())
             raise RunError(f"hyperparameters of {plan.algo}: {reason}") from error
@@ -210,10 +206,60 @@ def _model(plan: TrainingPlan, folder: Path, envs: VecMonitor) -> Any:
 
 
 def _write_checkpoint(model: Any, folder: Path) -> None:
+    saves = {CHECKPOINT: model.save}
     if hasattr(model, "replay_buffer"):
-        draft = folder / f".{REPLAY}"
-        model.save_replay_buffer(draft)
-        install_checkpoint(draft, folder / REPLAY)
-    draft = folder / f".{CHECKPOINT}"
-    model.save(draft)
-    install_checkpoint(draft, folder / CHECKPOINT)
+        saves = {REPLAY: model.save_replay_buffer, **saves}
+    for name, save in saves.items():
+        draft = folder / f".{name}"
+        save(draft)
+        install_checkpoint(draft, folder / name)
+
+
+def evaluate_on_worlds(model: Any, trials: WrappedVectorEnv) -> Point:
+    """Drives robot i once through world i, with deterministic actions.
+
+    Args:
+        model: Model with a method `predict`.
+        trials: The robots, which are not reset automatically.
+
+    Returns:
+        The results, with 0 steps, 0 seconds and no success rate in training (nan).
+    """
+    count = trials.num_envs
+    seen = _begun(trials)
+    ended = np.zeros(count, np.bool_)
+    reached, hit, returns, lengths = np.zeros((4, count))
+    state, over = None, np.ones(count, np.bool_)
+    while not ended.all():
+        actions, state = model.predict(seen, state, over, deterministic=True)
+        seen, rewards, terminated, truncated, infos = trials.step(actions)
+        returns[~ended] += rewards[~ended]
+        lengths[~ended] += 1
+        over = terminated | truncated
+        first = over & ~ended
+        if first.any():
+            reached[first] = infos["is_success"][first]
+            hit[first] = infos["collision"][first]
+        ended |= over
+        if over.any() and not ended.all():
+            # World 0 is at hand: these robots' further episodes do not count.
+            trials.reset(options={"index": 0, "reset_mask": over})
+    return _point(reached, hit, returns, lengths)
+
+
+def _begun(trials: WrappedVectorEnv) -> Seen:
+    """The first observations, of robot i in world i."""
+    rows: list[Any] = []
+    # In descending order, so that the last world made is 0.
+    for i in reversed(range(trials.num_envs)):
+        mask = np.arange(trials.num_envs) == i
+        seen, _ = trials.reset(options={"index": i, "reset_mask": mask})
+        rows.append(
+            {key: value[i] for key, value in seen.items()}
+            if isinstance(seen, dict)
+            else seen[i]
+        )
+    rows.reverse()
+    if isinstance(rows[0], dict):
+        return {key: np.stack([row[key] for row in rows]) for key in rows[0]}
+    return np.stack(rows)

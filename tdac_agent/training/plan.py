@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import gymnasium as gym
 from gymnasium.envs.registration import load_env_creator
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from tdac_agent.errors import RunError
 from tdac_agent.runs.ownership import load_task
@@ -25,8 +25,10 @@ from tdac_agent.training.hyperparameters import (
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
+from tdac_envs.core.strict_model import StrictModel
+from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 from tdac_envs.learning.wrappers import check_wrappers
-from tdac_envs.learning.wrapping import FOR_RL
+from tdac_envs.learning.wrapping import FOR_RL, wrap_for_rl
 
 Variation = Literal["nominal", "jitter", "mixed", "random"]
 EVALUATIONS, EPISODES = 12, 100
@@ -36,10 +38,8 @@ MOST_SEED = 2**31
 """Largest seed of a training."""
 
 
-class TrainingPlan(BaseModel):
+class TrainingPlan(StrictModel):
     """`training.json` of a training's folder."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     schema_version: Literal[1] = 1
     algo: Algo
@@ -114,8 +114,8 @@ def make_plan(
     disturbance = disturbance or Disturbance(0.0, 0.0, 0.0, 0)
     for task in loaded:
         task.disturbed_options(disturbance)
-    given = read_hyperparameters(config or config_file(algo), loaded[0].spec.env)
-    chosen = FOR_RL if given.wrappers is None else given.wrappers
+    defaults = read_hyperparameters(config or config_file(algo), loaded[0].spec.env)
+    chosen = FOR_RL if defaults.wrappers is None else defaults.wrappers
     names = chosen if wrappers is None else wrappers
     check_wrappers(names)
     if len(loaded) > 1 and "goal-relative" not in names:
@@ -123,21 +123,21 @@ def make_plan(
             "several tasks need --wrapper goal-relative: positions on one map mean "
             "nothing on another"
         )
-    count = n_envs or given.n_envs
-    wanted = steps or given.steps
+    count = n_envs or defaults.n_envs
+    wanted = steps or defaults.steps
     return TrainingPlan(
         algo=algo,
         tasks=tuple(map(_lasting_name, tasks)),
         task_sha256=tuple(task.sha256() for task in loaded),
         wrappers=names,
         variation=variation or "jitter",
-        env_kwargs=_env_kwargs(given, variation, loaded[0]),
+        env_kwargs=_env_kwargs(defaults, variation, loaded[0]),
         disturbance=disturbance,
         steps=wanted,
         seed=seed,
         n_envs=max(count, len(tasks)),
-        policy=policy_class(given, names),
-        hyperparameters=given.model,
+        policy=policy_class(defaults, names),
+        hyperparameters=defaults.model,
         evaluate_every=max(wanted // EVALUATIONS, 1),
         episodes=max(episodes, len(tasks)),
     )
@@ -189,42 +189,58 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
         TaskError: A task has changed since the plan was made, or cannot be used.
     """
     from tdac_envs.learning.sb3 import SB3VecEnv
-    from tdac_envs.learning.wrapping import wrap_for_rl
 
-    each = []
     tasks = tasks_of(plan)
-    own = plan.env_kwargs if training else {}
-    for task in tasks:
-        options = task.disturbed_options(plan.disturbance)
-        varied = {**options, "variation": plan.variation, **own}
-        each.append({**task.env_kwargs(), **varied})
+    own = {"variation": plan.variation, **(plan.env_kwargs if training else {})}
+    each = [
+        task.env_kwargs() | task.disturbed_options(plan.disturbance) | own
+        for task in tasks
+    ]
+    make = load_env_creator(str(gym.spec(tasks[0].spec.env).vector_entry_point))
+    return SB3VecEnv(wrapped_batch(plan, make, count, "SameStep", each=each))
+
+
+def wrapped_batch(
+    plan: TrainingPlan, make: Any, count: int, mode: str, **kwargs: Any
+) -> WrappedVectorEnv:
+    """Makes a batch of robots with a plan's wrappers.
+
+    Args:
+        plan: Plan of the training.
+        make: Entry point of the batch.
+        count: Number of robots.
+        mode: When robots are reset.
+        kwargs: Further arguments of the entry point.
+
+    Raises:
+        TaskError: An argument is unknown.
+    """
     try:
-        name = str(gym.spec(tasks[0].spec.env).vector_entry_point)
-        make: Any = load_env_creator(name)
-        batch = make(count, autoreset_mode="SameStep", each=each)
+        batch = make(count, autoreset_mode=mode, **kwargs)
     except TypeError as error:
         reason = str(error).partition("() ")[2]
         raise TaskError(f"env_kwargs of the hyperparameters: {reason}") from error
-    return SB3VecEnv(wrap_for_rl(batch, plan.wrappers))
+    wrapped: WrappedVectorEnv = wrap_for_rl(batch, plan.wrappers)
+    return wrapped
 
 
 def _env_kwargs(
-    given: Hyperparameters, variation: Variation | None, task: Task
+    defaults: Hyperparameters, variation: Variation | None, task: Task
 ) -> dict[str, Any]:
     """Arguments of the training environments.
 
     Raises:
         TaskError: The task sets one of them.
     """
-    for name in given.env:
+    for name in defaults.env:
         if name in task.env_kwargs():
             raise TaskError(f"env_kwargs: {name} is set by the task; leave it out")
-    return given.env | ({} if variation is None else {"variation": variation})
+    return defaults.env | ({} if variation is None else {"variation": variation})
 
 
-def policy_class(given: Hyperparameters, wrappers: tuple[str, ...]) -> str:
+def policy_class(defaults: Hyperparameters, wrappers: tuple[str, ...]) -> str:
     """The policy class, for observations of one array or of several."""
-    flat = given.policy.replace("MultiInput", "Mlp")
+    flat = defaults.policy.replace("MultiInput", "Mlp")
     return flat if "flatten" in wrappers else flat.replace("Mlp", "MultiInput")
 
 

@@ -21,14 +21,14 @@ FACTS = "policy.json"
 LEARNERS = ("stable_baselines3", "sb3_contrib", "torch")
 
 
-def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> None:
+def write_policy(model: Any, folder: Path, plan: TrainingPlan, point: Point) -> None:
     """Writes `policy.zip`, which `tdac evaluate` reads, and `policy.json`.
 
     Args:
         model: Model of stable-baselines3.
         folder: Folder of the training.
         plan: Plan of the training.
-        found: Evaluation of the model.
+        point: Evaluation of the model.
     """
     saved = SavedPolicy(
         algo=plan.algo,
@@ -37,34 +37,27 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, found: Point) -> 
         set_sha256=plan.set_sha256,
         wrappers=plan.wrappers,
         variation=plan.env_kwargs.get("variation", plan.variation),
-        steps=found.steps,
+        steps=point.steps,
         seed=plan.seed,
     )
     draft = folder / f".{POLICY}"
     model.save(draft)
     write_metadata(draft, saved)
     os.replace(draft, folder / POLICY)
+    # JSON has no nan; the training success rate is nan until an episode has ended.
+    evaluation = {
+        key: None if math.isnan(value) else value
+        for key, value in asdict(point).items()
+    }
+    learners = {name: importlib.metadata.version(name) for name in LEARNERS}
     facts = {
         **plan.model_dump(mode="json"),
         "steps_planned": plan.steps,
-        "steps": found.steps,
-        "seconds": found.seconds,
-        "evaluation": asdict(found),
+        "steps": point.steps,
+        "seconds": point.seconds,
+        "evaluation": evaluation,
         "cores": os.cpu_count(),
-        "versions": {**versions(), **_learner_versions()},
+        "versions": {**versions(), **learners},
     }
-    # JSON has no nan; the training success rate is nan until an episode has ended.
-    text = json.dumps(_without_nan(facts), indent=2, allow_nan=False)
+    text = json.dumps(facts, indent=2, allow_nan=False)
     write_atomic(folder / FACTS, text + "\n")
-
-
-def _learner_versions() -> dict[str, str]:
-    return {name: importlib.metadata.version(name) for name in LEARNERS}
-
-
-def _without_nan(facts: dict[str, Any]) -> dict[str, Any]:
-    evaluation = {
-        key: None if math.isnan(value) else value
-        for key, value in facts["evaluation"].items()
-    }
-    return {**facts, "evaluation": evaluation}

@@ -17,6 +17,7 @@ from tdac_agent.training.plan import (
     MOST_ROBOTS,
     TrainingPlan,
     policy_class,
+    wrapped_batch,
 )
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
@@ -64,17 +65,17 @@ def make_set_plan(
     for argument, number in (("n_envs", n_envs), ("episodes", episodes)):
         if number is not None:
             whole_number(argument, number, 1, MOST_ROBOTS)
-    given = read_hyperparameters(config or config_file(algo), OnSet.title)
-    for own in _OWN & given.env.keys():
+    defaults = read_hyperparameters(config or config_file(algo), OnSet.title)
+    for own in _OWN & defaults.env.keys():
         raise TaskError(f"env_kwargs: {own} is set by the training; leave it out")
     tasks.check_count(TRAINED, 1, "training worlds")
     tasks.check_count(SELECTED, episodes or 1, "episodes")
     env: Any = make(name, split=SELECTED)
-    chosen = default_wrappers(env) if given.wrappers is None else given.wrappers
+    chosen = default_wrappers(env) if defaults.wrappers is None else defaults.wrappers
     names = chosen if wrappers is None else wrappers
     wrap_for_rl(env, names)  # checks that they support what is observed
     count = tasks.count(SELECTED)
-    wanted = steps or given.steps
+    wanted = steps or defaults.steps
     return TrainingPlan(
         algo=algo,
         tasks=(),
@@ -83,13 +84,13 @@ def make_set_plan(
         set_sha256=tasks.sha256,
         wrappers=names,
         variation="nominal",
-        env_kwargs=given.env,
+        env_kwargs=defaults.env,
         disturbance=Disturbance(0.0, 0.0, 0.0, 0),
         steps=wanted,
         seed=seed,
-        n_envs=n_envs or given.n_envs,
-        policy=policy_class(given, names),
-        hyperparameters=given.model,
+        n_envs=n_envs or defaults.n_envs,
+        policy=policy_class(defaults, names),
+        hyperparameters=defaults.model,
         evaluate_every=max(wanted // EVALUATIONS, 1),
         episodes=episodes or min(EPISODES, count or EPISODES),
     )
@@ -133,15 +134,5 @@ def _batch(
     plan: TrainingPlan, count: int, split: str, mode: str, own: dict[str, Any]
 ) -> WrappedVectorEnv:
     set_of(plan)
-    try:
-        batch = make_batch(
-            count,
-            autoreset_mode=mode,
-            level=str(plan.set),
-            split=split,
-            **own,
-        )
-    except TypeError as error:
-        reason = str(error).partition("() ")[2]
-        raise TaskError(f"env_kwargs of the hyperparameters: {reason}") from error
-    return wrap_for_rl(batch, plan.wrappers)
+    facts = {"level": str(plan.set), "split": split, **own}
+    return wrapped_batch(plan, make_batch, count, mode, **facts)

@@ -13,7 +13,7 @@ from pydantic import AliasChoices, ConfigDict, Field, model_validator
 
 from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
 from tdac_agent.metrics.rates import rate_of_runs
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.units import Place
 from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores, scores_of
@@ -43,13 +43,10 @@ TOUCHED = {
 """How the failures of each contact are told apart."""
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-
-class EpisodeProvenance(_Record):
+class EpisodeProvenance(StrictRecord):
     """What the results apply to; with a number, it determines an episode."""
 
+    model_config = ConfigDict(populate_by_name=True)
     name: str = Field(
         validation_alias=AliasChoices("name", "set", "task"),
         description="Name of the task or the task set.",
@@ -87,7 +84,7 @@ class EpisodeProvenance(_Record):
     versions: dict[str, str]
 
 
-class Interval(_Record):
+class Interval(StrictRecord):
     """A confidence interval for the success rate.
 
     Exact (Clopper and Pearson 1934): its coverage is at least `confidence` at any rate.
@@ -100,7 +97,7 @@ class Interval(_Record):
     method: Literal["Clopper-Pearson", "bootstrap over worlds"] = "Clopper-Pearson"
 
 
-class SequentialResult(_Record):
+class SequentialResult(StrictRecord):
     """The decision of a sequential test, and its error rates."""
 
     decision: Decision
@@ -110,7 +107,7 @@ class SequentialResult(_Record):
     at_accepted_rate: Characteristics
 
 
-class HiddenCount(_Record):
+class HiddenCount(StrictRecord):
     """What the ledger says about a hidden evaluation."""
 
     number: int = Field(description="Its number among those of this controller, set.")
@@ -125,9 +122,10 @@ class HiddenCount(_Record):
     )
 
 
-class EpisodeReport(_Record):
+class EpisodeReport(StrictRecord):
     """Independent episodes of a task, by seed, or on worlds of a set, by index."""
 
+    model_config = ConfigDict(populate_by_name=True)
     schema_version: int = 2
     provenance: EpisodeProvenance
     tests: dict[str, str] = Field(

@@ -20,8 +20,13 @@ from tdac_agent.tasks.provenance import origin, versions
 from tdac_agent.tasks.task import Task, display_name, lay_out
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
-from tdac_agent.verification.diagnosis.report import OWN, SHIPPED, Provenance, Report
-from tdac_agent.verification.diagnosis.shown import in_units
+from tdac_agent.verification.diagnosis.report import (
+    OWN,
+    SHIPPED,
+    Provenance,
+    Report,
+    in_units,
+)
 from tdac_agent.verification.judge.jobs import Findings, Job, write_job
 from tdac_agent.verification.judge.report_log import (
     read_findings,
@@ -103,10 +108,10 @@ def verify(
             metres=task.setting.shown != task.setting.units,
         )
         _prepare(job, task, source, suites)
-        given = _files_in(job.task)
+        files = _files_in(job.task)
         output = _run_judge(job, folder, warm, meanwhile)
         findings = read_findings(job.out, output)
-        if _files_in(job.task) != given:
+        if _files_in(job.task) != files:
             raise Fault("the suite changed the task's files, so there is no verdict")
         tests, failures = read_outcomes(job.out / "report.jsonl", findings, output)
         report = Report(
@@ -138,7 +143,7 @@ def kept_report(
         report = Report.model_validate(parse_json(content))
     except (OSError, ValueError):
         return None
-    about = report.provenance
+    provenance = report.provenance
     wanted = {
         "controller_sha256": sha256_of(raw),
         "task_sha256": task.sha256(),
@@ -148,7 +153,7 @@ def kept_report(
         "seed": seed_of(raw, task) if seed is None else seed,
         "versions": versions(),
     }
-    same = all(getattr(about, name) == value for name, value in wanted.items())
+    same = all(getattr(provenance, name) == value for name, value in wanted.items())
     return report if same else None
 
 
@@ -241,7 +246,7 @@ def _provenance(
     return Provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
         called=display_name(task),
-        own_suite=_own_suite_hash(suites),
+        own_suite=_hash_of_files(suites[OWN])[:8] if OWN in suites else "",
         suite=" + ".join(_suite_name(task, folder) for folder in suites.values()),
         suite_sha256=_hash_of_suites(suites),
         profile=job.profile,
@@ -250,13 +255,7 @@ def _provenance(
     )
 
 
-def _own_suite_hash(suites: dict[str, Path]) -> str:
-    """Short hash of the suite that is not shipped; empty without one."""
-    own = suites.get(OWN)
-    return _hash_of_folder(own)[:8] if own else ""
-
-
-def _hash_of_folder(folder: Path) -> str:
+def _hash_of_files(folder: Path) -> str:
     return sha256_of(json.dumps(_file_hashes(folder), sort_keys=True).encode())
 
 

@@ -56,10 +56,10 @@ class Copier:
         if real is None:
             return
         try:
-            found = os.stat(real)
-            if not stat.S_ISREG(found.st_mode):
+            status = os.stat(real)
+            if not stat.S_ISREG(status.st_mode):
                 return
-            self._take(found.st_size)
+            self._take(status.st_size)
             shutil.copyfile(real, target)
         except OSError as error:
             self._note(source, f"cannot be read: {error.strerror}")

@@ -9,9 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.drive.task import Pose
 from tdac_envs.ladder.admission import Admitted, Conditions, Rejection, admit
 from tdac_envs.ladder.difficulty import Difficulty
@@ -29,10 +30,8 @@ _WALL, _HEIGHT = 0.01, 0.1
 """Thickness of the arena's wall, and height of everything, m."""
 
 
-class PlatesSpec(BaseModel):
+class PlatesSpec(StrictModel):
     """What a generated world for the e-puck is like, and what its task must fulfil."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     generator: Plates = Plates()
     step: float = Field(

@@ -9,9 +9,10 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.admission import Admitted, Conditions, Rejection, admit
@@ -21,10 +22,8 @@ from tdac_envs.ladder.words import Words
 from tdac_envs.map2d.terrain import Terrain
 
 
-class WorldSpec(BaseModel):
+class WorldSpec(StrictModel):
     """What a generated world is like, and what its task must fulfil."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     generator: AnyParameters
     radius: float = Field(8.0, ge=1, le=100, description="Radius of the body, px.")

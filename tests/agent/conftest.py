@@ -15,7 +15,8 @@ from small import QUICK, write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.cli.main import main
-from tdac_agent.environments.map2d.builtin import Parameters, render_controller
+from tdac_agent.environments.epuck import builtin as epuck
+from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.verification.judge.warm import WarmJudge
 
 
@@ -29,7 +30,19 @@ def small_task(tmp_path_factory):
 def good_source(small_task):
     """A controller that is verified on the small task."""
     task = small_task
-    return render_controller(Parameters(), task.params.robot, task.nominal.dt)
+    return template_for(task.params.robot, task.nominal.dt).render(MapParameters())
+
+
+@pytest.fixture(scope="session")
+def crates():
+    """A rectangular world for the e-puck that is soon crossed."""
+    return load_task("epuck-crates")
+
+
+@pytest.fixture(scope="session")
+def crates_source(crates):
+    """A controller that is verified there."""
+    return epuck.template_for(crates.nominal).render(epuck.EPuckParameters())
 
 
 @pytest.fixture(scope="session")
@@ -116,6 +129,19 @@ def good(tmp_path, good_source):
 def quick():
     """Limits with which a controller that hangs is soon given up."""
     return QUICK
+
+
+@pytest.fixture
+def alarm():
+    """Interrupts the test so many seconds after it is called; 0 for never."""
+
+    def late(number, frame):
+        raise TimeoutError("still at work")
+
+    before = signal.signal(signal.SIGALRM, late)
+    yield signal.alarm
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
 
 
 def mentioning(text: str) -> list[int]:

@@ -1,6 +1,7 @@
 """Environments on drawn grids, episodes in them, and controllers run in-process."""
 
 import importlib.util
+import itertools
 import math
 import shutil
 import sys
@@ -10,6 +11,7 @@ import numpy as np
 import tdac_envs.controller_kit.sensors
 from tdac_agent.episodes.episode import Record
 from tdac_agent.episodes.trajectory import Rollout
+from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import clearance
 from tdac_envs.map2d.env import Map2DEnv
@@ -65,6 +67,23 @@ def drive(env, act, start=None, steps=None, name="nominal", held_out=False) -> R
         tolerance=task.goal_tolerance,
         contact=record.contact,
     )
+
+
+def always(left, right):
+    """A policy that never does anything else."""
+    return lambda obs: (left, right)
+
+
+def pattern(*actions):
+    """Repeats (steps, left, right) blocks."""
+    blocks = itertools.cycle([a[1:] for a in actions for _ in range(a[0])])
+    return lambda obs: next(blocks)
+
+
+def judged(env, policy, **options):
+    """The episode of a policy, and its diagnosis; `options` are those of `drive`."""
+    rollout = drive(env, policy, **options)
+    return rollout, diagnose(rollout, env.nominal)
 
 
 def import_controller(source, env, folder, monkeypatch):

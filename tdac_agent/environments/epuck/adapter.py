@@ -20,7 +20,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 WHEELS = ("left", "right")
 
 
-class EPuck:
+class SupervisedEPuck:
     """The robot, with the controller's observations and actions."""
 
     def __init__(self, params: dict[str, Any]) -> None:
@@ -68,7 +68,7 @@ def main() -> None:
     os.chdir(HERE)
     with open("params.json", encoding="utf-8") as file:
         params = json.load(file)
-    epuck = EPuck(params)
+    epuck = SupervisedEPuck(params)
     import tdac_policy
 
     # Sensors have no readings before the first step.

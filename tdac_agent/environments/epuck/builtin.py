@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
 
-from tdac_agent.builtin.parameters import Tuned, tunable
-from tdac_agent.builtin.remedies import Remedies, Remedy
-from tdac_agent.builtin.template import Template
+from tdac_agent.builtin.template import Remedy, Template, Tuned, tunable
+from tdac_agent.verification.diagnosis.report import Cause
 from tdac_agent.verification.suite.contract import time_step
 from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.task import EPuckTask
@@ -20,7 +20,7 @@ _DISTRUSTED = Remedy(
 )
 _UNSTEADY = Remedy(scale={"turn_gain": 0.6, "turn_in_place": 1.5, "blocked": 1.5})
 
-REMEDIES: Remedies = MappingProxyType(
+REMEDIES: Mapping[Cause, Remedy] = MappingProxyType(
     {
         "collision": Remedy(
             margin="wider",
@@ -92,8 +92,3 @@ def template_for(task: EPuckTask) -> Template[EPuckParameters]:
     }
     file = Path(__file__).with_name("controller.py.j2")
     return Template(EPuckParameters, file, facts)
-
-
-def render_epuck(parameters: EPuckParameters, task: EPuckTask) -> str:
-    """Returns the source of the controller with these parameters."""
-    return template_for(task).render(parameters)

@@ -11,9 +11,9 @@ from tdac_agent.tasks.units import METRES, Point
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template
+    from tdac_agent.environments.epuck.oracle import WorldOracle
     from tdac_agent.environments.epuck.pictures import WorldPictures
     from tdac_agent.environments.epuck.surroundings import WorldSurroundings
-    from tdac_agent.environments.epuck.world_copies import WorldOracle
     from tdac_agent.tasks.first_run import CodePart
     from tdac_agent.tasks.task import Task
     from tdac_agent.tasks.task_file import TaskFile
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tdac_envs.epuck.task import EPuckTask
 
 
-class EPuck(Environment):
+class EPuckEnvironment(Environment):
     """E-pucks in Webots worlds, in m. See `Environment`."""
 
     id = "TDAC-EPuck-v0"
@@ -81,7 +81,7 @@ class EPuck(Environment):
         from tdac_agent.environments.epuck.pictures import WorldPictures
         from tdac_agent.environments.epuck.setting import world_setting
 
-        return WorldPictures(world_setting(setting))
+        return WorldPictures(world_setting(setting).nominal)
 
     def surroundings(self, task: Nominal) -> WorldSurroundings:
         """Returns the world with the queries of a diagnosis."""
@@ -91,7 +91,7 @@ class EPuck(Environment):
 
     def oracle(self) -> WorldOracle:
         """Returns an oracle for grids and worlds."""
-        from tdac_agent.environments.epuck.world_copies import WorldOracle
+        from tdac_agent.environments.epuck.oracle import WorldOracle
 
         return WorldOracle()
 
@@ -137,4 +137,4 @@ def _own(task: Nominal) -> EPuckTask:
     return task
 
 
-EPUCK = EPuck()
+EPUCK = EPuckEnvironment()

@@ -23,11 +23,11 @@ def flat_world(world: World, dt: float) -> World:
         world: World from `open_world`, with a robot and a goal.
         dt: Duration of a step, s.
     """
-    standing = tuple(map(standing_robot, world.robots[1:]))
+    others = tuple(map(standing_robot, world.robots[1:]))
     return replace(
         world,
         robots=(world.robot,),
-        obstacles=(_mark(world), *_without_marks(world), *standing),
+        obstacles=(_mark(world), *_without_marks(world), *others),
         time_step=1e3 * dt,
         unmodelled=(),
     )

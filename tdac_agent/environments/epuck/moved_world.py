@@ -10,7 +10,7 @@ import numpy as np
 
 from tdac_agent.tasks.units import Point
 from tdac_envs.worlds.footprint import Disc, Footprint, Polygon, Rectangle
-from tdac_envs.worlds.world import Arena, Obstacle, Part, World
+from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part, World
 
 _FIRST = ("WorldInfo", "Viewpoint")
 _POSE = re.compile(
@@ -62,20 +62,20 @@ class Motion:
         visible = tuple(map(self.part, thing.visible))
         return replace(thing, x=x, y=y, solid=solid, visible=visible)
 
+    def robot(self, robot: EPuck) -> EPuck:
+        """Moves an e-puck."""
+        x, y = self.point(robot.x, robot.y)
+        return replace(robot, x=x, y=y, heading=robot.heading + self.angle)
+
     def arena(self, arena: Arena) -> Arena:
         """Moves an arena."""
         return replace(arena, inside=self.arena_floor(arena.inside))
 
     def world(self, world: World) -> World:
         """Moves a whole world."""
-        robots = []
-        for robot in world.robots:
-            x, y = self.point(robot.x, robot.y)
-            heading = robot.heading + self.angle
-            robots.append(replace(robot, x=x, y=y, heading=heading))
         return replace(
             world,
-            robots=tuple(robots),
+            robots=tuple(map(self.robot, world.robots)),
             goal=None if world.goal is None else self.point(*world.goal),
             arenas=tuple(map(self.arena, world.arenas)),
             obstacles=tuple(map(self.obstacle, world.obstacles)),
@@ -89,7 +89,7 @@ def reordered(text: str, random: np.random.Generator) -> str:
         text: File from `write_world`, in which each node starts a line.
         random: Random number generator.
     """
-    head, *nodes = text.split("\n\n")[0:1] + _nodes(text)
+    head, nodes = text.partition("\n\n")[0], _nodes(text)
     first = [node for node in nodes if node.startswith(_FIRST)]
     others = [node for node in nodes if not node.startswith(_FIRST)]
     named = [
@@ -120,8 +120,8 @@ def turned_groups(text: str, angle: float) -> str:
 def _turned(node: str, angle: float) -> str:
     back = Motion(-angle, 0.0, 0.0)
 
-    def pose(found: re.Match[str]) -> str:
-        space, x, y, z, yaw = found.groups()
+    def pose(match: re.Match[str]) -> str:
+        space, x, y, z, yaw = match.groups()
         u, v = back.point(float(x), float(y))
         turn = float(yaw or 0.0) - angle
         return (

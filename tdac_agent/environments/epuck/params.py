@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.epuck.infrared import PLACES, RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.task import EPuckTask
@@ -14,11 +15,7 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 _AZIMUTHS: tuple[float, ...] = tuple(PLACES[:, 2].tolist())
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class EPuckRobot(_Record):
+class EPuckRobot(StrictModel):
     """Dimensions and limits of the e-puck."""
 
     radius: float = Field(BODY_RADIUS, description="Radius of the body, m.")
@@ -31,7 +28,7 @@ class EPuckRobot(_Record):
     )
 
 
-class EPuckParams(_Record):
+class WorldParams(StrictModel):
     """Contents of `params.json`; metres, headings counter-clockwise from +x, rad."""
 
     schema_version: Literal[1] = 1
@@ -47,7 +44,7 @@ class EPuckParams(_Record):
     notes: tuple[str, ...] = Field((), description="Assumptions of the world reader.")
 
     @classmethod
-    def read(cls, written: Any) -> EPuckParams:
+    def read(cls, written: Any) -> WorldParams:
         """The parameters of a file's contents.
 
         Raises:
@@ -58,7 +55,7 @@ class EPuckParams(_Record):
 
 def params_of(
     task: EPuckTask, source: str, digest: str, notes: tuple[str, ...]
-) -> EPuckParams:
+) -> WorldParams:
     """Returns the contents of the file for a task.
 
     Args:
@@ -67,7 +64,7 @@ def params_of(
         digest: Hash of the flat world file.
         notes: Assumptions of the world reader.
     """
-    return EPuckParams(
+    return WorldParams(
         source=source,
         source_sha256=digest,
         start=task.start[:2],

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.environments.epuck.setting import EPuckSetting
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.units import Points
 from tdac_envs.drawing.canvas import Image
@@ -21,69 +20,44 @@ from tdac_envs.epuck.task import EPuckTask
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorldPictures:
-    """See `Pictures`."""
+    """See `Pictures`.
 
-    setting: EPuckSetting
+    Attributes:
+        nominal: Task of the episodes.
+    """
+
+    nominal: EPuckTask
 
     def backdrop(self) -> WorldBackground:
         """Returns the world as a background."""
-        return backdrop_of(self.setting.nominal)
+        return WorldBackground.of(self.nominal)
 
     def trajectories(
         self,
         runs: Sequence[Points],
         outcomes: Sequence[str],
         labels: Sequence[str],
-        movers: Sequence[Points] = (),
+        movers: Sequence[Points] = (),  # noqa: ARG002 - a world has none
     ) -> Image:
-        """Draws the world with all trajectories; it has no movers."""
-        nominal = self.setting.nominal
-        return trajectories_of(nominal, runs, outcomes, labels, movers)
+        """Draws the world with all trajectories."""
+        return trajectory_picture(self.nominal, runs, outcomes=outcomes, labels=labels)
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:
-        """Draws frames of the e-puck with its sensors."""
-        return frames_of(self.setting.nominal, rollout, stride)
-
-
-def backdrop_of(nominal: EPuckTask) -> WorldBackground:
-    """Returns the world of a task as a background."""
-    return WorldBackground.of(nominal)
-
-
-def trajectories_of(
-    nominal: EPuckTask,
-    runs: Sequence[Points],
-    outcomes: Sequence[str],
-    labels: Sequence[str],
-    movers: Sequence[Points] = (),
-) -> Image:
-    """See `Pictures.trajectories`; there are no movers."""
-    del movers
-    return trajectory_picture(nominal, runs, outcomes=outcomes, labels=labels)
-
-
-def frames_of(nominal: EPuckTask, rollout: Rollout, stride: int) -> Iterator[Image]:
-    """Draws every `stride`-th step of an episode and the last one.
-
-    Args:
-        nominal: Task of the episode.
-        rollout: The episode.
-        stride: Steps between two frames.
-    """
-    trajectory = rollout.trajectory
-    scene = EPuckScene(nominal, movable=False)
-    gaps, last = rollout.distances("euclidean"), trajectory.steps
-    for step in trajectory.every(stride):
-        outcome = rollout.outcome if step == last else ""
-        readings = trajectory.ranges[step]
-        yield scene.frame(
-            trajectory.poses[step].tolist(),
-            readings=readings,
-            reaches=reaches(readings),
-            trail=trajectory.poses[: step + 1, :2],
-            solid=nominal.ground.solid,
-            status=Status(step, nominal.horizon, float(gaps[step]), outcome),
-        )
+        """Draws the sensors, too, in every `stride`-th step and the last one."""
+        nominal, trajectory = self.nominal, rollout.trajectory
+        scene = EPuckScene(nominal, movable=False)
+        gaps = rollout.distances("euclidean")
+        for step in trajectory.every(stride):
+            outcome = rollout.outcome if step == trajectory.steps else ""
+            readings = trajectory.ranges[step]
+            yield scene.frame(
+                trajectory.poses[step].tolist(),
+                readings=readings,
+                reaches=reaches(readings),
+                trail=trajectory.poses[: step + 1, :2],
+                solid=nominal.ground.solid,
+                status=Status(step, nominal.horizon, float(gaps[step]), outcome),
+            )
 
 
 def reaches(readings: NDArray[np.float32]) -> Points:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.environments.epuck.flat_world import flat_world
-from tdac_agent.environments.epuck.params import EPuckParams, params_of
+from tdac_agent.environments.epuck.params import WorldParams, params_of
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.setting import Original, Setting
 from tdac_agent.tasks.task_file import TaskFile
@@ -43,7 +43,7 @@ class EPuckSetting:
         left_out: Descriptions of the ignored nodes that may be solid.
     """
 
-    params: EPuckParams
+    params: WorldParams
     nominal: EPuckTask
     text: str
     file: Path

@@ -149,7 +149,7 @@ class _Near(NamedTuple):
 
 def _nearest(task: EPuckTask, x: float, y: float) -> _Near:
     ground, none = task.ground, np.empty((0, 2))
-    found = []
+    nearby = []
     for thing in ground.things:
         parts = at_body_height(thing.solid, ground.floor)
         prisms = Prisms.of(map(Owned, parts))
@@ -157,15 +157,15 @@ def _nearest(task: EPuckTask, x: float, y: float) -> _Near:
             gap, *away = part_gap(*prisms.arrays(), part, x, y)
             outline = prisms.outline(part) if len(parts) == 1 else none
             vector = (float(away[0]), float(away[1]))
-            found.append(_Near(_name(thing), float(gap), vector, outline))
+            nearby.append(_Near(_name(thing), float(gap), vector, outline))
     left, low, right, high = ground.bounds
-    found += [
+    nearby += [
         _Near(FENCE, x - left, (1.0, 0.0), none),
         _Near(FENCE, right - x, (-1.0, 0.0), none),
         _Near(FENCE, y - low, (0.0, 1.0), none),
         _Near(FENCE, high - y, (0.0, -1.0), none),
     ]
-    return min(found, key=lambda near: near.gap)
+    return min(nearby, key=lambda near: near.gap)
 
 
 def _nearest_corner(outline: Points, point: Point) -> Point | None:

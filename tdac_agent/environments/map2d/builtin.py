@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import ClassVar
 
-from tdac_agent.builtin.parameters import Tuned, tunable
-from tdac_agent.builtin.remedies import Remedies, Remedy
-from tdac_agent.builtin.template import Template
+from tdac_agent.builtin.template import Remedy, Template, Tuned, tunable
+from tdac_agent.verification.diagnosis.report import Cause
 from tdac_envs.mapping.params import RobotParams
 
 _HELD_UP = Remedy(
@@ -17,7 +17,7 @@ _HELD_UP = Remedy(
 )
 _RESTLESS = Remedy(scale={"turn_gain": 0.6, "turn_in_place": 1.5})
 
-REMEDIES: Remedies = MappingProxyType(
+REMEDIES: Mapping[Cause, Remedy] = MappingProxyType(
     {
         "collision": Remedy(
             margin="wider",
@@ -49,7 +49,7 @@ REMEDIES: Remedies = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True)
-class Parameters(Tuned):
+class MapParameters(Tuned):
     """Constants of the controller for maps; the defaults are neutral."""
 
     remedies: ClassVar = REMEDIES
@@ -91,7 +91,7 @@ class Parameters(Tuned):
 
 def template_for(
     robot: RobotParams, dt: float, resolution: float | None = None
-) -> Template[Parameters]:
+) -> Template[MapParameters]:
     """Returns the template for a robot.
 
     Args:
@@ -101,10 +101,5 @@ def template_for(
     """
     file = Path(__file__).with_name("controller.py.j2")
     return Template(
-        Parameters, file, {"robot": robot, "dt": dt, "resolution": resolution}
+        MapParameters, file, {"robot": robot, "dt": dt, "resolution": resolution}
     )
-
-
-def render_controller(parameters: Parameters, robot: RobotParams, dt: float) -> str:
-    """Returns the source of the controller with these parameters."""
-    return template_for(robot, dt).render(parameters)

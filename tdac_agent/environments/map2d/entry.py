@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from tdac_envs.map2d.task import Map2DTask
 
 
-class Map2D(Environment):
+class Map2DEnvironment(Environment):
     """Disc-shaped robots with range rays on maps, in px. See `Environment`."""
 
     id = "TDAC-Map2D-v0"
@@ -82,7 +82,8 @@ class Map2D(Environment):
         from tdac_agent.environments.map2d.pictures import MapPictures
         from tdac_agent.environments.map2d.setting import map_setting
 
-        return MapPictures(map_setting(setting))
+        own = map_setting(setting)
+        return MapPictures(own.nominal, own.robot_image, own.shown_in)
 
     def surroundings(self, task: Nominal) -> MapSurroundings:
         """Returns the map with the queries of a diagnosis."""
@@ -132,4 +133,4 @@ def _own(task: Nominal) -> Map2DTask:
     return task
 
 
-MAP2D = Map2D()
+MAP2D = Map2DEnvironment()

@@ -28,8 +28,8 @@ def as_option(specs: Sequence[AnySpec]) -> dict[str, list[dict[str, Any]]]:
 
     So tasks without movers keep the hash that they had before there were any.
     """
-    given = [spec.model_dump(mode="json", exclude_none=True) for spec in specs]
-    return {"movers": given} if given else {}
+    options = [spec.model_dump(mode="json", exclude_none=True) for spec in specs]
+    return {"movers": options} if options else {}
 
 
 def sentence_on(specs: Sequence[AnySpec]) -> str:

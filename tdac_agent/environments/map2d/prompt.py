@@ -7,8 +7,7 @@ from typing import Any
 
 from tdac_agent.environments.map2d.moving import sentence_on
 from tdac_agent.environments.map2d.setting import Map2DSetting, map_setting
-from tdac_agent.prompting.manual import interface_of
-from tdac_agent.prompting.source_excerpt import needed_part
+from tdac_agent.prompting.manual import interface_of, needed_part
 from tdac_agent.tasks.task import SENSORS_FILE, Task
 from tdac_envs.map2d.terrain import widest_connected_radius
 

@@ -1,20 +1,17 @@
-"""The privileged reference for maps: follows the oracle's path using the true pose.
+"""The privileged reference for maps: the oracle's path on the exact grid.
 
 It shows that a task and its suite can be passed, so it may use information that
-controllers lack. It turns in place and drives straight, and ends both with an exact
-fractional step. It shares no code with `builtin`.
+controllers lack. It shares no code with `builtin`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tdac_agent.tasks.units import Point
-from tdac_agent.verification.suite.reference import steer, without_flat_points
+from tdac_agent.verification.suite.reference import without_flat_points
 from tdac_envs.grid.grid import BoolGrid, body_free
 from tdac_envs.grid.plan import Path, descend, distance_field
 from tdac_envs.map2d.straight import is_line_free
@@ -23,37 +20,9 @@ from tdac_envs.map2d.task import Map2DTask
 # Clearances beyond the body that are tried for the path, px, widest first. With the
 # last but one, float32 actions cannot touch a corner that a path with 0 would graze.
 MARGINS = (4.0, 2.0, 1.0, 0.5, 0.05, 0.0)
-_ARRIVED = 1e-4  # px
 # Clearance of a shortcut beyond the body in privileged controllers, px: much larger
 # than the rounding errors of float32.
 _SAFE_IN_FLOAT32 = 0.02
-
-
-class Reference:
-    """Policy that solves a feasible task without contact.
-
-    Args:
-        task: The task; its start is not used.
-    """
-
-    def __init__(self, task: Map2DTask) -> None:
-        self.task = task
-        self._waypoints: list[Point] = []
-
-    def reset(self, pose: Sequence[float]) -> None:
-        """Plans from a pose (x, y, heading), px and rad."""
-        path = oracle_path(self.task, float(pose[0]), float(pose[1]))
-        self._waypoints = self.task.pulled(path)[1:]
-
-    def act(self, pose: Sequence[float]) -> tuple[float, float]:
-        """Returns wheel fractions (left, right) for the next step at the true pose."""
-        x, y, heading = (float(value) for value in pose)
-        while self._waypoints and math.dist((x, y), self._waypoints[0]) < _ARRIVED:
-            self._waypoints.pop(0)
-        if not self._waypoints:
-            return 0.0, 0.0
-        step, axle = self.task.full_step, self.task.robot.axle_length
-        return steer((x, y, heading), self._waypoints[0], step, axle)
 
 
 def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
@@ -65,13 +34,15 @@ def oracle_path(task: Map2DTask, x: float, y: float) -> Path:
     ends = np.array([[x, y], task.goal])
     for margin in MARGINS:
         free = _roomy(task, (x, y), margin)
-        last = _nearest(free, *task.goal)
+        around = _near(*task.goal, free.shape)
+        last = next(((i, j) for i, j in around if free[j, i]), None)
         if last is None:
             continue
         field = distance_field(free, last)
-        first = _entry(task, field, x, y)
-        if first is not None:
-            return np.vstack([ends[:1], descend(free, field, first), ends[1:]])
+        # The nearest pixel on a path to the goal that the body can drive to.
+        for i, j in _near(x, y, field.shape):
+            if np.isfinite(field[j, i]) and _free(task, (x, y), (i, j)):
+                return np.vstack([ends[:1], descend(free, field, (i, j)), ends[1:]])
     return ends
 
 
@@ -102,7 +73,7 @@ def _roomy(task: Map2DTask, start: Point, margin: float) -> BoolGrid:
     return free
 
 
-def _near(x: float, y: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
+def _near(x: float, y: float, shape: tuple[int, ...]) -> list[tuple[int, int]]:
     """Returns the pixels (i, j) around a point, up to 3 px away, nearest first."""
     column, row = math.floor(x + 0.5), math.floor(y + 0.5)
     pixels = [
@@ -110,22 +81,4 @@ def _near(x: float, y: float, shape: tuple[int, ...]) -> NDArray[np.int64]:
         for j in range(max(row - 3, 0), min(row + 4, shape[0]))
         for i in range(max(column - 3, 0), min(column + 4, shape[1]))
     ]
-    pixels.sort(key=lambda pixel: math.dist(pixel, (x, y)))
-    return np.array(pixels, np.int64).reshape(-1, 2)
-
-
-def _nearest(free: BoolGrid, x: float, y: float) -> tuple[int, int] | None:
-    for i, j in _near(x, y, free.shape):
-        if free[j, i]:
-            return int(i), int(j)
-    return None
-
-
-def _entry(
-    task: Map2DTask, field: NDArray[np.float64], x: float, y: float
-) -> tuple[int, int] | None:
-    """Returns the nearest pixel on a path to the goal that the body can drive to."""
-    for i, j in _near(x, y, field.shape):
-        if np.isfinite(field[j, i]) and _free(task, (x, y), (i, j)):
-            return int(i), int(j)
-    return None
+    return sorted(pixels, key=lambda pixel: math.dist(pixel, (x, y)))

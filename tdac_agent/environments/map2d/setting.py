@@ -121,8 +121,8 @@ class Map2DSetting:
         scale = scale_text(params.resolution)
         lines = [f"map: {obstacles_text(params)}; {scale}"]
         if self.shown_in != MAP_PIXELS:
-            told = "" if self.view else "; the controller and its tests use px"
-            lines.append(f"metres of the map's frame{told}")
+            note = "" if self.view else "; the controller and its tests use px"
+            lines.append(f"metres of the map's frame{note}")
             lines.append(robot_text(params.robot, self.shown_in))
         return lines
 
@@ -330,9 +330,9 @@ def _check_robot_image(file: Path) -> None:
 
 
 def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
-    given = spec.model_dump(exclude={"radius", "image"}, exclude_none=True)
+    values = spec.model_dump(exclude={"radius", "image"}, exclude_none=True)
     fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
-    changes = {fields.get(key, key): value for key, value in given.items()}
+    changes = {fields.get(key, key): value for key, value in values.items()}
     robot = RobotParams(**{**params.robot.model_dump(), **changes})
     return params.model_copy(update={"robot": robot})
 

@@ -31,10 +31,8 @@ def heading_error(
     """Angle from the heading to the shortest path, rad, right positive."""
     for path in _paths_until(around, trajectory, step):
         # Grid paths of equal length differ in direction; a straightened path has one.
-        (x, y), (to_x, to_y), *_ = around.pull(path[:_PATH_AHEAD])
-        bearing = math.atan2(to_y - y, to_x - x)
-        heading = float(trajectory.poses[step, 2])
-        return math.remainder(bearing - heading, 2.0 * math.pi)
+        (x, y), corner, *_ = around.pull(path[:_PATH_AHEAD])
+        return _turn_to((x, y, float(trajectory.poses[step, 2])), corner)
     return None
 
 
@@ -60,9 +58,7 @@ def goal_bearing(
     trajectory: Trajectory, goal: tuple[float, float], step: int = -1
 ) -> float:
     """Angle from the heading to the goal, rad, right positive."""
-    x, y, heading = trajectory.poses[step].tolist()
-    bearing = math.atan2(goal[1] - y, goal[0] - x)
-    return math.remainder(bearing - heading, 2.0 * math.pi)
+    return _turn_to(trajectory.poses[step].tolist(), goal)
 
 
 def turned_away(
@@ -78,10 +74,9 @@ def turned_away(
     turning = np.flatnonzero(np.abs(difference) > _TURNING)
     steps = turning[:_SAMPLES].tolist()
     clear = []
-    for step, error in zip(
-        steps, _path_bearings(around, trajectory, steps), strict=True
-    ):
-        if error is not None and abs(error) > math.pi - _OPPOSITE:
+    errors = _path_bearings(around, trajectory, steps)
+    for step, error in zip(steps, errors, strict=True):
+        if abs(error or 0.0) > math.pi - _OPPOSITE:
             break
         if error is not None and abs(error) > _ALIGNED:
             clear.append((step, error))
@@ -99,9 +94,12 @@ def _path_bearings(
     """Like `heading_error` for many steps, by a point a few radii ahead on the path."""
     poses = trajectory.poses[list(steps)]
     ahead = around.places_ahead(poses[:, :2], _RADII * around.radius)
-    for (x, y, heading), place in zip(poses.tolist(), ahead, strict=True):
-        if place is None:
-            yield None
-            continue
-        bearing = math.atan2(place[1] - y, place[0] - x)
-        yield math.remainder(bearing - heading, 2.0 * math.pi)
+    for pose, place in zip(poses.tolist(), ahead, strict=True):
+        yield None if place is None else _turn_to(pose, place)
+
+
+def _turn_to(pose: Sequence[float], place: Sequence[float]) -> float:
+    """Angle from the heading of a pose to a place, rad, right positive."""
+    x, y, heading = pose
+    bearing = math.atan2(place[1] - y, place[0] - x)
+    return math.remainder(bearing - heading, 2.0 * math.pi)

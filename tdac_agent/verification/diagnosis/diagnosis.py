@@ -95,12 +95,13 @@ def _collision(rollout: Rollout, around: Surroundings) -> Diagnosis:
     share = saturated(trajectory)
     touched, facts = _touched(rollout, around)
     error, course = _course(rollout, around)
+    limited = f"A wheel was at its limit in {percent(share)} of the steps. "
     text = (
         f"collision in step {trajectory.steps} "
         f"({trajectory.steps * trajectory.dt:.1f} s) at {units.point(pose.x, pose.y)}, "
         f"heading {units.degrees(pose.heading)}°, speed "
-        f"{units.far(speed * around.full_speed, 0)}/s: {touched} {_limits(share)}"
-        f"{_passed_goal(rollout, units)}{course}"
+        f"{units.far(speed * around.full_speed, 0)}/s: {touched} "
+        f"{limited if share else ''}{_passed_goal(rollout, units)}{course}"
     )
     return _diagnosis(
         rollout,
@@ -158,17 +159,11 @@ def _touched_wall(rollout: Rollout, around: Surroundings) -> tuple[str, dict[str
     }
 
 
-def _limits(share: float) -> str:
-    text = f"A wheel was at its limit in {percent(share)} of the steps. "
-    return text if share else ""
-
-
 def _passed_goal(rollout: Rollout, units: Units) -> str:
     distances = rollout.trajectory.path_distances
     best = int(distances.argmin())
-    if distances[best] > near_goal(rollout):
-        return ""
-    if distances[-1] - distances[best] < PROGRESS:
+    stayed = distances[-1] - distances[best] < PROGRESS
+    if stayed or distances[best] > near_goal(rollout):
         return ""
     left = f"{units.far(distances[best])} of path left"
     return f"It had passed the goal in step {best} with {left}. "
@@ -181,9 +176,10 @@ def _no_arrival(rollout: Rollout, around: Surroundings) -> Diagnosis:
     touch = around.touch(end, 5.0 * rollout.radius)
     if touch is not None and cause in ("stuck", "oscillating", "no motion"):
         near = "wall" if touch.border else touch.thing
-        text += f" The nearest {near} is "
-        text += f"{around.units.far(touch.gap)} from the body, at its "
-        text += f"{side_of(touch.bearing)}."
+        text += (
+            f" The nearest {near} is {around.units.far(touch.gap)} from the body, at "
+            f"its {side_of(touch.bearing)}."
+        )
     error, course = _course(rollout, around)
     text = f"{cause}: {text} {course}"
     return _diagnosis(rollout, around.units, cause, text, step, heading_error=error)
@@ -202,8 +198,10 @@ def _course(rollout: Rollout, around: Surroundings) -> tuple[float | None, str]:
     )
     share, steps = turned_away(around, trajectory, rollout.goal)
     if steps >= _AWAY_STEPS and share >= _AWAY:
-        text += f"In {percent(share)} of its first {steps} turning steps it turned "
-        text += "away from both: check the sign of the turn. "
+        text += (
+            f"In {percent(share)} of its first {steps} turning steps it turned away "
+            "from both: check the sign of the turn. "
+        )
     return round(error, 3), text
 
 

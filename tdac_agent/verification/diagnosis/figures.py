@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.setting import Nominal
@@ -31,42 +30,27 @@ from tdac_envs.drive.task import Pose
 MAX_FACT = 240
 
 
-class Figures(Protocol):
-    """Figures of an episode."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def held_out(self) -> bool:
-        """Whether its start is held out."""
-
-    @property
-    def outcome(self) -> str:
-        """How it ended."""
-
-    @property
-    def d0(self) -> float:
-        """Remaining path at the start, px or m."""
-
-    @property
-    def d_min(self) -> float:
-        """Least remaining path, px or m."""
-
-
 class EpisodeFigures(NamedTuple):
-    """Figures of an episode whose start is not held out; see `Figures`."""
+    """Figures of a failed episode for its picture.
+
+    Attributes:
+        name: Its name.
+        outcome: How it ended.
+        d0: Remaining path at the start, px or m.
+        d_min: Least remaining path, px or m.
+        held_out: Whether its start is held out.
+    """
 
     name: str
     outcome: str
     d0: float
     d_min: float
+    held_out: bool = False
 
-    @property
-    def held_out(self) -> bool:
-        """See `Figures`."""
-        return False
+
+def figures_of(episode: Episode) -> EpisodeFigures:
+    """The figures of an episode of a report."""
+    return EpisodeFigures(*(getattr(episode, name) for name in EpisodeFigures._fields))
 
 
 def draw_trajectories(
@@ -76,7 +60,7 @@ def draw_trajectories(
     path: Path,
 ) -> None:
     """Writes a PNG of the map or world with trajectories and outcomes by episode."""
-    picture = pictures_of(task.setting).trajectories(
+    picture = task.pictures().trajectories(
         [trajectory.poses for trajectory in trajectories.values()],
         [outcomes.get(name, "") for name in trajectories],
         list(trajectories),
@@ -104,10 +88,14 @@ def draw_failures(
     """
     background, files = None, []
     for episode, trajectory in failed_episodes(report, trajectories):
-        background = background or pictures_of(task.setting).backdrop()
+        background = background or task.pictures().backdrop()
         diagnosis = diagnosis_of(report, episode)
         event = event_of(
-            task.nominal, trajectory, episode, diagnosis, task.setting.shown
+            task.nominal,
+            trajectory,
+            figures_of(episode),
+            diagnosis,
+            task.setting.shown,
         )
         picture = run_picture(background, trajectory.poses, event)
         files.append(folder / f"{file_stem(episode.name)}.png")
@@ -130,8 +118,10 @@ def failed_episodes(
 
 def diagnosis_of(report: Report, episode: Episode) -> Diagnosis | None:
     """The diagnosis of an episode, if there is one."""
-    found = (failure.diagnosis for failure in report.failures)
-    return next((d for d in found if d is not None and d.episode == episode.name), None)
+    diagnoses = (failure.diagnosis for failure in report.failures)
+    return next(
+        (d for d in diagnoses if d is not None and d.episode == episode.name), None
+    )
 
 
 def file_stem(name: str) -> str:
@@ -142,7 +132,7 @@ def file_stem(name: str) -> str:
 def event_of(
     task: Nominal,
     trajectory: Trajectory,
-    episode: Figures,
+    episode: EpisodeFigures,
     diagnosis: Diagnosis | None,
     units: Units | None = None,
 ) -> Event:

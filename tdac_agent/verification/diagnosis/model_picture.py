@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 from PIL import Image as PilImage
 
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.figures import (
-    Figures,
+    EpisodeFigures,
     diagnosis_of,
     event_of,
     failed_episodes,
+    figures_of,
 )
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 from tdac_envs.drawing.backdrop import Backdrop
@@ -59,14 +59,14 @@ def failure_picture(
     """
     for episode, trajectory in failed_episodes(report, trajectories):
         if not episode.held_out and trajectory.steps:
-            found = diagnosis_of(report, episode)
-            return episode_picture(task, episode, found, trajectory, side)
+            figures, diagnosis = figures_of(episode), diagnosis_of(report, episode)
+            return episode_picture(task, figures, diagnosis, trajectory, side)
     return None
 
 
 def episode_picture(
     task: Task,
-    episode: Figures,
+    episode: EpisodeFigures,
     diagnosis: Diagnosis | None,
     trajectory: Trajectory,
     side: int,
@@ -82,7 +82,7 @@ def episode_picture(
     """
     units = task.setting.units
     event = event_of(task.nominal, trajectory, episode, diagnosis, units)
-    background = pictures_of(task.setting).backdrop()
+    background = task.pictures().backdrop()
     return picture_of_event(background, trajectory, event, units, side)
 
 

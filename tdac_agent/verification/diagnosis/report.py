@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from tdac_agent.storage.printable_record import PrintableRecord
-from tdac_agent.tasks.units import Place
+from tdac_agent.storage.printable_record import StrictRecord
+from tdac_agent.tasks.units import Place, Units
 
 Group = Literal["static", "unit", "end to end", "user", "judge"]
 GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
@@ -32,11 +33,7 @@ Cause = Literal[
 ]
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Diagnosis(_Record):
+class Diagnosis(StrictRecord):
     """What happened in an episode, computed from its trajectory.
 
     Distances and positions are in px, for the e-puck in m; None if they do not apply.
@@ -69,7 +66,7 @@ class Diagnosis(_Record):
     d_min: float | None = Field(None, description="Least remaining path.")
 
 
-class Failure(_Record):
+class Failure(StrictRecord):
     """One expected test that did not pass."""
 
     test: str = Field(description="Test id, as pytest prints it.")
@@ -78,7 +75,7 @@ class Failure(_Record):
     diagnosis: Diagnosis | None = None
 
 
-class Episode(_Record):
+class Episode(StrictRecord):
     """Figures of one judged episode; distances in px, for the e-puck in m."""
 
     # JSON has no infinity: a report with one could not be read back.
@@ -100,7 +97,7 @@ class Episode(_Record):
     error: str | None = None
 
 
-class Provenance(_Record):
+class Provenance(StrictRecord):
     """What was verified, and under which conditions."""
 
     task: str
@@ -128,7 +125,7 @@ class Provenance(_Record):
     versions: dict[str, str]
 
 
-class Verdict(_Record):
+class Verdict(StrictRecord):
     """Passed means: exactly the expected tests ran and each one passed."""
 
     passed: bool
@@ -137,7 +134,7 @@ class Verdict(_Record):
     failed_tests: int
 
 
-class Report(_Record):
+class Report(StrictRecord):
     """One verification."""
 
     schema_version: Literal[1] = 1
@@ -155,11 +152,11 @@ class Report(_Record):
         passed = sum(outcome == "passed" for outcome in self.tests.values())
         counts = (len(self.tests), passed, len(self.tests) - passed)
         verdict = self.verdict
-        given = (verdict.expected, verdict.passed_tests, verdict.failed_tests)
+        stated = (verdict.expected, verdict.passed_tests, verdict.failed_tests)
         failed = {name for name, outcome in self.tests.items() if outcome != "passed"}
-        if given != counts or {failure.test for failure in self.failures} != failed:
+        if stated != counts or {failure.test for failure in self.failures} != failed:
             raise ValueError(
-                f"expected counts {counts} and their failures, got {given}"
+                f"expected counts {counts} and their failures, got {stated}"
             )
         if verdict.passed != (0 < passed == len(self.tests)):
             raise ValueError(f"passed={verdict.passed} contradicts counts {counts}")
@@ -184,3 +181,36 @@ def group_of(test: str) -> Group:
         "test_end_to_end.py": "end to end",
     }
     return files.get(test.partition("::")[0], "user")
+
+
+_PIXELS = re.compile(r"(?<![\w.])(\d+(?:\.\d+)?) px\b")
+# Other tests compare with grids of their own, which have no scale.
+_ON_THE_MAP = "end to end"
+
+
+def in_units(report: Report, units: Units) -> Report:
+    """A copy whose failures read in the user's units; it is not stored.
+
+    Figures stay in the units of the environment (`Provenance.unit`).
+
+    Args:
+        report: The report of a verification.
+        units: As from `Setting.shown`.
+    """
+    if units.shown is None:
+        return report
+    failures = tuple(_failure(failure, units) for failure in report.failures)
+    return report.model_copy(update={"failures": failures})
+
+
+def _failure(failure: Failure, units: Units) -> Failure:
+    changes: dict[str, object] = {}
+    if failure.group == _ON_THE_MAP:
+        changes["message"] = _PIXELS.sub(
+            lambda match: units.far(float(match[1])), failure.message
+        )
+    diagnosis = failure.diagnosis
+    if diagnosis is not None and diagnosis.shown is not None:
+        text = {"text": diagnosis.shown}
+        changes["diagnosis"] = diagnosis.model_copy(update=text)
+    return failure.model_copy(update=changes)

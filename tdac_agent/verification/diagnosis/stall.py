@@ -93,11 +93,9 @@ def _jittering(
 ) -> Behaviour | None:
     turned, share = turns(trajectory)[late:], flips(trajectory, late)
     actions = np.abs(trajectory.actions[late:])
-    if abs(turned.sum()) >= 0.3 * max(np.abs(turned).sum(), 1.0):
-        return None
-    if share < FLIPS and not _sweeping(trajectory, late, radius):
-        return None
-    if actions.mean() < _IDLE:
+    turns_round = abs(turned.sum()) >= 0.3 * max(np.abs(turned).sum(), 1.0)
+    steady = share < FLIPS and not _sweeping(trajectory, late, radius)
+    if turns_round or steady or actions.mean() < _IDLE:
         return None
     return "oscillating", (
         f"in the last {trajectory.steps - late} steps it reversed its turning or "

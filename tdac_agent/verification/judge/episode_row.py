@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AliasChoices, ConfigDict, Field
 
 from tdac_agent.episodes.trajectory import Contact, Outcome, Rollout
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
@@ -22,7 +22,7 @@ _DIGITS = 6
 _FAILURE = {"cause", "step", "x", "y", "side", "text"}
 
 
-class EpisodeRow(PrintableRecord):
+class EpisodeRow(StrictRecord):
     """Figures of an episode of a task or on a world; lengths in px or m.
 
     A task has an episode for each `seed`, a task set one for each world, by its
@@ -30,7 +30,7 @@ class EpisodeRow(PrintableRecord):
     diagnosis of a failure; of hidden worlds, only the cause may be told.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(populate_by_name=True)
 
     seed: int | None = None
     index: int | None = None
@@ -105,10 +105,8 @@ class EpisodeRow(PrintableRecord):
         return self.clearance_min or 0.0 if self.success else 0.0
 
 
-class Scores(PrintableRecord):
+class Scores(StrictRecord):
     """Means over a fixed number of episodes, each in [0, 1]."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     success: float
     time: float = Field(description="Success weighted by completion time, SCT.")

@@ -7,6 +7,7 @@ import functools
 import warnings
 from collections.abc import Collection, Iterator
 from importlib.util import decode_source
+from typing import NamedTuple
 
 ALLOWED_IMPORTS = frozenset(
     [
@@ -82,11 +83,11 @@ def _bindings(body: list[ast.stmt]) -> Iterator[tuple[str, ast.stmt]]:
         elif isinstance(node, ast.Import | ast.ImportFrom):
             for alias in node.names:
                 yield alias.asname or alias.name.partition(".")[0], node
-        elif isinstance(node, ast.Assign):
-            for target in node.targets:
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            # An annotation without a value binds nothing.
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            for target in targets if node.value is not None else ():
                 yield from ((name, node) for name in _target_names(target))
-        elif isinstance(node, ast.AnnAssign) and node.value is not None:
-            yield from ((name, node) for name in _target_names(node.target))
         else:
             for block in ("body", "orelse", "finalbody"):
                 yield from _bindings(getattr(node, block, []))
@@ -116,13 +117,35 @@ def import_error(tree: ast.Module, without: Collection[str] = ()) -> str | None:
 
 def reads_clock(tree: ast.Module) -> bool:
     """Whether a source imports `time`, the one allowed module that knows it."""
+    return any(each.module == "time" for each in imports_in(tree))
+
+
+class Imported(NamedTuple):
+    """What one name of an import statement is.
+
+    Attributes:
+        line: Line of the statement.
+        module: Name of the module.
+        name: Name of what is imported from it; empty for the module itself.
+        known_as: Its name in the file.
+    """
+
+    line: int
+    module: str
+    name: str
+    known_as: str
+
+
+def imports_in(tree: ast.Module) -> Iterator[Imported]:
+    """Yields what is imported anywhere in a source."""
     for node in nodes_of(tree):
-        if isinstance(node, ast.Import):
-            if any(alias.name == "time" for alias in node.names):
-                return True
-        elif isinstance(node, ast.ImportFrom) and node.module == "time":
-            return True
-    return False
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            for alias in node.names:
+                known_as = alias.asname or alias.name
+                if isinstance(node, ast.Import):
+                    yield Imported(node.lineno, alias.name, "", known_as)
+                else:
+                    yield Imported(node.lineno, node.module or "", alias.name, known_as)
 
 
 def policy_error(tree: ast.Module) -> str | None:

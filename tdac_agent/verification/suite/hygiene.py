@@ -5,7 +5,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator
 
-from tdac_agent.verification.suite.contract import call_name, calls, last_name, nodes_of
+from tdac_agent.verification.suite.contract import (
+    call_name,
+    calls,
+    imports_in,
+    last_name,
+    nodes_of,
+)
 
 FORBIDDEN_CALLS = frozenset(
     ["eval", "exec", "compile", "__import__", "breakpoint", "input", "globals", "vars"]
@@ -16,7 +22,8 @@ FORBIDDEN_ATTRIBUTES = frozenset(
         *("__mro__", "__loader__", "__spec__", "__import__"),
     ]
 )
-SEEDED_CONSTRUCTORS = frozenset({"Random", "default_rng", "Generator", "SeedSequence"})
+SEEDED = frozenset({"Random", "default_rng", "Generator", "SeedSequence", "seed"})
+"""Functions that are allowed with a seed."""
 SAVERS = frozenset(
     [
         *("save", "savez", "savez_compressed", "savetxt", "tofile", "memmap"),
@@ -57,13 +64,9 @@ def file_writes(tree: ast.Module) -> Iterator[str]:
 def _reads_only(call: ast.Call) -> bool:
     # The first argument of `path.open(mode)` is the mode.
     place = 1 if isinstance(call.func, ast.Name) else 0
-    mode: ast.expr | None = call.args[place] if len(call.args) > place else None
-    for keyword in call.keywords:
-        if keyword.arg in ("mode", None):
-            mode = keyword.value
-    if mode is None:
-        return True
-    return isinstance(mode, ast.Constant) and mode.value in {"r", "rt", "rb"}
+    modes = call.args[place : place + 1]
+    modes += [each.value for each in call.keywords if each.arg in ("mode", None)]
+    return all(getattr(mode, "value", None) in ("r", "rt", "rb") for mode in modes[-1:])
 
 
 def sleeps(tree: ast.Module) -> Iterator[str]:
@@ -71,12 +74,9 @@ def sleeps(tree: ast.Module) -> Iterator[str]:
     for node in calls(tree):
         if call_name(node) == "sleep":
             yield f"line {node.lineno}: sleep()"
-    for statement in nodes_of(tree):
-        if isinstance(statement, ast.ImportFrom) and statement.module == "time":
-            names = {alias.name for alias in statement.names}
-            yield from (f"line {statement.lineno}: import of sleep",) * (
-                "sleep" in names
-            )
+    for each in imports_in(tree):
+        if (each.module, each.name) == ("time", "sleep"):
+            yield f"line {each.line}: import of sleep"
 
 
 def swallowed_errors(tree: ast.Module) -> Iterator[str]:
@@ -110,10 +110,8 @@ def runtime_errors(tree: ast.Module) -> Iterator[str]:
 def surface_indexing(tree: ast.Module) -> Iterator[str]:
     """Finds subscripts of drawing surfaces, which are not arrays."""
     for node in nodes_of(tree):
-        if isinstance(node, ast.Subscript):
-            name = last_name(node.value)
-            if name in SURFACES:
-                yield f"line {node.lineno}: {name}[...]"
+        if isinstance(node, ast.Subscript) and last_name(node.value) in SURFACES:
+            yield f"line {node.lineno}: {last_name(node.value)}[...]"
 
 
 def unseeded_randomness(tree: ast.Module) -> Iterator[str]:
@@ -130,16 +128,9 @@ def unseeded_randomness(tree: ast.Module) -> Iterator[str]:
         else:
             continue
         seeds = [*node.args, *(keyword.value for keyword in node.keywords)]
-        seeded = any(not _is_none(seed) for seed in seeds)
-        if name in SEEDED_CONSTRUCTORS and seeded:
-            continue
-        if name == "seed" and seeded:
-            continue
-        yield f"line {node.lineno}: {_spelled(function)}()"
-
-
-def _is_none(node: ast.expr) -> bool:
-    return isinstance(node, ast.Constant) and node.value is None
+        nones = [isinstance(s, ast.Constant) and s.value is None for s in seeds]
+        if name not in SEEDED or all(nones):
+            yield f"line {node.lineno}: {_spelled(function)}()"
 
 
 def _spelled(node: ast.expr) -> str:
@@ -156,21 +147,12 @@ def _spelled(node: ast.expr) -> str:
 def _random_modules(tree: ast.Module) -> set[str]:
     """Returns the names of random number modules and functions in this file."""
     names = set()
-    for node in nodes_of(tree):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                spelled = alias.asname or alias.name
-                if alias.name in {"random", "numpy.random"}:
-                    names.add(spelled)
-                if alias.name == "numpy":
-                    names.add(f"{spelled}.random")
-        elif isinstance(node, ast.ImportFrom):
-            for alias in node.names:
-                spelled = alias.asname or alias.name
-                if node.module in {"random", "numpy.random"}:
-                    names.add(spelled)
-                if node.module == "numpy" and alias.name == "random":
-                    names.add(spelled)
+    for each in imports_in(tree):
+        numpy_random = (each.module, each.name) == ("numpy", "random")
+        if each.module in {"random", "numpy.random"} or numpy_random:
+            names.add(each.known_as)
+        elif (each.module, each.name) == ("numpy", ""):
+            names.add(f"{each.known_as}.random")
     return names
 
 
@@ -188,5 +170,5 @@ HYGIENE: dict[str, Callable[[ast.Module], Iterator[str]]] = {
 
 def hygiene_error(tree: ast.Module, pattern: str) -> str | None:
     """Names the lines with an unstable pattern; None without one."""
-    found = list(HYGIENE[pattern](tree))
-    return f"{pattern.replace('_', ' ')}: {'; '.join(found[:8])}" if found else None
+    uses = list(HYGIENE[pattern](tree))
+    return f"{pattern.replace('_', ' ')}: {'; '.join(uses[:8])}" if uses else None

@@ -110,14 +110,14 @@ class Oracle:
             random: Random number generator.
         """
         height, width = occ.shape
-        found = 0
+        count = 0
         for _ in range(MOST_STARTS):
             start = int(random.integers(width)), int(random.integers(height))
             goal = self._walk(occ, start, cell, random)
             if goal != start:
-                found += 1
+                count += 1
                 yield start, goal
-            if found == WALKS:
+            if count == WALKS:
                 return
 
     def _walk(

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
-from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.task_file import Profile
 from tdac_agent.verification.diagnosis.report import OWN, Report
 from tdac_agent.verification.suite.privileged import REFERENCE
@@ -19,11 +19,7 @@ from tdac_agent.verification.suite.privileged import REFERENCE
 CLOCK = frozenset({"call_ms_mean", "call_ms_p99"})
 
 
-class _Record(PrintableRecord):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ProofRow(_Record):
+class ProofRow(StrictRecord):
     """Results of one controller."""
 
     controller: str
@@ -34,7 +30,7 @@ class ProofRow(_Record):
     seconds: float
 
 
-class SuiteCheck(_Record):
+class SuiteCheck(StrictRecord):
     """Verdict on a suite, for one task, seed and profile."""
 
     schema_version: Literal[1] = 1
@@ -110,7 +106,7 @@ def verdict_on_suite(
         rows: One row per controller.
         seconds: Duration of the check, s.
     """
-    about = reference.provenance
+    provenance = reference.provenance
     problems = [problem for row in rows for problem in problems_of(row)]
     failed = {test for row in rows for test in row.failures}
     notes = [
@@ -120,13 +116,13 @@ def verdict_on_suite(
     ]
     return SuiteCheck(
         proven=not problems,
-        task=about.task,
-        task_sha256=about.task_sha256,
-        suite=about.suite,
-        suite_sha256=about.suite_sha256,
-        profile=about.profile,
-        seed=about.seed,
-        sandbox=about.sandbox,
+        task=provenance.task,
+        task_sha256=provenance.task_sha256,
+        suite=provenance.suite,
+        suite_sha256=provenance.suite_sha256,
+        profile=provenance.profile,
+        seed=provenance.seed,
+        sandbox=provenance.sandbox,
         rows=tuple(rows),
         problems=tuple(problems),
         notes=tuple(notes),

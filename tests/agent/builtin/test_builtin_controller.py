@@ -2,25 +2,20 @@
 
 import ast
 import math
-from dataclasses import fields
 
 import numpy as np
 import pytest
 from driving import drive, import_controller, random_env
 
-from tdac_agent.builtin.parameters import read_parameters
-from tdac_agent.environments.map2d.builtin import Parameters, render_controller
-from tdac_agent.environments.map2d.entry import MAP2D
+from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.episodes.episode import Record
-from tdac_agent.verification.suite import contract
-from tdac_agent.verification.suite.hygiene import HYGIENE
 from tdac_agent.verification.suite.oracle import Oracle
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.task import jittered_start
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.params import RobotParams
 
-TUNED = Parameters(
+TUNED = MapParameters(
     inflation_margin=2.0,
     lookahead=60.0,
     slow_dist=10.0,
@@ -32,38 +27,7 @@ TUNED = Parameters(
 
 @pytest.fixture(scope="module")
 def source():
-    return render_controller(Parameters(), RobotParams(), 0.05)
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_parameters_are_read_back(seed):
-    """Whatever is rendered can be read from the file again."""
-    random = np.random.default_rng(seed)
-    drawn = {
-        f.name: random.uniform(f.metadata["low"], f.metadata["high"])
-        for f in fields(Parameters)
-    }
-    parameters = Parameters().changed(**drawn)
-    text = render_controller(parameters, RobotParams.disc(7.25), 0.05)
-    assert read_parameters(text, Parameters) == parameters
-
-
-def test_parameters_have_bounds():
-    """A value out of bounds is refused; a change stops at the bound."""
-    with pytest.raises(ValueError, match=r"turn_gain in \[0.1, 1\], got 2.0"):
-        Parameters(turn_gain=2.0)
-    assert Parameters().changed(turn_gain=2.0).turn_gain == 1.0
-
-
-def test_static_contract(source):
-    """The file is what the static tests ask for."""
-    tree = ast.parse(source)
-    names = contract.top_level_names(tree)
-    assert contract.import_problems(tree) == []
-    assert [problem for find in HYGIENE.values() for problem in find(tree)] == []
-    wanted = {"OccMap2D", "nearest_free", "plan_path", "policy", "reset", "run_episode"}
-    assert wanted | {"main"} | set(MAP2D.names.constants) <= set(names)
-    assert contract.has_main_guard(tree)
+    return template_for(RobotParams(), 0.05).render(MapParameters())
 
 
 def test_robot_constants():
@@ -71,7 +35,7 @@ def test_robot_constants():
     robot = RobotParams(radius=7.25, axle_length=11.0, n_rays=9, range_max=90.0)
     values = {
         node.targets[0].id: node.value.value
-        for node in ast.parse(render_controller(TUNED, robot, 0.1)).body
+        for node in ast.parse(template_for(robot, 0.1).render(TUNED)).body
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
     }
     assert values["ROBOT_RADIUS_PX"] == 7.25
@@ -162,7 +126,7 @@ def test_a_goal_behind_a_wall_is_said_to_be_out_of_reach(module):
 def test_run_episode(tmp_path, monkeypatch):
     """What `run_episode` returns is what the environment did."""
     env = Map2DEnv(np.zeros((90, 140), bool), (20, 20, 0), (110, 70), robot_radius=8)
-    text = render_controller(TUNED, env.nominal.robot, env.nominal.dt)
+    text = template_for(env.nominal.robot, env.nominal.dt).render(TUNED)
     module = import_controller(text, env, tmp_path, monkeypatch)
     record = Record(env, env.nominal.start, 2500)
     result = module.run_episode(record, 2500)
@@ -199,7 +163,7 @@ def test_drives_on_random_grids(seed, tmp_path, monkeypatch):
     env = random_env(random)
     while env.nominal.terrain.clear.max() < env.nominal.robot.radius + 1.5:
         env = random_env(random)
-    text = render_controller(TUNED, env.nominal.robot, env.nominal.dt)
+    text = template_for(env.nominal.robot, env.nominal.dt).render(TUNED)
     module = import_controller(text, env, tmp_path, monkeypatch)
     rollout = drive(env, steer(module))
     assert rollout.reached, rollout.outcome
@@ -210,7 +174,7 @@ def test_drives_on_random_grids(seed, tmp_path, monkeypatch):
 def test_large_maps_are_planned_on_a_lattice(name, nodes, tmp_path, monkeypatch):
     """With fewer nodes than pixels, or too few to get through, it still arrives."""
     env = Map2DEnv(name)
-    text = render_controller(TUNED, env.nominal.robot, env.nominal.dt)
+    text = template_for(env.nominal.robot, env.nominal.dt).render(TUNED)
     text = text.replace("MAX_NODES = 1_500_000", f"MAX_NODES = {nodes}")
     module = import_controller(text, env, tmp_path, monkeypatch)
     rollout = drive(env, steer(module))
@@ -222,7 +186,7 @@ def test_large_maps_are_planned_on_a_lattice(name, nodes, tmp_path, monkeypatch)
 def test_drives_on_bundled_maps(name, tmp_path, monkeypatch):
     """After one repair every bundled map is solved, from jittered starts, too."""
     env = Map2DEnv(name)
-    text = render_controller(TUNED, env.nominal.robot, env.nominal.dt)
+    text = template_for(env.nominal.robot, env.nominal.dt).render(TUNED)
     module = import_controller(text, env, tmp_path, monkeypatch)
     random = np.random.default_rng(3)
     for start in (None, jittered_start(env.nominal, random)):

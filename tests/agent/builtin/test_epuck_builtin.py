@@ -2,7 +2,7 @@
 
 import ast
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,25 +15,17 @@ from driving_epuck import (
 )
 
 from tdac_agent import load_task
-from tdac_agent.builtin.parameters import read_parameters
 from tdac_agent.builtin.provider import Builtin, template_of
-from tdac_agent.builtin.remedies import MarginBounds
-from tdac_agent.builtin.repair import read_rules, repair, write_rules
-from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.builtin.template import read_parameters
+from tdac_agent.environments.epuck.builtin import EPuckParameters, template_for
 from tdac_agent.environments.epuck.entry import EPUCK
-from tdac_agent.environments.epuck.oracle import occupied_at
-from tdac_agent.environments.epuck.world_copies import WorldOracle
-from tdac_agent.environments.map2d.builtin import Parameters
+from tdac_agent.environments.epuck.oracle import WorldOracle, occupied_at
 from tdac_agent.episodes.episode import Record
 from tdac_agent.models.provider import Request
 from tdac_agent.prompting.extract import extract_source
-from tdac_agent.prompting.rule_answer import MAX_OPERATIONS, apply, parse_operations
-from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.task_file import TaskFile
-from tdac_agent.verification.diagnosis.report import Diagnosis, Failure, Report
 from tdac_agent.verification.suite import contract
-from tdac_agent.verification.suite.hygiene import HYGIENE
 from tdac_agent.verification.verify import verify
 from tdac_envs import write_world
 from tdac_envs.worlds.footprint import Disc
@@ -50,33 +42,16 @@ TUNED = EPuckParameters(
 )
 
 
-@pytest.fixture(scope="module")
-def crates():
-    return load_task("epuck-crates")
-
-
 @pytest.fixture
-def module(crates, tmp_path, monkeypatch):
-    source = render_epuck(EPuckParameters(), crates.nominal)
-    return import_into(crates, source, tmp_path, monkeypatch)
-
-
-def test_static_contract(crates):
-    """The file is what the static tests ask for."""
-    tree = ast.parse(render_epuck(EPuckParameters(), crates.nominal))
-    names = contract.top_level_names(tree)
-    assert contract.import_problems(tree) == []
-    assert [problem for find in HYGIENE.values() for problem in find(tree)] == []
-    wanted = EPUCK.names
-    assert {"policy", "reset", *wanted.constants, *wanted.functions} <= set(names)
-    assert contract.has_main_guard(tree)
+def module(crates, crates_source, tmp_path, monkeypatch):
+    return import_into(crates, crates_source, tmp_path, monkeypatch)
 
 
 def test_constants(tmp_path):
     """Clock, wheel limit and tolerance are the task's."""
     spec = TaskFile(env=EPUCK.id, world="maze", dt=0.0125, tolerance=0.031)
     task = load_task(spec)
-    tree = ast.parse(render_epuck(EPuckParameters(), task.nominal))
+    tree = ast.parse(template_for(task.nominal).render(EPuckParameters()))
     values = {
         node.targets[0].id: node.value.value
         for node in tree.body
@@ -88,89 +63,6 @@ def test_constants(tmp_path):
     assert values["SENSOR_RANGE"] == 0.07
     assert values["WORLD_FILE"] == "world.wbt"
     assert type(contract.time_step(0.032)) is int
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_parameters_are_read_back(seed, crates):
-    """Whatever is rendered can be read from the file, and from rules, again."""
-    random = np.random.default_rng(seed)
-    drawn = {
-        f.name: random.uniform(f.metadata["low"], f.metadata["high"])
-        for f in fields(EPuckParameters)
-    }
-    parameters = EPuckParameters().changed(**drawn)
-    text = render_epuck(parameters, crates.nominal)
-    assert read_parameters(text, EPuckParameters) == parameters
-    rules = write_rules(parameters, [], MarginBounds(0.0015, 0.02), 1)
-    assert len(rules) <= MAX_OPERATIONS
-    known, bounds = read_rules(rules, EPuckParameters)
-    assert bounds == MarginBounds(0.0015, 0.02)
-    for name, value in drawn.items():
-        assert getattr(known, name) == pytest.approx(value, rel=1e-2, abs=1e-3)
-
-
-def test_the_repair_tables_know_their_parameters():
-    """Every parameter that a remedy names exists in its own template."""
-    for table, kind in ((EPuckParameters.remedies, EPuckParameters),):
-        names = {item.name for item in fields(kind)}
-        for remedy in table.values():
-            assert {*remedy.add, *remedy.scale, *remedy.switch_on} <= names
-    assert set(EPuckParameters.remedies) == set(Parameters.remedies)
-
-
-@pytest.mark.parametrize(
-    ("cause", "name", "way"),
-    [
-        ("collision", "inflation_margin", 1),
-        ("collision", "turn_gain", 1),
-        ("collision", "turn_in_place", -1),
-        ("collision", "slow_dist", 1),
-        ("no motion", "inflation_margin", -1),
-        ("stuck", "blocked", 1),
-        ("looping", "unstick_after", -1),
-        ("spinning", "turn_gain", -1),
-        ("oscillating", "turn_in_place", 1),
-        ("missed goal", "cruise_speed", -1),
-        ("too slow", "cruise_speed", 1),
-        ("time-out", "look_steps", 1),
-        ("held out", "inflation_margin", 1),
-    ],
-)
-def test_each_failure_changes_its_parameter(cause, name, way):
-    """The remedy moves the parameter the right way."""
-    middle = replace(TUNED, cruise_speed=0.6, unstick_after=80.0)
-    after, _ = repair(middle, failed(cause), MarginBounds(), 0)
-    assert (getattr(after, name) - getattr(middle, name)) * way > 0
-
-
-def failed(cause):
-    """A report of one failure."""
-    diagnosis = Diagnosis(cause=cause, text=cause)
-    failure = Failure(test="t", group="end to end", message="x", diagnosis=diagnosis)
-    return Report.model_construct(failures=(failure,))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "cause",
-    [
-        "collision",
-        *(pytest.param(c, marks=SLOW) for c in ("no motion", "too slow", "error")),
-    ],
-)
-def test_never_tries_the_same_twice(crates, cause):
-    """Ten iterations that all fail in the same way are twenty different candidates."""
-    builtin, book, tried = Builtin(template_of(crates.setting)), RuleBook(), []
-    for k in range(1, 11):
-        told = tuple(rule.text for rule in book.in_force)
-        reply = builtin.complete(Request("generate", "", rules=told, sample=(0, k, 0)))
-        for j, kind in enumerate(("edit", "summarise")):
-            text = extract_source(reply.text)
-            tried.append(read_parameters(text, EPuckParameters))
-            request = Request(kind, "", text, failed(cause), told, (0, k, j))
-            reply = builtin.complete(request)
-        book, _ = apply(book, parse_operations(reply.text), k, ())
-    assert len(set(tried)) == len(tried)
 
 
 @pytest.mark.slow_after(3)
@@ -285,7 +177,7 @@ def test_run_episode(crates, module):
 
 def drives(task, starts, parameters, folder, monkeypatch, **options):
     """Episodes of the controller, and the least room that it kept."""
-    source = render_epuck(parameters, task.nominal)
+    source = template_for(task.nominal).render(parameters)
     module = import_into(task, source, folder, monkeypatch)
     env = task.make_env(**options)
     return [episode(module, env, start) for start in starts]
@@ -359,7 +251,7 @@ def test_it_is_verified(name, tmp_path, warm):
 @pytest.mark.slow
 def test_a_collision_is_repaired(crates, tmp_path):
     """A margin that is given up on purpose comes back from the report's diagnosis."""
-    careless = render_epuck(EPuckParameters(), crates.nominal)
+    careless = template_for(crates.nominal).render(EPuckParameters())
     careless = careless.replace("BODY_RADIUS = 0.037", "BODY_RADIUS = 0.034")
     report = verify(careless, crates, paper=True)
     causes = {failure.diagnosis.cause for failure in report.failures}

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 import tdac_agent
-from tdac_agent.builtin.parameters import read_parameters
 from tdac_agent.builtin.provider import make_builtin
+from tdac_agent.builtin.template import read_parameters
 from tdac_agent.builtin.variation import varied, varied_parameters
 from tdac_agent.environments.epuck.builtin import EPuckParameters
-from tdac_agent.environments.map2d.builtin import Parameters
+from tdac_agent.environments.map2d.builtin import MapParameters
 from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import Request
 
@@ -62,7 +62,7 @@ def test_each_level_can_be_varied(path):
     compile(changed, path.name, "exec")
 
 
-@pytest.mark.parametrize("kind", [Parameters, EPuckParameters])
+@pytest.mark.parametrize("kind", [MapParameters, EPuckParameters])
 def test_one_or_two_parameters_move_within_their_bounds(kind):
     """A value out of bounds would be refused; one at its bound moves inwards."""
     changed, before = set(), asdict(kind())
@@ -83,9 +83,9 @@ def test_the_built_in_learner_improves_any_controller(small_task, template):
     learner = make_builtin("", Options(small_task.setting))
     source = SOURCE
     if template:
-        source = learner.template.render(Parameters())
+        source = learner.template.render(MapParameters())
     answer = learner.complete(Request("improve", "?", source, sample=(0, 7, 0)))
     changed = answer.text.removeprefix("```python\n").removesuffix("```\n")
     assert changed != source
     assert answer.notes
-    assert (read_parameters(changed, Parameters) is not None) == template
+    assert (read_parameters(changed, MapParameters) is not None) == template

@@ -15,8 +15,7 @@ from driving_epuck import (
 )
 
 from tdac_agent.environments.epuck.entry import EPUCK
-from tdac_agent.environments.epuck.oracle import occupied_at
-from tdac_agent.environments.epuck.world_copies import WorldOracle
+from tdac_agent.environments.epuck.oracle import WorldOracle, occupied_at
 from tdac_agent.verification.suite import contract
 from tdac_agent.verification.suite.hygiene import HYGIENE
 from tdac_agent.verification.suite.privileged import (

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from tdac_agent import load_task
 from tdac_agent.environments.epuck.moved_world import Motion, reordered
-from tdac_agent.environments.epuck.oracle import occupied_at
-from tdac_agent.environments.epuck.world_copies import ANGLES, world_cases
+from tdac_agent.environments.epuck.oracle import ANGLES, WorldOracle, occupied_at
 from tdac_envs import bundled_worlds, load_world, read_world
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.worlds.bodies import at_body_height, bodies, floor_under
@@ -92,7 +91,7 @@ def assert_same_things(found, expected):
 def test_copies_are_the_worlds_they_say(name):
     """Each text reads as its world; the copies have another order, names and more."""
     world = flat(name)
-    first, *copies = world_cases(world)
+    first, *copies = WorldOracle().world_cases(world)
     assert read_world(first.text) == world
     assert len(copies) == len(ANGLES)
     for case in copies:
@@ -125,7 +124,7 @@ def test_reordered_text_has_the_same_nodes():
 @pytest.mark.parametrize("name", ["epuck", "epuck-room", "epuck-yard"])
 def test_samples_are_what_footprints_say(name):
     """Without inflation a point is occupied just where a footprint covers it."""
-    for case in world_cases(flat(name))[:2]:
+    for case in WorldOracle().world_cases(flat(name))[:2]:
         arena, shapes = case.world.arena.inside, footprints(case.world)
         found = list(case.samples(0.0, 0.01))
         assert {occupied for _, occupied in found} == {True, False}
@@ -137,7 +136,7 @@ def test_samples_are_what_footprints_say(name):
 @pytest.mark.slow
 def test_inflated_samples_are_what_a_ring_of_probes_says():
     """With inflation a point is occupied just where something solid is that near."""
-    case = world_cases(flat("epuck-crates"))[1]
+    case = WorldOracle().world_cases(flat("epuck-crates"))[1]
     arena, shapes = case.world.arena.inside, footprints(case.world)
     for (x, y), occupied in list(case.samples(0.04, 0.01))[::6]:
         near = covered_nearby(shapes, x, y, 0.04) or not arena.contains(x, y)

@@ -26,7 +26,7 @@ from small import QUICK, write_small_task
 import tdac_agent
 from tdac_agent import load_task
 from tdac_agent.episodes.learned import Learned
-from tdac_agent.episodes.sb3_file import SavedPolicy, read_metadata, write_metadata
+from tdac_agent.episodes.sb3_file import SavedPolicy, read_policy, write_metadata
 from tdac_agent.evaluation.evaluate import NO_DISTURBANCE, episode_seeds, evaluate
 from tdac_agent.evaluation.evaluation_report import compare
 from tdac_agent.evaluation.overlay import COLOURS
@@ -266,7 +266,7 @@ def test_a_saved_policy_drives_as_its_model_does(algo, tmp_path, small_task):
     file = tmp_path / "model.zip"
     model = save(file, kind, env, **(options if algo == "PPO" else {}))
     write_metadata(file, SavedPolicy(algo=algo.lower(), wrappers=wrappers))
-    who = PolicySpec("sb3", file, read_metadata(file).wrappers)
+    who = PolicySpec("sb3", file, read_policy(file).saved.wrappers)
     assert who.knows == "+ guidance"
     for seed in range(3):
         episode = drive_alone(who, small_task, seed)
@@ -370,10 +370,10 @@ def test_metadata_is_read_inside_and_beside(tmp_path, small_task):
     sb3 = pytest.importorskip("stable_baselines3")
     file = tmp_path / "model.zip"
     save(file, sb3.PPO, wrap(small_task.make_env(), WRAPPERS))
-    assert read_metadata(file) is None
+    assert read_policy(file).saved is None
     saved = SavedPolicy(algo="ppo", wrappers=WRAPPERS, tasks=("small",), steps=10)
     file.with_suffix(".json").write_text(saved.model_dump_json())
-    assert read_metadata(file) == saved
+    assert read_policy(file).saved == saved
     hashes = {entrants_of([file])[0].sha256}
     other = saved.model_copy(update={"wrappers": WRAPPERS[:1]})
     file.with_suffix(".json").write_text(other.model_dump_json())
@@ -382,7 +382,7 @@ def test_metadata_is_read_inside_and_beside(tmp_path, small_task):
     assert len(hashes) == 3  # a network with other observations is another policy
     for steps in (11, 12):
         write_metadata(file, saved.model_copy(update={"steps": steps}))
-        assert read_metadata(file).steps == steps
+        assert read_policy(file).saved.steps == steps
     sb3.PPO.load(file, device="cpu")
     assert entrants_of([file])[0].sha256 == sha256_of(file.read_bytes())
     folder = tmp_path / "training"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import signal
 import tempfile
 from collections import Counter
 from pathlib import Path
@@ -28,29 +27,16 @@ def problem_of(kind: Kind, text: str, folder: Path) -> str:
     try:
         kind.read(folder)
     except TdacError as error:
-        told = str(error)
-        if not told or len(told) > LONGEST:
-            return f"a message of {len(told)} characters: {told[:300]!r}"
+        message = str(error)
+        if not message or len(message) > LONGEST:
+            return f"a message of {len(message)} characters: {message[:300]!r}"
     except OSError as error:
         # The command line ends with one line for such a name.
         return "" if error.filename and error.errno in (36, 40) else repr(error)
     return ""
 
 
-@pytest.fixture
-def patience():
-    """Interrupts an example that takes too long."""
-
-    def late(number, frame):
-        raise TimeoutError(f"an example took more than {SECONDS} s")
-
-    before = signal.signal(signal.SIGALRM, late)
-    yield lambda: signal.alarm(SECONDS)
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
-
-
-def check_kind(kind: Kind, examples: int, patience) -> None:
+def check_kind(kind: Kind, examples: int, alarm) -> None:
     """Tries so many files of a kind; at least half get past the first check."""
     seen: Counter[bool] = Counter()
 
@@ -65,7 +51,7 @@ def check_kind(kind: Kind, examples: int, patience) -> None:
         text = kind.text(value)
         seen[kind.gets_in(text)] += 1
         folder = Path(tempfile.mkdtemp(prefix="generated-"))
-        patience()
+        alarm(SECONDS)
         try:
             assert problem_of(kind, text, folder) == ""
         finally:
@@ -88,13 +74,13 @@ def test_the_file_that_nobody_changed_is_read(kind, tmp_path):
 
 @pytest.mark.slow_after(1)
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_a_hostile_field_is_taken_or_refused_in_one_line(kind, patience):
+def test_a_hostile_field_is_taken_or_refused_in_one_line(kind, alarm):
     """Of each kind of file some 25, 300 in all: no traceback, and soon."""
-    check_kind(kind, 300 // len(KINDS) + 1, patience)
+    check_kind(kind, 300 // len(KINDS) + 1, alarm)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
-def test_many_hostile_fields(kind, patience):
+def test_many_hostile_fields(kind, alarm):
     """The same for 10,000 files."""
-    check_kind(kind, 10_000 // len(KINDS) + 1, patience)
+    check_kind(kind, 10_000 // len(KINDS) + 1, alarm)

@@ -48,20 +48,18 @@ sys.addaudithook(_watch)
 
 
 @pytest.fixture
-def command(monkeypatch):
+def command(monkeypatch, alarm):
     """Gives a line to the command line; exit code (None: judged), stderr."""
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setenv("TERM", "dumb")
-    numbers = (signal.SIGTERM, signal.SIGHUP, signal.SIGALRM)
-    handlers = {n: signal.getsignal(n) for n in numbers}
-    signal.signal(signal.SIGALRM, _late)
+    handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
 
     def run(words: list[str], here: Path, temporary: Path):
         monkeypatch.chdir(here)
         monkeypatch.setattr("sys.argv", ["tdac", *words])
         monkeypatch.setattr("tempfile.tempdir", str(temporary))
         out, errors = io.StringIO(), io.StringIO()
-        signal.alarm(SECONDS)
+        alarm(SECONDS)
         _WATCHING.append(True)
         try:
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
@@ -72,17 +70,13 @@ def command(monkeypatch):
             return None, errors.getvalue()
         finally:
             _WATCHING.clear()
-            signal.alarm(0)
+            alarm(0)
             gc.unfreeze()
         raise AssertionError("the command has not ended")
 
     yield run
     for number, handler in handlers.items():
         signal.signal(number, handler)
-
-
-def _late(number, frame):
-    raise TimeoutError(f"a command took more than {SECONDS} s")
 
 
 def problem_of(code: int | None, errors: str) -> str:

@@ -8,7 +8,7 @@ from few_worlds import KNOWN
 from mcp_agent import STILL, converse, journal, over_stdio, record
 
 from tdac_agent import load_task
-from tdac_agent.environments.map2d.builtin import Parameters, render_controller
+from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.html_report import make_page
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -19,7 +19,7 @@ TOOLS = {"read_task", "submit", "failures", "picture", "submissions", "choose"}
 def good_on_maze():
     """A controller that is verified on the bundled maze."""
     task = load_task("maze")
-    return render_controller(Parameters(), task.params.robot, task.nominal.dt)
+    return template_for(task.params.robot, task.nominal.dt).render(MapParameters())
 
 
 def test_from_nothing_to_verified_on_a_bundled_task(tmp_path, good_on_maze, tdac):

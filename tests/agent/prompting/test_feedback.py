@@ -8,9 +8,9 @@ from tdac_agent.prompting.feedback import (
     MAX_CHARS,
     choose,
     cut,
+    feedback_of,
     group_failures,
     render_feedback,
-    tell_attempt,
 )
 from tdac_agent.verification.diagnosis.report import GROUPS, Diagnosis, Failure
 from tdac_agent.verification.verify import verify
@@ -147,11 +147,11 @@ def test_a_broken_file_is_one_cause(small_task, warm):
 
 
 def test_an_attempt_in_one_line(small_task, warm):
-    """Which attempt, how many tests, what happened, with figures."""
+    """How many tests, what happened, with figures."""
     report = verify(WALL, small_task, profile="policy", judge=warm)
-    line = tell_attempt(2, 1, report)
+    line = feedback_of(report).line
     failed, expected = report.verdict.failed_tests, report.verdict.expected
-    assert line.startswith(f"k=2 j=1: {failed} of {expected} tests failed: nominal: ")
+    assert line.startswith(f"{failed} of {expected} tests failed: nominal: ")
     figures = report.failures[0].diagnosis
     assert f"collision in step {figures.step} at ({figures.x:.4g}, " in line
     assert f"with {figures.d_min:.4g} of {figures.d0:.4g} px left at best" in line
@@ -192,7 +192,7 @@ def test_whatever_failed_is_told_within_bounds(any_report, failed):
     report = report_with(any_report, *failed)
     text = render_feedback(report)
     assert "71.25" not in text
-    assert "71.25" not in tell_attempt(1, 0, report)
+    assert "71.25" not in feedback_of(report).line
     assert len(text) <= 3 * (2 * 5 * (MAX_CHARS + 60)) + 1000
     groups, not_run = group_failures(report)
     told = [f for group in groups for f in group.members] + not_run

@@ -12,13 +12,14 @@ from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.map2d.entry import MAP2D
 from tdac_agent.prompting.context import contract_of
+from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.prompting.manual import ManualError, interface_of
 from tdac_agent.prompting.prompt import (
     PromptError,
     PromptTemplate,
     generate_prompt,
     load_template,
-    repair_prompt,
+    repair_question,
 )
 from tdac_agent.prompting.rules import BEGIN, RuleBook
 from tdac_agent.tasks.task import SENSORS_FILE, write_workdir
@@ -241,14 +242,16 @@ def test_what_changes_comes_last(small_task, epuck_task, warm):
     report = verify("def policy(obs):\n    return 1, 1\n", small_task, judge=warm)
     first = generate_prompt(small_task, ())
     stable = first.partition(BEGIN)[0]
-    assert repair_prompt("edit", first, "x = 1", report).startswith(stable)
+    assert repair_question("edit", first, "x = 1", render_feedback(report)).startswith(
+        stable
+    )
 
 
 def test_the_summariser_reads_first_that_no_file_is_wanted(small_task, warm):
     """Else the question that it quotes would ask it for a controller."""
     report = verify("def policy(obs):\n    return 1, 1\n", small_task, judge=warm)
     first = generate_prompt(small_task, ())
-    text = repair_prompt("summarise", first, "x = 1", report)
+    text = repair_question("summarise", first, "x = 1", render_feedback(report))
     preface, _, rest = text.partition(first)
     assert "not\na Python file" in preface
     assert "exactly one fenced ```json block" in rest
@@ -341,19 +344,25 @@ def test_repair_prompts_tell_earlier_attempts_and_rules(small_task, warm):
     book = book.observed(("test_x",), 0)
     report = verify("def policy(obs):\n    return 1, 1\n", small_task, judge=warm)
     prompt = generate_prompt(small_task, book.in_force)
-    told = {
-        kind: repair_prompt(
-            kind, prompt, "x = 1", report, earlier=("k=1 j=0: 3",), rules=book.in_force
+    feedback = render_feedback(report)
+    texts = {
+        kind: repair_question(
+            kind,
+            prompt,
+            "x = 1",
+            feedback,
+            earlier=("k=1 j=0: 3",),
+            rules=book.in_force,
         )
         for kind in ("edit", "summarise")
     }
-    for text in told.values():
+    for text in texts.values():
         assert "## Earlier attempts, oldest first\n- k=1 j=0: 3\n" in text
     effect = "cured 0 of 1 test; more tests failed than before"
     line = f"- R1 (task, since k=1; {effect}): slow down near walls\n"
-    assert line in told["summarise"]
-    assert line not in told["edit"]
-    assert "test_x" not in told["summarise"]
+    assert line in texts["summarise"]
+    assert line not in texts["edit"]
+    assert "test_x" not in texts["summarise"]
 
 
 @pytest.mark.slow_after(1)
@@ -365,7 +374,7 @@ def test_repair_prompts_hide_the_held_out_starts(name, kind, warm, request):
     prompt = generate_prompt(task, ())
     source = "X = '{{ 1 }}'\n\n\ndef policy(obs):\n    return 0.6, 0.5\n"
     report = verify(source, task, profile="policy", judge=warm)
-    text = repair_prompt(kind, prompt, source, report)
+    text = repair_question(kind, prompt, source, render_feedback(report))
     assert source.strip() in text
     assert prompt in text
     assert "jitter 3" not in text

@@ -21,7 +21,7 @@ from small import write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.episodes.learned import Learned
-from tdac_agent.episodes.sb3_file import read_metadata
+from tdac_agent.episodes.sb3_file import read_policy
 from tdac_agent.errors import RunError
 from tdac_agent.training.curve import Point, read_curve, write_curve
 from tdac_agent.training.hyperparameters import (
@@ -121,7 +121,7 @@ def test_a_training_leaves_a_policy_its_facts_and_a_curve(
     assert facts["seed"] == 3
     assert facts["versions"]["torch"] == version("torch")
     file = tmp_path / "out" / "policy.zip"
-    saved = read_metadata(file)
+    saved = read_policy(file).saved
     assert (saved.algo, saved.wrappers, saved.seed) == (algo, WRAPPERS, 3)
     assert saved.steps == best.steps
     env = load_task(small).make_env(variation="jitter")

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from tdac_agent.bench.bench import bench
-from tdac_agent.episodes.sb3_file import read_metadata
+from tdac_agent.episodes.sb3_file import read_policy
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
 from tdac_agent.training.curve import read_curve
@@ -96,7 +96,7 @@ def test_a_training_records_its_set(trained, values):
     tasks, plan, points, out = trained(**values)
     assert points[-1].steps == 256
     assert read_plan(out) == plan
-    saved = read_metadata(out / "policy.zip")
+    saved = read_policy(out / "policy.zip").saved
     assert (saved.set, saved.set_sha256, saved.tasks) == ("few", tasks.sha256, ())
     facts = json.loads((out / "policy.json").read_text())
     assert facts["set_sha256"] == tasks.sha256

@@ -1,4 +1,4 @@
-"""A suite proves itself, or is found out: by the reference, by bad ones, by repeats."""
+"""Suites prove themselves, or are found out: by the reference, bad ones and repeats."""
 
 import json
 
@@ -6,11 +6,13 @@ import pytest
 from small import SHORT, write_small_task
 
 from tdac_agent import load_task
+from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.models.provider import Reply
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.tasks.installation import seed_of
+from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.suite.privileged import (
     BAD,
     REFERENCE,
@@ -22,12 +24,23 @@ from tdac_agent.verification.suite.proof import SuiteCheck
 from tdac_agent.verification.suite_check import check_suite, prove_suite
 from tdac_agent.verification.verify import verify
 from tdac_envs.mapping.bundled import bundled_maps
+from tdac_envs.worlds.bundled import bundled_worlds
 
 IMPOSSIBLE = """
 def test_flies(rollout):
     assert rollout("nominal").trajectory.steps < 3, "it took 3 steps or more"
 """
 VACUOUS = "def test_anything(controller):\n    assert controller.source\n"
+FAR = """
+def test_keeps_far(rollout, task):
+    poses = rollout("nominal").trajectory.poses
+    gaps = [task.nominal.ground.gap(x, y) for x, y, _ in poses]
+    assert min(gaps) > 0.5, f"{min(gaps):.3f} m from something"
+"""
+QUICK_BAD = tuple(name for name in BAD if name != SLOW)
+WORLDS = [TaskFile(env=EPUCK.id, world=name) for name in bundled_worlds()]
+BUNDLED = [*bundled_maps(), *WORLDS]
+NAMES = [*bundled_maps(), *(f"world {name}" for name in bundled_worlds())]
 
 
 @pytest.fixture
@@ -68,20 +81,45 @@ def test_the_shipped_suite_proves_itself(task, profile, warm):
     The bad ones fail for what they do: what is read from the file, and each function
     but the policy, is right.
     """
-    told = []
+    steps = []
     check = check_suite(
-        task, profile=profile, repeats=2, judge=warm, on_progress=told.append
+        task, profile=profile, repeats=2, judge=warm, on_progress=steps.append
     )
-    assert_proven(check, 2)
-    assert [row.controller for row in check.rows] == [REFERENCE, *BAD]
-    assert (check.profile, check.task) == (profile, "small")
+    assert_proven_on(check, task, profile, BAD, 2)
+    assert (check.suite, check.task) == ("map2d", "small")
     assert check.seed == seed_of(b"", task)
     assert check.notes == ()
+    assert steps[:3] == ["reference, 1 of 2", "reference, 2 of 2", "do-nothing, 1 of 2"]
+    assert steps[-1] == "slow"
+    assert "test_end_to_end.py::test_policy_is_fast_enough" in check.rows[-1].failures
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("profile", "repeats"), [("paper", 1), ("policy", 2)])
+def test_the_suite_of_worlds_proves_itself(crates, profile, repeats, warm):
+    """The reference passes, each bad one fails for how it drives, each time alike."""
+    check = check_suite(
+        crates, profile=profile, repeats=repeats, bad=QUICK_BAD, judge=warm
+    )
+    assert_proven_on(check, crates, profile, QUICK_BAD, repeats)
+    assert check.suite == "epuck"
+
+
+def assert_proven_on(check, task, profile, bad, repeats):
+    """The record names task and profile, and the bad ones fail for how they drive."""
+    assert_proven(check, repeats)
+    assert [row.controller for row in check.rows] == [REFERENCE, *bad]
+    assert (check.profile, check.task) == (profile, task.name)
     assert SuiteCheck.model_validate_json(check.model_dump_json()) == check
-    assert told[:3] == ["reference, 1 of 2", "reference, 2 of 2", "do-nothing, 1 of 2"]
-    assert told[-1] == "slow"
     failures = [test for row in check.rows for test in row.failures]
     assert all(test.startswith("test_end_to_end.py::") for test in failures)
+
+
+@pytest.mark.slow
+def test_a_slow_controller_is_found_out(crates, warm):
+    """It drives as the reference does, but each call takes more than two steps."""
+    check = check_suite(crates, profile="policy", repeats=1, bad=(SLOW,), judge=warm)
+    assert_proven(check, 1)
     assert "test_end_to_end.py::test_policy_is_fast_enough" in check.rows[-1].failures
 
 
@@ -93,19 +131,22 @@ def test_five_repeats_agree(small_task, warm):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("profile", ["paper", "policy"])
-@pytest.mark.parametrize("name", bundled_maps())
-def test_every_bundled_task(name, profile, warm):
+@pytest.mark.parametrize("number", range(len(BUNDLED)), ids=NAMES)
+def test_every_bundled_task(number, profile, warm):
     """The shipped suite proves itself on each, from a seed of its own."""
-    bad = tuple(other for other in BAD if other != SLOW)
-    seed = 1 + bundled_maps().index(name)
     check = check_suite(
-        load_task(name), profile=profile, seed=seed, repeats=1, bad=bad, judge=warm
+        load_task(BUNDLED[number]),
+        profile=profile,
+        seed=1 + number,
+        repeats=1,
+        bad=QUICK_BAD,
+        judge=warm,
     )
     assert_proven(check, 1)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", bundled_maps())
+@pytest.mark.parametrize("name", BUNDLED, ids=NAMES)
 def test_the_nominal_start_alone(name, warm):
     """The reference passes with `paper`, too."""
     task = load_task(name)
@@ -118,8 +159,9 @@ def test_the_impossible_is_found_out(task, suite_of, warm):
     """A test that the reference fails is named, with its message."""
     check = check_suite(task, suite=suite_of(IMPOSSIBLE), repeats=1, bad=(), judge=warm)
     assert not check.proven
-    told = "the reference fails own/test_mine.py::test_flies: it took 3 steps or more"
-    assert check.problems == (told,)
+    assert check.problems == (
+        "the reference fails own/test_mine.py::test_flies: it took 3 steps or more",
+    )
 
 
 @pytest.mark.slow
@@ -141,10 +183,15 @@ def test_a_suite_that_tests_nothing_is_found_out(task, suite_of, warm):
 
 
 @pytest.mark.slow
-def test_a_task_that_needs_no_control_is_found_out(tmp_path, warm):
+@pytest.mark.parametrize("kind", ["map2d", "epuck"])
+def test_a_task_that_needs_no_control_is_found_out(kind, tmp_path, warm):
     """Where driving straight on is enough, the suite proves nothing about steering."""
-    changes = {"start": [95, 60, 0.0], "goal": [140, 60], "tolerance": 30}
-    easy = load_task(write_small_task(tmp_path / "easy", **changes))
+    if kind == "map2d":
+        changes = {"start": [95, 60, 0.0], "goal": [140, 60], "tolerance": 30}
+        easy = load_task(write_small_task(tmp_path / "easy", **changes))
+    else:
+        ends = {"start": (-0.6, 0.2, 0.0), "goal": (-0.3, 0.2), "tolerance": 0.2}
+        easy = load_task(TaskFile(env=EPUCK.id, world="crates", **ends))
     bad = ("do-nothing", "constant")
     check = check_suite(easy, profile="policy", repeats=1, bad=bad, judge=warm)
     assert check.problems == (
@@ -213,16 +260,44 @@ def test_arguments_that_make_no_sense(task, tmp_path, warm):
 
 
 @pytest.mark.slow
-def test_the_short_form(task, suite_of, warm):
+@pytest.mark.parametrize(
+    ("name", "text", "reason"),
+    [
+        (
+            "task",
+            IMPOSSIBLE.replace("more", "more\\n" + "and more " * 100),
+            "suite failed its check: the reference",
+        ),
+        ("crates", FAR, r"test_keeps_far: 0\.\d+ m from something"),
+    ],
+)
+def test_the_short_form(name, text, reason, suite_of, warm, request):
     """A proof, or one clear line that says what is wrong."""
+    task = request.getfixturevalue(name)
     proof = prove_suite(task, profile="policy", judge=warm)
     assert [row.controller for row in proof.rows] == [REFERENCE, "do-nothing"]
     assert_proven(proof, 1)
-    long = IMPOSSIBLE.replace("more", "more\\n" + "and more " * 100)
-    with pytest.raises(Fault, match="suite failed its check: the reference") as fault:
-        prove_suite(task, suite=suite_of(long), judge=warm)
+    with pytest.raises(Fault, match=reason) as fault:
+        prove_suite(task, suite=suite_of(text), judge=warm)
     assert "\n" not in str(fault.value)
     assert len(str(fault.value)) < 400
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("choice", "name"),
+    [(["--task", "epuck"], "epuck"), (["--world", "corridor"], "corridor")],
+)
+def test_the_command_line(choice, name, tdac):
+    """`--task epuck` and a world of one's own: exit 0, and what was proven."""
+    words = ["check-suite", "--repeats", 1, "--json", *choice, "--profile", "policy"]
+    code, out, err = tdac(*words)
+    assert (code, err) == (0, "")
+    record = json.loads(out)
+    assert record["proven"] is True
+    assert (record["suite"], record["task"]) == ("epuck", name)
+    assert record["rows"][-1]["controller"] == SLOW
+    assert record["rows"][-1]["passed"] == 0
 
 
 class Paid:
@@ -269,10 +344,10 @@ def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
     paid, out = Paid(good_source), tmp_path / "run"
     providers = {"learner": "builtin", who: paid}
-    told = []
-    run = synthesize(task, **providers, out=out, judge=warm, on_event=told.append)
+    seen = []
+    run = synthesize(task, **providers, out=out, judge=warm, on_event=seen.append)
     assert run.verified
-    doing = [record["doing"] for record in told if record["event"] == "prove.step"]
+    doing = [record["doing"] for record in seen if record["event"] == "prove.step"]
     assert doing == ["reference", "do-nothing"]
     assert paid.calls == (who == "learner")
     records = events(out)

@@ -11,10 +11,8 @@ import pytest
 
 from tdac_agent import load_task
 from tdac_agent.cli.play import drive_disturbed
-from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.pictures import reaches
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.evaluation.policy import load_controller
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.loop import synthesize
@@ -34,29 +32,18 @@ NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
 LEGO = '\nLegoTallWall {\n  translation 0.1 3 0\n  name "north"\n}\n'
 
 
-@pytest.fixture(scope="module")
-def task():
-    """A world that is soon crossed."""
-    return load_task("epuck-crates")
-
-
-@pytest.fixture(scope="module")
-def source(task):
-    return render_epuck(EPuckParameters(), task=task.nominal)
-
-
 @pytest.fixture
-def controller(tmp_path, source):
+def controller(tmp_path, crates_source):
     file = tmp_path / "controller.py"
-    file.write_text(source)
+    file.write_text(crates_source)
     return file
 
 
-def test_starts_are_spread_in_metres(task):
+def test_starts_are_spread_in_metres(crates):
     """Moved starts lie within a body radius, on several sides, and are feasible."""
-    starts = spread_starts(task.nominal, 3, 5)
-    assert starts == spread_starts(task.nominal, 3, 5)
-    x, y, heading = task.nominal.start
+    starts = spread_starts(crates.nominal, 3, 5)
+    assert starts == spread_starts(crates.nominal, 3, 5)
+    x, y, heading = crates.nominal.start
     offsets = np.array([(s.x - x, s.y - y) for s in starts])
     turns = [math.remainder(s.heading - heading, math.tau) for s in starts]
     assert np.hypot(*offsets.T).max() <= 0.037
@@ -65,12 +52,12 @@ def test_starts_are_spread_in_metres(task):
     assert {tuple(np.sign(row)) for row in offsets[:4]} == {
         (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)
     }  # fmt: skip
-    assert all(task.nominal.ground.gap(s.x, s.y) >= 0.037 for s in starts)
+    assert all(crates.nominal.ground.gap(s.x, s.y) >= 0.037 for s in starts)
 
 
-def test_a_collision_is_judged_and_drawn(task, warm, tmp_path):
+def test_a_collision_is_judged_and_drawn(crates, warm, tmp_path):
     """The report names what was hit; the trajectory and a picture are kept."""
-    report = verify(RAM, task, profile="policy", judge=warm, out=tmp_path)
+    report = verify(RAM, crates, profile="policy", judge=warm, out=tmp_path)
     assert not report.passed
     nominal = report.episodes[0]
     assert (nominal.outcome, nominal.collisions) == ("collision", 1)
@@ -88,9 +75,9 @@ def test_a_collision_is_judged_and_drawn(task, warm, tmp_path):
     assert picture.shape[1] > 880
 
 
-def test_feedback_is_in_millimetres(task, warm):
+def test_feedback_is_in_millimetres(crates, warm):
     """What fails the progress test is told in the units of the prompt."""
-    report = verify(NOTHING, task, profile="policy", judge=warm)
+    report = verify(NOTHING, crates, profile="policy", judge=warm)
     message = next(f.message for f in report.failures if "test_progress" in f.test)
     assert re.search(
         r"the path to the goal must fall from 127\d\.\d mm to 8[89]\d\.\d mm or less "
@@ -99,9 +86,9 @@ def test_feedback_is_in_millimetres(task, warm):
     )
 
 
-def test_a_trajectory_picture_has_each_run(task):
+def test_a_trajectory_picture_has_each_run(crates):
     """A run goes through the picture where it went through the world, y up."""
-    pictures, view = pictures_of(task.setting), pictures_of(task.setting).backdrop()
+    pictures, view = crates.pictures(), crates.pictures().backdrop()
     poses = np.array([(-0.6, 0.0, 0.0), (-0.6, 0.4, 1.5), (-0.2, 0.4, 0.0)])
     image = pictures.trajectories([poses], ["out of time"], ["one"])
     (u, v), (left, _), (_, low) = view.whole().at(
@@ -114,11 +101,11 @@ def test_a_trajectory_picture_has_each_run(task):
 
 
 @pytest.mark.slow
-def test_frames_show_what_the_sensors_read(task, warm, tmp_path):
+def test_frames_show_what_the_sensors_read(crates, warm, tmp_path):
     """A video's frames are of one size, and a ray ends where its reading says."""
-    verify(RAM, task, profile="policy", judge=warm, out=tmp_path)
-    rollout = drive_disturbed(task, RAM.encode(), 0, Disturbance(), "auto").rollout
-    frames = list(pictures_of(task.setting).frames(rollout, 2))
+    verify(RAM, crates, profile="policy", judge=warm, out=tmp_path)
+    rollout = drive_disturbed(crates, RAM.encode(), 0, Disturbance(), "auto").rollout
+    frames = list(crates.pictures().frames(rollout, 2))
     assert len({frame.shape for frame in frames}) == 1
     assert len(frames) == (rollout.trajectory.steps + 1) // 2 + 1
     assert np.allclose(reaches(TABLE[:, 1].astype(np.float32)), TABLE[:, 0], atol=1e-6)
@@ -126,40 +113,40 @@ def test_frames_show_what_the_sensors_read(task, warm, tmp_path):
 
 
 @pytest.mark.slow
-def test_robust_episodes_are_what_the_environment_draws(task, source, warm):
+def test_disturbed_episodes_are_what_the_environment_draws(crates, crates_source, warm):
     """Disturbed episodes: reproducible, in metres, and counted."""
-    report = verify_episodes(source, task, 6, judge=warm)
+    report = verify_episodes(crates_source, crates, 6, judge=warm)
     assert report.provenance.unit == "m"
-    assert report.successes + len(report.failed_seeds) == 6
-    again = verify_episodes(source, task, 6, judge=warm)
+    assert report.successes + len(report.failures) == 6
+    again = verify_episodes(crates_source, crates, 6, judge=warm)
     figures = [e.model_dump(exclude={"cpu_seconds"}) for e in report.worst]
     assert figures == [e.model_dump(exclude={"cpu_seconds"}) for e in again.worst]
     for episode in report.worst:
-        env = task.disturbed_env(Disturbance())
+        env = crates.disturbed_env(Disturbance())
         _, info = env.reset(seed=episode.seed)
         assert episode.d0 == round(info["path_distance"], 4)
 
 
-def test_a_policy_drives_the_environment(task, controller):
+def test_a_policy_drives_the_environment(crates, controller):
     """`env.step(policy(obs))` with a loaded controller, from Python."""
-    env = gym.make("tdac_envs:TDAC-EPuck-v0", **task.env_kwargs())
+    env = gym.make("tdac_envs:TDAC-EPuck-v0", **crates.env_kwargs())
     observation, _ = env.reset(seed=0)
-    with load_controller(controller, task) as policy:
+    with load_controller(controller, crates) as policy:
         for _ in range(30):
             observation, _, terminated, _, _ = env.step(policy(observation))
     assert not terminated
     assert observation["pose"][0] > -0.6
 
 
-def test_a_run_is_self_contained(task, tmp_path, warm):
+def test_a_run_is_self_contained(crates, tmp_path, warm):
     """A synthesis leaves the world, its original, the picture and a task that loads."""
-    run = synthesize(task, out=tmp_path / "run", iterations=2, judge=warm)
+    run = synthesize(crates, out=tmp_path / "run", iterations=2, judge=warm)
     assert run.verified
     folder = tmp_path / "run"
     names = {path.name for path in folder.iterdir()}
     assert {"world.wbt", "original.wbt", "trajectory.png", "params.json"} <= names
     assert (folder / "original.wbt").read_bytes() == world_file("crates").read_bytes()
-    assert load_run(folder).task_sha256 == load_task(folder).sha256() == task.sha256()
+    assert load_run(folder).task_sha256 == load_task(folder).sha256() == crates.sha256()
 
 
 @pytest.mark.slow

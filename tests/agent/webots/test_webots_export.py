@@ -13,7 +13,7 @@ import yaml
 from worlds_for_controllers import OPEN
 
 from tdac_agent import load_task
-from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
+from tdac_agent.environments.epuck.builtin import EPuckParameters, template_for
 from tdac_agent.environments.epuck.export import POLICY, export_webots, project_name
 from tdac_agent.evaluation.policy import load_controller
 from tdac_agent.runs.run_record import Run
@@ -196,7 +196,9 @@ def test_here_it_takes_as_many_steps(verified, tmp_path):
 def test_builtin_controllers_of_bundled_worlds(tmp_path, world):
     """A controller of the built-in learner takes as many steps ± 5 %, also bare."""
     spec = {"schema": 1, "env": "TDAC-EPuck-v0", "world": world, "name": world}
-    source = render_epuck(EPuckParameters(), load_task_of(spec, tmp_path).nominal)
+    source = template_for(load_task_of(spec, tmp_path).nominal).render(
+        EPuckParameters()
+    )
     folder = make_run(tmp_path / "run", spec, source)
     project = export_webots(folder, tmp_path / "out")
     stage = open_stage(project.world)

@@ -145,42 +145,37 @@ def task_that_calls_itself_maze(place: Place) -> list[str | Path]:
     return ["verify", place.run]
 
 
-@attack(SUITE)
-def tests_of_a_run(place: Place) -> list[str | Path]:
-    place.set_suite("test_more.py", FORGED_TEST)
-    return ["verify", place.run]
+def brings_tests(name: str, *words: str, file: str = "conftest.py") -> None:
+    """Adds a command on a run whose task has tests of its own.
+
+    Args:
+        name: Name of the attack.
+        words: The command; `RUN` stands for the folder of the run.
+        file: The test file besides `test_own.py`.
+    """
+
+    def build(place: Place) -> list[str | Path]:
+        text = CONFTEST if file == "conftest.py" else FORGED_TEST
+        shutil.copy(place.set_suite(file, text), place.run / "nice.yaml")
+        return [word.replace("RUN", str(place.run)) for word in words]
+
+    ATTACKS.append(Foreign(name, build, SUITE))
 
 
-@attack(SUITE)
-def conftest_of_a_run(place: Place) -> list[str | Path]:
-    place.set_suite("conftest.py", CONFTEST)
-    return ["verify", place.run]
-
-
-@attack(SUITE)
-def tests_beside_a_controller(place: Place) -> list[str | Path]:
-    place.set_suite("conftest.py", CONFTEST)
-    return ["verify", place.run / "controller.py"]
-
-
-@attack(SUITE)
-def tests_of_a_task_file(place: Place) -> list[str | Path]:
-    file = place.set_suite("conftest.py", CONFTEST)
-    shutil.copy(file, place.run / "nice.yaml")
-    words = ["--task", place.run / "nice.yaml"]
-    return ["verify", place.run / "controller.py", *words]
-
-
-@attack(SUITE)
-def tests_that_are_to_prove_themselves(place: Place) -> list[str | Path]:
-    place.set_suite("conftest.py", CONFTEST)
-    return ["check-suite", "--task", place.run, "--repeats", "1"]
-
-
-@attack(SUITE)
-def tests_of_a_task_for_synthesis(place: Place) -> list[str | Path]:
-    place.set_suite("conftest.py", CONFTEST)
-    return ["synth", "--task", place.run / "task.yaml", "-K", "1", "-J", "0"]
+brings_tests("tests_of_a_run", "verify", "RUN", file="test_more.py")
+brings_tests("conftest_of_a_run", "verify", "RUN")
+brings_tests("tests_beside_a_controller", "verify", "RUN/controller.py")
+brings_tests(
+    "tests_of_a_task_file", "verify", "RUN/controller.py", "--task", "RUN/nice.yaml"
+)
+brings_tests(
+    "tests_that_are_to_prove_themselves",
+    *("check-suite", "--task", "RUN", "--repeats", "1"),
+)
+brings_tests(
+    "tests_of_a_task_for_synthesis",
+    *("synth", "--task", "RUN/task.yaml", "-K", "1", "-J", "0"),
+)
 
 
 @attack(SUITE, works=False)
@@ -190,13 +185,57 @@ def tests_of_a_run_that_goes_on(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
-@attack(
-    r"run the program `touch .*` as its learner.* --learner 'command:touch .*--trust"
+def claims(name: str, wants: str, *, works: bool = False, **fields: object) -> None:
+    """Adds the resumption of a run with other fields in its `run.json`.
+
+    Args:
+        name: Name of the attack.
+        wants: As of `Foreign`.
+        works: As of `Foreign`.
+        fields: The fields; texts have the places that an attack is to reach.
+    """
+
+    def build(place: Place) -> list[str | Path]:
+        filled = {
+            key: place.filled(value) if isinstance(value, str) else value
+            for key, value in fields.items()
+        }
+        place.change(**filled)
+        return ["synth", "--resume", place.run]
+
+    ATTACKS.append(Foreign(name, build, wants, works=works))
+
+
+TOUCH = "command:touch @TARGET@/came"
+DRAWS = "command:true -c \x1b[2J\x1b[Hverified: 41 of 41"
+claims(
+    "program_as_learner",
+    r"run the program `touch .*` as its learner.* --learner 'command:touch .*--trust",
+    works=True,
+    learner=TOUCH,
+    optimizer=TOUCH,
 )
-def program_as_learner(place: Place) -> list[str | Path]:
-    program = place.filled("command:touch @TARGET@/came")
-    place.change(learner=program, optimizer=program)
-    return ["synth", "--resume", place.run]
+claims(
+    "program_that_draws_on_the_terminal",
+    r"run the program `true -c .\[2J.\[Hverified: 41 of 41` as its learner",
+    learner=DRAWS,
+    optimizer=DRAWS,
+    mark="\x1b[2J",
+)
+claims(
+    "half_of_a_character",
+    "run.json: a string has a lone surrogate",
+    learner="command:true \udc1b",
+)
+claims(
+    "seed_that_suits_a_tape", r"choose the jittered starts \(seed 0\).*--seed 0", seed=0
+)
+claims("limit_of_cost", r"spend up to 1e\+06 USD.*--max-cost 1e\+06", max_cost=1e6)
+claims(
+    "flags_of_a_limit",
+    r"enough.max_cost: Input should be a valid number",
+    enough="--max-cost 1 --tier rlimits",
+)
 
 
 @attack(r"run the program `touch .*` as its optimizer.* --optimizer .*--trust", code=2)
@@ -204,21 +243,6 @@ def program_as_optimizer(place: Place) -> list[str | Path]:
     (place.run / "given.py").write_text(STILL)
     program = place.filled("command:touch @TARGET@/came")
     place.change(optimizer=program, given_sha256=digest_of(STILL), max_tokens=10**6)
-    return ["synth", "--resume", place.run]
-
-
-@attack(
-    r"run the program `true -c .\[2J.\[Hverified: 41 of 41` as its learner", works=False
-)
-def program_that_draws_on_the_terminal(place: Place) -> list[str | Path]:
-    program = "command:true -c \x1b[2J\x1b[Hverified: 41 of 41"
-    place.change(learner=program, optimizer=program, mark="\x1b[2J")
-    return ["synth", "--resume", place.run]
-
-
-@attack("run.json: a string has a lone surrogate", works=False)
-def half_of_a_character(place: Place) -> list[str | Path]:
-    place.change(learner="command:true \udc1b")
     return ["synth", "--resume", place.run]
 
 
@@ -237,49 +261,29 @@ def server_that_gets_the_key(place: Place) -> list[str | Path]:
     return ["synth", "--resume", place.run]
 
 
-@attack(r"choose the jittered starts \(seed 0\).*--seed 0", works=False)
-def seed_that_suits_a_tape(place: Place) -> list[str | Path]:
-    place.change(seed=0)
-    return ["synth", "--resume", place.run]
-
-
-@attack(r"spend up to 1e\+06 USD.*--max-cost 1e\+06", works=False)
-def limit_of_cost(place: Place) -> list[str | Path]:
-    place.change(max_cost=1e6)
-    return ["synth", "--resume", place.run]
-
-
-@attack(r"enough.max_cost: Input should be a valid number", works=False)
-def flags_of_a_limit(place: Place) -> list[str | Path]:
-    place.change(enough="--max-cost 1 --tier rlimits")
-    return ["synth", "--resume", place.run]
-
-
 LINK = r"is a link that leads out of \S+, and this command writes there"
 
 
-@attack(LINK, works=False)
-def journal_that_is_elsewhere(place: Place) -> list[str | Path]:
-    (place.run / "journal.jsonl").unlink()
-    (place.run / "journal.jsonl").symlink_to(place.target / "came")
-    place.change()
-    return ["synth", "--resume", place.run]
+def leads_elsewhere(name: str, to: str = "") -> None:
+    """Adds the resumption of a run of which a file or a folder is a link."""
+
+    def build(place: Place) -> list[str | Path]:
+        old = place.run / name
+        if old.is_dir():
+            shutil.rmtree(old)
+        else:
+            old.unlink()
+        old.symlink_to(place.target / to)
+        place.change()
+        return ["synth", "--resume", place.run]
+
+    stem = name.partition(".")[0]
+    ATTACKS.append(Foreign(f"{stem}_that_is_elsewhere", build, LINK, works=False))
 
 
-@attack(LINK, works=False)
-def iterations_that_are_elsewhere(place: Place) -> list[str | Path]:
-    shutil.rmtree(place.run / "iterations")
-    (place.run / "iterations").symlink_to(place.target)
-    place.change()
-    return ["synth", "--resume", place.run]
-
-
-@attack(LINK, works=False)
-def blobs_that_are_elsewhere(place: Place) -> list[str | Path]:
-    shutil.rmtree(place.run / "blobs")
-    (place.run / "blobs").symlink_to(place.target)
-    place.change()
-    return ["synth", "--resume", place.run]
+leads_elsewhere("journal.jsonl", "came")
+leads_elsewhere("iterations")
+leads_elsewhere("blobs")
 
 
 @attack("claims to be verified: test it with tdac verify", works=False)

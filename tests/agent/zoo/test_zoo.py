@@ -1,7 +1,6 @@
 """Every attack is refused and harms nothing; every good controller passes."""
 
 import re
-import signal
 from pathlib import Path
 
 import offers
@@ -98,28 +97,15 @@ def test_each_surface_has_its_attacks():
         assert sum(name.startswith(f"{surface}/") for name in names) >= least
 
 
-@pytest.fixture
-def impatient():
-    """Interrupts a test that waits for what never comes."""
-
-    def late(number, frame):
-        raise TimeoutError(f"still at work after {SECONDS} s")
-
-    before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(SECONDS)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
-
-
 @pytest.mark.slow_after(3)
 @pytest.mark.parametrize("offer", AT_ONCE, ids=str)
-def test_a_hostile_file_is_refused_in_one_line(offer, tdac, tmp_path, impatient):
+def test_a_hostile_file_is_refused_in_one_line(offer, tdac, tmp_path, alarm):
     """With exit code 2, or used without harm; no traceback, nothing is written."""
     if offer.needs:
         pytest.importorskip(offer.needs)
     here = tmp_path / "here"
     offer.make(here)
+    alarm(SECONDS)  # ends a wait for what never comes
     before = sorted(here.rglob("*"))
     code, _, errors = tdac(*offer.words)
     assert offers.line_problems(offer, code, errors) == []

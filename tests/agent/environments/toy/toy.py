@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tdac_agent.environments.map2d.entry import Map2D
+from tdac_agent.environments.map2d.entry import Map2DEnvironment
 from tdac_agent.environments.map2d.setting import Map2DSetting, open_map_task
 from tdac_envs.map2d.env import Map2DEnv
 
@@ -19,7 +19,7 @@ class CrossedSetting(Map2DSetting):
         return CrossedEnv(**{**self.env_kwargs(), **options})
 
 
-class Crossed(Map2D):
+class Crossed(Map2DEnvironment):
     id = "Toy-Crossed-v0"
     folder = Path(__file__).parent
 

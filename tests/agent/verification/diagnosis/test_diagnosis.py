@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from driving import drive
+from driving import always, judged, pattern
 
-from tdac_agent.environments.map2d.touch import nearest_corner, nearest_touch
+from tdac_agent.environments.map2d.surroundings import nearest_corner, nearest_touch
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.touch import side_of, where_on_the_wall
 from tdac_envs.drive.task import Pose
@@ -24,26 +24,10 @@ def room(start=(60, 60, 0), goal=(170, 60), walls=(), radius=8.0, **arguments):
     return Map2DEnv(cells, start, goal, robot_radius=radius, **arguments)
 
 
-def always(left, right):
-    return lambda obs: (left, right)
-
-
-def pattern(*actions):
-    """Repeats (steps, left, right) blocks."""
-    once = itertools.chain.from_iterable([a[1:]] * a[0] for a in actions)
-    blocks = itertools.cycle(list(once))
-    return lambda obs: next(blocks)
-
-
 def first(steps, action, then):
     """One action for some steps, then a policy."""
     count = itertools.count()
     return lambda obs: action if next(count) < steps else then(obs)
-
-
-def judged(env, policy, steps=None, **arguments):
-    rollout = drive(env, policy, steps=steps, **arguments)
-    return rollout, diagnose(rollout, env.nominal)
 
 
 @pytest.mark.parametrize(

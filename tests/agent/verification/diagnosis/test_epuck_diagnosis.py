@@ -6,10 +6,9 @@ import re
 
 import numpy as np
 import pytest
-from driving import drive
+from driving import always, judged, pattern
 
 from tdac_agent.tasks.units import METRES, PIXELS
-from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.surroundings import surroundings_of
 from tdac_envs.drive.task import Pose
 from tdac_envs.epuck.env import EPuckEnv
@@ -32,21 +31,6 @@ def env_with(*shapes, start=(0.0, 0.0, 0.0), goal=(0.7, 0.2), names=(), **argume
         obstacles=things,
     )
     return EPuckEnv(world, **arguments)
-
-
-def always(left, right):
-    return lambda obs: (left, right)
-
-
-def pattern(*actions):
-    """Repeats (steps, left, right) blocks."""
-    blocks = itertools.cycle([a[1:] for a in actions for _ in range(a[0])])
-    return lambda obs: next(blocks)
-
-
-def judged(env, policy, steps=None, **arguments):
-    rollout = drive(env, policy, steps=steps, **arguments)
-    return rollout, diagnose(rollout, env.nominal)
 
 
 @pytest.mark.parametrize(

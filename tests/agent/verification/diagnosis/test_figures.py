@@ -6,14 +6,14 @@ import re
 import cv2
 import numpy as np
 import pytest
-from driving import drive
 from planted import PLANTS, fail
 
-from tdac_agent.environments.map2d.reference import Reference
+from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.figures import event_of
 from tdac_agent.verification.diagnosis.report import Episode, Report
+from tdac_agent.verification.judge.drivers import ReferenceDriver
 from tdac_agent.verification.verify import verify
 from tdac_envs.drawing.backdrop import CLOSE_UP
 from tdac_envs.drawing.canvas import TRAIL
@@ -156,9 +156,9 @@ def test_held_out_caption():
 def recorded(task):
     """A controller that plays the reference's actions back from the nominal start."""
     env = task.make_env()
-    reference = Reference(task.nominal)
-    reference.reset(task.nominal.start)
-    rollout = drive(env, lambda obs: reference.act(env.pose()))
+    record = Record(env, task.nominal.start, task.nominal.horizon)
+    driver = ReferenceDriver(env)
+    rollout = run_policy(driver, record, "x", held_out=False, deadline=math.inf)
     assert rollout.reached
     actions = [tuple(row) for row in rollout.trajectory.actions.tolist()]
     return (

@@ -8,7 +8,6 @@ from driving import drive
 from small import write_small_task
 
 from tdac_agent import load_task
-from tdac_agent.episodes.pictures import pictures_of
 from tdac_agent.verification.diagnosis.figures import contact_of
 from tdac_envs.drawing.canvas import MOVER
 from tdac_envs.drawing.closeup import Event, run_picture
@@ -39,7 +38,7 @@ def dark(picture):
 
 
 def on_frame(task, places):
-    return pictures_of(task.setting).backdrop().whole().canvas.to_frame(places)
+    return task.pictures().backdrop().whole().canvas.to_frame(places)
 
 
 def test_ghosts_are_those_of_a_second(rollout):
@@ -63,7 +62,7 @@ def test_the_contact_is_at_the_mover(task, rollout):
 @pytest.mark.parametrize("kind", ["trajectory", "failure", "frame"])
 def test_each_picture_has_the_mover(task, rollout, kind):
     """Its rim is where it was at the end; without it there is none."""
-    trajectory, pictures = rollout.trajectory, pictures_of(task.setting)
+    trajectory, pictures = rollout.trajectory, task.pictures()
     poses, ghosts = trajectory.poses, trajectory.ghosts(trajectory.steps)
     for movers in (ghosts, []):
         if kind == "trajectory":

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tdac_agent.environments.epuck.world_copies import WorldOracle
+from tdac_agent.environments.epuck.oracle import WorldOracle
 from tdac_envs import load_world
 from tdac_envs.worlds.bundled import world_file
 

@@ -9,8 +9,6 @@ from functools import partial
 
 import pytest
 
-from tdac_agent import load_task
-from tdac_agent.environments.epuck.builtin import EPuckParameters, render_epuck
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.verification.verify import verify
 
@@ -176,17 +174,6 @@ WRONG = {
 
 
 @pytest.fixture(scope="module")
-def task():
-    """A rectangular world that is soon crossed."""
-    return load_task("epuck-crates")
-
-
-@pytest.fixture(scope="module")
-def source(task):
-    return render_epuck(EPuckParameters(), task=task.nominal)
-
-
-@pytest.fixture(scope="module")
 def rows(tmp_path_factory):
     """The shipped suite but for its episodes, which say nothing about the rows."""
     folder = tmp_path_factory.mktemp("rows")
@@ -196,9 +183,9 @@ def rows(tmp_path_factory):
 
 
 @pytest.fixture
-def checked(task, rows, warm):
+def checked(crates, rows, warm):
     """Checks a source against the rows."""
-    return partial(verify, task=task, profile="paper", shipped=rows, judge=warm)
+    return partial(verify, task=crates, profile="paper", shipped=rows, judge=warm)
 
 
 def failed(report, group):
@@ -209,10 +196,10 @@ def failed(report, group):
     }
 
 
-def test_the_good_one_passes(task, source, warm):
+def test_the_good_one_passes(crates, crates_source, warm):
     """What the variants are made of is verified, in both profiles."""
     for profile, tests in (("paper", 46), ("policy", 21)):
-        report = verify(source, task, profile=profile, judge=warm)
+        report = verify(crates_source, crates, profile=profile, judge=warm)
         assert report.failures == ()
         assert report.verdict.expected == tests
         assert report.provenance.suite == "epuck"
@@ -221,10 +208,10 @@ def test_the_good_one_passes(task, source, warm):
 
 @pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_one_fails_where_it_is_wrong(checked, source, name):
+def test_a_wrong_one_fails_where_it_is_wrong(checked, crates_source, name):
     """Exactly the unit tests that are about it fail."""
     wrapper, tests = WRONG[name]
-    report = checked(source + wrapper)
+    report = checked(crates_source + wrapper)
     assert failed(report, "unit") == set(tests)
     assert failed(report, "static") == set()
 
@@ -234,20 +221,20 @@ def test_a_wrong_one_fails_where_it_is_wrong(checked, source, name):
     "name",
     ["parse_world", "build_grid", "astar", "compute_wheel_speeds", "run_episode"],
 )
-def test_a_missing_function_is_named(checked, source, name):
+def test_a_missing_function_is_named(checked, crates_source, name):
     """The static contract names each function that is not there."""
-    report = checked(source.replace(f"def {name}(", f"def other_{name}("))
+    report = checked(crates_source.replace(f"def {name}(", f"def other_{name}("))
     message = next(f.message for f in report.failures if "entry_points" in f.test)
     assert name in message
 
 
 @pytest.mark.slow
-def test_speeds_are_metres_a_second(task, source, warm):
+def test_speeds_are_metres_a_second(crates, crates_source, warm):
     """`run_episode` that reports rad/s disagrees with the judge's record."""
-    spoiled = source + (
+    spoiled = crates_source + (
         "\n_run = run_episode\ndef run_episode(env, max_steps):\n"
         "    told = _run(env, max_steps)\n"
         "    told['speeds'] = [50.0 * v for v in told['speeds']]\n    return told\n"
     )
-    report = verify(spoiled, task, profile="paper", paper=True, judge=warm)
+    report = verify(spoiled, crates, profile="paper", paper=True, judge=warm)
     assert failed(report, "end to end") == {"test_run_episode_agrees_with_the_judge"}

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tdac_agent.environments.map2d.builtin import Parameters, render_controller
+from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.verification.suite.several import Several
 from tdac_agent.verification.verify import verify
 
@@ -23,7 +23,7 @@ def test_what_fails_is_collected():
 def test_feedback_names_every_wrong_entry(small_task, warm):
     """Of `run_episode`: with where to read what is wanted; of constants: each."""
     robot = small_task.params.robot
-    source = render_controller(Parameters(), robot, small_task.nominal.dt)
+    source = template_for(robot, small_task.nominal.dt).render(MapParameters())
     wrong = source.replace(f"N_RAYS = {robot.n_rays}", "N_RAYS = 7")
     wrong = wrong.replace("SENSOR_FOV_DEG = ", "SENSOR_FOV_DEG = 1 + ")
     wrong += (

@@ -6,7 +6,7 @@ import pytest
 from small import QUICK, write_small_task
 
 from tdac_agent import load_task
-from tdac_agent.environments.map2d.builtin import Parameters, render_controller
+from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.tasks.task import write_workdir
 from tdac_agent.verification.diagnosis.report import Report
@@ -236,7 +236,7 @@ def test_after(controller):
     folder.mkdir()
     (folder / "test_mine.py").write_text(text)
     task = load_task(write_small_task(tmp_path / "task"))
-    source = render_controller(Parameters(), task.params.robot, 0.05) + hang
+    source = template_for(task.params.robot, 0.05).render(MapParameters()) + hang
     # A host may have kept the CPU from what computes, which is rightly tried again.
     for _ in range(4 if "while" in body else 1):
         (folder / "count").unlink(missing_ok=True)

