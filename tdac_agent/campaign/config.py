@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.choice import OFFLINE, check_name
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.runs.run_record import Setting
+from tdac_agent.runs.run_record import LoopSetting
 from tdac_agent.set_synthesis.synthesize import EPISODES, FEEDBACK_EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.storage.shipped import shipped, shipped_names
@@ -44,13 +44,18 @@ class CampaignConfig(BaseModel):
     optimizers: tuple[str, ...] = Field(
         (SAME,), min_length=1, description="As for --optimizer; `same`: the learner."
     )
-    settings: tuple[Setting, ...] = Field(("dual tier",), min_length=1)
+    settings: tuple[LoopSetting, ...] = Field(("dual tier",), min_length=1)
     prompts: tuple[str, ...] = Field(
         ("full",), min_length=1, description="As for --prompt."
     )
     runs: int = Field(5, ge=1, description="R: runs of each kind.")
     iterations: int = Field(20, ge=1, description="K, for the settings that repair.")
-    patience: int = Field(1, ge=1, description="J, for the settings that edit.")
+    patience: int = Field(
+        1,
+        ge=1,
+        description="J, for the settings that edit; without edits, the "
+        "settings are `prompt only`, `best of N` and `one shot`.",
+    )
     samples: int | None = Field(
         None,
         ge=2,

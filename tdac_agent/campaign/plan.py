@@ -24,7 +24,7 @@ from tdac_agent.prompting.prompt import (
 )
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.runs.ownership import load_task
-from tdac_agent.runs.run_record import Setting
+from tdac_agent.runs.run_record import LoopSetting
 from tdac_agent.tasks.setting import Setting as TaskSetting
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import bundled_task
@@ -63,7 +63,7 @@ class Cell:
     task_name: str
     learner: str
     optimizer: str
-    setting: Setting
+    setting: LoopSetting
     prompt: str
     iterations: int
     patience: int
@@ -229,7 +229,7 @@ def _cell(
     optimizer: str,
     prompt: str,
     template: str,
-    setting: Setting,
+    setting: LoopSetting,
 ) -> Cell:
     """One kind of run; its folder name has a hash of all that its runs depend on."""
     iterations, patience, refine = loop_of(config, setting)
@@ -290,7 +290,7 @@ def _hashes(about: Task | TaskSet) -> dict[str, str]:
     return {"task": about.sha256(), "suite": suite_sha256(about)}
 
 
-def loop_of(config: CampaignConfig, setting: Setting) -> tuple[int, int, bool]:
+def loop_of(config: CampaignConfig, setting: LoopSetting) -> tuple[int, int, bool]:
     """K, J and whether failures become rules, for a setting."""
     iterations, edits = config.iterations, config.patience
     samples = config.samples or iterations * (edits + 2)

@@ -112,11 +112,12 @@ def test_a_setting_is_a_loop_and_the_loop_tells_the_setting(setting, loop, writt
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"runs": 0}, "few.yaml: runs: .*expected at least 1, got 0"),
-        (
-            {"runz": 3},
-            r"few.yaml: runz: unknown key \(did you mean 'runs'\?\)",
-        ),
+        ({"runs": 0}, r"few.yaml: runs: expected at least 1, got 0 \(R: runs of each"),
+        ({"runz": 3}, r"few.yaml: runz: unknown key \(did you mean 'runs'\?\)"),
+        ({"R": 3}, r"few.yaml: R: unknown key \(did you mean 'runs'\?\); known: runs,"),
+        ({"refine": True}, "few.yaml: refine: unknown key; known: .*settings, "),
+        ({"patience": 0}, "expected at least 1, got 0 .*`prompt only`.*`one shot`"),
+        ({"settings": ["agent"]}, "settings.0: Input should be 'dual tier'"),
         ({"learners": ["nosuch"]}, "unknown model 'nosuch'; known: builtin"),
         ({"tasks": ["small", "small"]}, "tasks: 'small' is listed twice"),
         ({"learners": ["manual:here"]}, "for one run, not for a campaign"),
