@@ -8,8 +8,8 @@ from typing import Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from tdac_agent.errors import ProviderError, RunError
-from tdac_agent.models.choice import OFFLINE, check_name
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
+from tdac_agent.models.ready import needs_limit
 from tdac_agent.runs.run_record import LoopSetting
 from tdac_agent.set_synthesis.synthesize import EPISODES, FEEDBACK_EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
@@ -97,15 +97,13 @@ class CampaignConfig(BaseModel):
                 raise ValueError(f"{name}: {again.pop()!r} is listed twice")
         if any(name.partition(":")[0] == "manual" for name in self.models):
             raise ValueError("manual: works for one run, not for a campaign")
-        for name in self.models:
-            try:
-                check_name(name)
-            except ProviderError as error:
-                raise ValueError(str(error)) from None
-        online = sorted(n for n in self.models if n.partition(":")[0] not in OFFLINE)
-        if online and self.max_cost is None and self.max_tokens is None:
+        try:
+            paid = sorted(n for n in self.models if needs_limit(n, self.base_url))
+        except ProviderError as error:
+            raise ValueError(str(error)) from None
+        if paid and self.max_cost is None and self.max_tokens is None:
             raise ValueError(
-                f"max_cost: required for {online[0]}: a limit in USD for all runs"
+                f"max_cost: required for {paid[0]}: a limit in USD for all runs"
             )
         return self
 

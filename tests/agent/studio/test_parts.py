@@ -17,6 +17,9 @@ import pytest
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
+from nicegui import Client
+from nicegui.page import page
+
 import tdac_agent
 from tdac_agent.cli.flags import TaskFlags
 from tdac_agent.models.budget import Enough
@@ -39,6 +42,7 @@ from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.shelf import unpack
+from tdac_agent.studio.pages.writers import Writers
 from tdac_agent.studio.standing import (
     about_given,
     asked_by,
@@ -49,6 +53,22 @@ from tdac_agent.studio.standing import (
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 SECONDS = 120
+
+
+def test_a_local_model_needs_neither_key_nor_limit(monkeypatch):
+    """What is missing is said as the command would; the limit is for paid models."""
+    for name in ("OPENAI_API_KEY", "OPENAI_BASE_URL"):
+        monkeypatch.delenv(name, raising=False)
+    with Client(page("/")):
+        writers = Writers(Path(), lambda: None)
+        writers._who.value, writers._model.value = "openai", "qwen3"
+        assert "set the environment variable OPENAI_API_KEY" in writers.problem()
+        assert writers.words()[2:] == ["--max-cost", "2"]
+        writers._server.value = "http://localhost:11434/v1"
+        assert writers.problem() is None
+        assert writers.words()[2:] == ["--base-url", "http://localhost:11434/v1"]
+        writers._server.value = "http://["
+        assert "is not a valid URL" in writers.problem()
 
 
 def flags_of(words):
