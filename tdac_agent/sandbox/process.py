@@ -12,12 +12,12 @@ from types import TracebackType
 from typing import Any, Protocol
 
 from tdac_agent.sandbox.conversation import Conversation
-from tdac_agent.sandbox.ending import ChildUsage, ProcessEnd, usage_of_tree
+from tdac_agent.sandbox.ending import ChildUsage, ProcessEnd
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
 from tdac_agent.sandbox.inner.wire import Handle, Kind, is_name
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
-from tdac_agent.sandbox.own_time import OwnTime
-from tdac_agent.sandbox.waiting import RunQueue
+from tdac_agent.sandbox.time_limit import TimeLimit
+from tdac_agent.sandbox.waiting import RunQueue, usage_of_tree
 from tdac_agent.sandbox.zygote import Forked
 
 
@@ -81,8 +81,8 @@ class Child:
         self.controller_pid = forked.pid
         self._line = forked.line
         end, root = ProcessEnd(forked), forked.folder.root
-        channel, lifeline = forked.channel, forked.lifeline
-        self._talk = Conversation(channel, lifeline, limits, root, end)
+        ends = forked.channel, forked.line, forked.lifeline
+        self._talk = Conversation(*ends, limits, root, end)
         weakref.finalize(self, end)
 
     def __enter__(self) -> Child:
@@ -259,14 +259,14 @@ class Child:
             timeout: Seconds that the controller may compute, and sleep, in total.
             max_left: Returns the current upper bound on the seconds left.
         """
-        own = OwnTime(timeout, self._look, RunQueue("thread-self").waited)
+        limit = TimeLimit(timeout, self._line.measure, RunQueue("thread-self").waited)
         left = max_left()
         reply: tuple[Kind, Any] = (kind, value)
         while True:
-            own.begin_turn(left)
-            self._talk.send(*reply, phase, own.left, timeout)
-            asked, value = self._talk.receive(phase, own.left, timeout)
-            left -= own.end_turn()
+            limit.start(left)
+            self._talk.send(*reply, phase, limit.left, timeout)
+            asked, value = self._talk.receive(phase, limit.left, timeout)
+            left -= limit.stop()
             if asked == Kind.VALUE:
                 return value
             if asked not in {Kind.ENV_RESET, Kind.ENV_STEP}:
@@ -280,10 +280,6 @@ class Child:
                 self.close()
                 raise
             left = min(left, max_left())
-
-    def _look(self) -> tuple[float, float, bool]:
-        """Return CPU time, run-queue wait time, and whether it is ready."""
-        return self.cpu_seconds(), self._line.waited(), self._line.is_ready()
 
 
 def _split(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import functools
 import multiprocessing
 import os
 import shutil
@@ -155,9 +156,10 @@ class Zygote:
             self._counts[GIVEN] += 1
             self._counts[ALIVE] += 1
         write, read, printed, lifeline = outer
-        frame, output, line = limits.frame_bytes, limits.output_bytes, RunQueue(pid)
-        channel = Channel(write, read, printed, frame, output, line)
-        return Forked(pid, folder, channel, line, lifeline, lambda: self._reap(number))
+        sizes = limits.frame_bytes, limits.output_bytes
+        channel = Channel(write, read, printed, *sizes)
+        reap = functools.partial(self._reap, number)
+        return Forked(pid, folder, channel, RunQueue(pid), lifeline, reap)
 
     @property
     def ended(self) -> bool:
