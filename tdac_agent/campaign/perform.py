@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.campaign.gate import gated
+from tdac_agent.campaign.concurrency import limited_provider
 from tdac_agent.campaign.plan import SET_LIMITS, PlannedRun, setting_of
 from tdac_agent.errors import Fault
 from tdac_agent.executors.executor import Work
@@ -178,8 +178,8 @@ def _synthesize(
         key_over_http=terms.key_over_http,
     )
     gates, same = Path(terms.folder) / "gates", models[0] is models[1]
-    learner = gated(models[0], gates, terms.workers)
-    optimizer = learner if same else gated(models[1], gates, terms.workers)
+    learner = limited_provider(models[0], gates, terms.workers)
+    optimizer = learner if same else limited_provider(models[1], gates, terms.workers)
     folder = terms.runs / planned.name
     folder.parent.mkdir(parents=True, exist_ok=True)
     wanted: dict[str, Any] = {

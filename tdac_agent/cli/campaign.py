@@ -22,7 +22,7 @@ from tdac_agent.campaign.drive import (
 )
 from tdac_agent.campaign.perform import Terms
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
-from tdac_agent.campaign.progress import Progress
+from tdac_agent.campaign.progress import CampaignProgress
 from tdac_agent.cli.campaign_live import LiveView
 from tdac_agent.cli.campaign_table import make_console, progress_line
 from tdac_agent.cli.console import Console
@@ -156,7 +156,7 @@ def check_models(
 
 
 def _run_remaining(
-    progress: Progress,
+    progress: CampaignProgress,
     remaining: list[PlannedRun],
     terms: Terms,
     executor: str,
@@ -167,7 +167,7 @@ def _run_remaining(
 
 
 def _print_heading(
-    console: Console, config: CampaignConfig, progress: Progress, folder: Path
+    console: Console, config: CampaignConfig, progress: CampaignProgress, folder: Path
 ) -> None:
     kinds = len(progress.tallies)
     console.print(
@@ -193,7 +193,7 @@ def _print_notes(console: Console, plan: Plan, terms: Terms) -> None:
 
 def _print_ending(
     console: Console,
-    progress: Progress,
+    progress: CampaignProgress,
     folder: Path,
     wanted: CampaignCommand,
     tables: list[Path],
@@ -211,7 +211,7 @@ def _print_ending(
         console.print(f"  to continue{more}: {command}", soft_wrap=True)
 
 
-def _as_json(progress: Progress, folder: Path) -> dict[str, Any]:
+def _as_json(progress: CampaignProgress, folder: Path) -> dict[str, Any]:
     return {
         "folder": str(folder),
         "planned": progress.planned,
@@ -229,7 +229,7 @@ def _as_json(progress: Progress, folder: Path) -> dict[str, Any]:
     }
 
 
-def _exit_code(progress: Progress) -> int:
+def _exit_code(progress: CampaignProgress) -> int:
     if progress.finished == progress.planned:
         return 0
     return 4 if progress.exhausted else 3

@@ -54,7 +54,7 @@ class PlanRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class CostLimits:
     """The limits of all runs together; None if there is none.
 
     Attributes:
@@ -98,7 +98,7 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
     if progress.before:
         done = f"{progress.before} of {progress.planned} runs in {folder} have already"
         print_sentences(console, f"{done} finished; they are counted above, too")
-    limits = Limits(config.max_cost, config.max_tokens)
+    limits = CostLimits(config.max_cost, config.max_tokens)
     for line in _lines(rows, limits, prices):
         print_sentences(console, line)
     for line in model_warnings(models_of(plan.cells)):
@@ -145,7 +145,7 @@ def _table(cells: list[Cell], rows: list[PlanRow]) -> Table:
     return table
 
 
-def _lines(rows: list[PlanRow], limits: Limits, prices: PriceList) -> list[str]:
+def _lines(rows: list[PlanRow], limits: CostLimits, prices: PriceList) -> list[str]:
     """What the runs may do and cost at most."""
     runs = sum(row.runs for row in rows)
     tested = sum(row.runs * row.iterations * (1 + row.patience) for row in rows)
@@ -171,7 +171,7 @@ def _lines(rows: list[PlanRow], limits: Limits, prices: PriceList) -> list[str]:
     return lines
 
 
-def _stop(limits: Limits, most: float, *, is_known: bool) -> str:
+def _stop(limits: CostLimits, most: float, *, is_known: bool) -> str:
     """What is spent at most, given the limits of all runs together."""
     words = limits.words()
     if not words:

@@ -95,7 +95,7 @@ def bootstrap(scores: Mapping[str, Array], seed: int = 0) -> dict[str, Bootstrap
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class MeanChange:
     """Means before and after a change, and the interval of their difference.
 
     Attributes:
@@ -114,14 +114,14 @@ class Change:
     p: float
 
 
-def paired_change(before: Sequence[float], after: Sequence[float]) -> Change:
+def paired_change(before: Sequence[float], after: Sequence[float]) -> MeanChange:
     """Compares scores in the same worlds or episodes, in the same order."""
     scores = {"before": before, "after": after}
     found = bootstrap({name: np.array([each]) for name, each in scores.items()})
     one, other = found["before"], found["after"]
     change = other.minus(one)
     ends = change.estimate()
-    return Change(one.mean, other.mean, ends.low, ends.high, change.p_value())
+    return MeanChange(one.mean, other.mean, ends.low, ends.high, change.p_value())
 
 
 def over_sets(parts: Sequence[Bootstrap]) -> Bootstrap:

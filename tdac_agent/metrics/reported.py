@@ -10,7 +10,7 @@ import pandas as pd
 from tdac_agent.errors import RunError
 from tdac_agent.metrics.frames import (
     RUN_COLUMNS,
-    Frames,
+    RunFrames,
     frames_from_tau,
     join_frames,
 )
@@ -20,7 +20,7 @@ LABELS = {*RUN_COLUMNS, "environment"} - {"tau"}
 _WORD = re.compile(r"(\d+)(\+?)")
 
 
-def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
+def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> RunFrames:
     """Loads a table with one row per kind of run, such as `results/paper/results.csv`.
 
     The column `tau` lists the iterations of the first successes, such as `1 2 5`; `2+`
@@ -56,7 +56,7 @@ def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
     )
 
 
-def _kind(row: dict[str, str], labels: list[str], path: Path, most: int) -> Frames:
+def _kind(row: dict[str, str], labels: list[str], path: Path, most: int) -> RunFrames:
     tau: list[int] = []
     ended: list[int] = []
     for word in row["tau"].split():

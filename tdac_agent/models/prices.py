@@ -22,11 +22,11 @@ class PriceError(TdacError):
     """A price file cannot be used."""
 
 
-class _Strict(BaseModel):
+class _PriceModel(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class Price(_Strict):
+class Price(_PriceModel):
     """Prices of one model, USD per million tokens."""
 
     input: float = Field(ge=0)
@@ -52,7 +52,7 @@ class Price(_Strict):
         ) / 1e6
 
 
-class PriceList(_Strict):
+class PriceList(_PriceModel):
     """Contents of a price file, schema 1."""
 
     schema_version: Literal[1] = Field(1, alias="schema")

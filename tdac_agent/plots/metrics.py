@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tdac_agent.metrics import Frames, Rate, cumulative_success, success_rate
+from tdac_agent.metrics import Rate, RunFrames, cumulative_success, success_rate
 from tdac_agent.plots.style import (
     COLOURS,
     LINES,
@@ -29,7 +29,7 @@ BEHIND = "#D5D5D5"
 
 
 def plot_success_rates(
-    groups: dict[str, Frames],
+    groups: dict[str, RunFrames],
     *,
     by: str = "learner",
     heading: str = "Success rate SR",
@@ -88,7 +88,7 @@ def _bar(axes: Axes, place: float, rate: Rate, width: float, colour: str) -> Non
 
 
 def plot_cumulative_success(
-    frames: Frames,
+    frames: RunFrames,
     *,
     by: str = "learner",
     most: int | None = None,
@@ -124,7 +124,7 @@ def plot_cumulative_success(
 
 
 def plot_cumulative_panels(
-    frames: Frames,
+    frames: RunFrames,
     *,
     by: str = "learner",
     most: int | None = None,
@@ -165,7 +165,7 @@ def plot_cumulative_panels(
     return figure
 
 
-def _curves(frames: Frames, by: str, most: int | None) -> dict[str, pd.DataFrame]:
+def _curves(frames: RunFrames, by: str, most: int | None) -> dict[str, pd.DataFrame]:
     """CS(k) of each kind, starting with CS(0) = 0."""
     last = most if most is not None else _last_shown_k(frames.runs)
     begin = pd.DataFrame({"k": [0], "cs": [0.0], "low": [0.0], "high": [0.0]})
@@ -175,7 +175,7 @@ def _curves(frames: Frames, by: str, most: int | None) -> dict[str, pd.DataFrame
     }
 
 
-def _counted(frames: Frames, by: str, name: str) -> str:
+def _counted(frames: RunFrames, by: str, name: str) -> str:
     return f"{name} (R = {int((frames.runs[by] == name).sum())})"
 
 
@@ -221,7 +221,7 @@ def _last_shown_k(runs: pd.DataFrame) -> int:
     return min(int(runs["K"].max()), int(runs["done"].max()) + 1)
 
 
-def _order(groups: dict[str, Frames], by: str) -> list[str]:
+def _order(groups: dict[str, RunFrames], by: str) -> list[str]:
     return list(
         dict.fromkeys(name for frames in groups.values() for name in frames.runs[by])
     )

@@ -23,7 +23,7 @@ SAMPLES, LEAST_STEP = 12, 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
+class Bottleneck:
     """The narrowest passage of a path.
 
     Attributes:
@@ -38,7 +38,7 @@ class Passage:
     at: Literal["path", "start", "goal"]
 
 
-def passage_on(nominal: Any, path: Points) -> Passage | None:
+def bottleneck_on(nominal: Any, path: Points) -> Bottleneck | None:
     """The narrowest passage of a path of a task; None without a path.
 
     Args:
@@ -54,10 +54,10 @@ def passage_on(nominal: Any, path: Points) -> Passage | None:
     else:
         return None
     step = max(radius / SAMPLES, least)
-    return narrowest_passage(path, walls, step) if len(path) > 1 else None
+    return narrowest(path, walls, step) if len(path) > 1 else None
 
 
-def narrowest_passage(path: Points, walls: Points, step: float) -> Passage:
+def narrowest(path: Points, walls: Points, step: float) -> Bottleneck:
     """The narrowest passage of a path between walls.
 
     A gap that the path crosses is also crossed by each path that can be deformed into
@@ -84,7 +84,7 @@ def narrowest_passage(path: Points, walls: Points, step: float) -> Passage:
         left, right = sides
         width = float(np.hypot(*(left - points[i])) + np.hypot(*(right - points[i])))
         if width < best.width:
-            best = Passage(width, (_point(left), _point(right)), "path")
+            best = Bottleneck(width, (_point(left), _point(right)), "path")
     return best
 
 
@@ -123,10 +123,10 @@ def outlines_of(solid: Prisms, between: float) -> Points:
     return np.concatenate(found)
 
 
-def _at_end(tree: Any, end: Points, name: Literal["start", "goal"]) -> Passage:
+def _at_end(tree: Any, end: Points, name: Literal["start", "goal"]) -> Bottleneck:
     """The room at an end of the path."""
     near, index = tree.query(end)
-    return Passage(2.0 * float(near), (_point(end), _point(tree.data[index])), name)
+    return Bottleneck(2.0 * float(near), (_point(end), _point(tree.data[index])), name)
 
 
 def _sampled(path: Points, step: float) -> tuple[Points, NDArray[np.int64]]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from tdac_agent.studio.board import Board
-from tdac_agent.studio.draft import Checked, Draft
+from tdac_agent.studio.draft import Checked, TaskDraft
+from tdac_agent.studio.source_view import SourceView
 from tdac_envs.grid.plan import path_length
 
 LEAST_RADIUS, RADIUS_STEP = 1.0, 0.5
@@ -15,7 +15,7 @@ ELSEWHERE = 0.5
 through elsewhere: it is measured between walls, the radius from pixel to pixel."""
 
 
-def fitting_radius(draft: Draft, checked: Checked | None) -> float | None:
+def fitting_radius(draft: TaskDraft, checked: Checked | None) -> float | None:
     """The largest radius of the slider that gets through; None if that is no help."""
     if checked is None or checked.widest is None or draft.radius is None:
         return None
@@ -23,16 +23,16 @@ def fitting_radius(draft: Draft, checked: Checked | None) -> float | None:
     return fitting if LEAST_RADIUS <= fitting < draft.radius else None
 
 
-def sentence_of(checked: Checked, board: Board) -> tuple[str, bool]:
+def sentence_of(checked: Checked, view: SourceView) -> tuple[str, bool]:
     """What was found, and whether it is good."""
     if checked.task is None:
         return checked.problem, False
     reach = checked.task.nominal.goal_tolerance
     text = (
-        f"A path of {path_length(checked.path):.4g} {board.unit}; the goal is reached "
-        f"within {reach:.3g} {board.unit} (green disc)"
+        f"A path of {path_length(checked.path):.4g} {view.unit}; the goal is reached "
+        f"within {reach:.3g} {view.unit} (green disc)"
     )
-    return f"{text}.{_about_passage(checked, board.unit)}", True
+    return f"{text}.{_about_passage(checked, view.unit)}", True
 
 
 def _about_passage(checked: Checked, unit: str) -> str:

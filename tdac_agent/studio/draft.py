@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.runs.ownership import load_task
-from tdac_agent.studio.board import Board, Kind, Place
-from tdac_agent.studio.passage import Passage, passage_on
+from tdac_agent.studio.bottleneck import Bottleneck, bottleneck_on
+from tdac_agent.studio.source_view import Kind, Place, SourceView
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.core.errors import TdacError
@@ -22,7 +22,7 @@ DIGITS = {"px": 1, "m": 3}
 
 
 @dataclass(frozen=True, slots=True)
-class Draft:
+class TaskDraft:
     """What has been chosen so far.
 
     Attributes:
@@ -44,12 +44,14 @@ class Draft:
     polarity: str | None = None
 
     @classmethod
-    def of(cls, board: Board, source: str, polarity: str | None = None) -> Draft:
+    def of(
+        cls, view: SourceView, source: str, polarity: str | None = None
+    ) -> TaskDraft:
         """The task of the file itself, as far as it has one."""
-        start = None if board.start is None else (board.start[0], board.start[1])
-        heading = None if board.start is None else board.start[2]
-        radius = board.radius or (15.0 if board.kind == "map" else None)
-        return cls(board.kind, source, start, board.goal, heading, radius, polarity)
+        start = None if view.start is None else (view.start[0], view.start[1])
+        heading = None if view.start is None else view.start[2]
+        radius = view.radius or (15.0 if view.kind == "map" else None)
+        return cls(view.kind, source, start, view.goal, heading, radius, polarity)
 
     def words(self) -> list[str]:
         """The flags of the command line that name this task."""
@@ -65,15 +67,15 @@ class Draft:
             words += ["--polarity", self.polarity]
         return words
 
-    def with_start(self, place: Place, unit: str) -> Draft:
+    def with_start(self, place: Place, unit: str) -> TaskDraft:
         """The draft with a clicked start."""
         return replace(self, start=_rounded(place, unit))
 
-    def with_goal(self, place: Place, unit: str) -> Draft:
+    def with_goal(self, place: Place, unit: str) -> TaskDraft:
         """The draft with a clicked goal."""
         return replace(self, goal=_rounded(place, unit))
 
-    def facing(self, place: Place) -> Draft:
+    def facing(self, place: Place) -> TaskDraft:
         """The draft with a robot that faces a place; without a start, unchanged."""
         if self.start is None or place == self.start:
             return self
@@ -110,36 +112,36 @@ class Checked:
     task: Task | None
     problem: str = ""
     path: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    narrowest: Passage | None = None
+    narrowest: Bottleneck | None = None
     widest: float | None = None
     picture: bytes | None = None
 
 
-def check(draft: Draft, board: Board, place: Path) -> Checked:
+def check(draft: TaskDraft, view: SourceView, place: Path) -> Checked:
     """Loads the task of a draft, as the command would.
 
     Args:
         draft: The draft; it must have a goal, and a start unless the world has one.
-        board: Its board.
+        view: Its view.
         place: Folder of the studio.
     """
     widest = None
-    if board.widest is not None and draft.start and draft.goal:
-        widest = board.widest(draft.start, draft.goal)
+    if view.widest is not None and draft.start and draft.goal:
+        widest = view.widest(draft.start, draft.goal)
     try:
         task = load_task(draft.task_file(), base=place)
     except (TdacError, ValueError) as error:
         return Checked(None, " ".join(str(error).split()), widest=widest)
     nominal = task.nominal
     path = np.asarray(nominal.shortest_path(nominal.start), np.float64)
-    narrowest = passage_on(nominal, path)
+    narrowest = bottleneck_on(nominal, path)
     picture = None
-    if board.laid_over is not None and isinstance(nominal, Map2DTask):
-        picture = board.laid_over(nominal.terrain.grid.cells)
+    if view.laid_over is not None and isinstance(nominal, Map2DTask):
+        picture = view.laid_over(nominal.terrain.grid.cells)
     return Checked(task, "", path, narrowest, widest, picture)
 
 
-def snapped(draft: Draft, place: Path) -> Draft:
+def snapped(draft: TaskDraft, place: Path) -> TaskDraft:
     """The draft with start and goal at the nearest free places.
 
     Raises:

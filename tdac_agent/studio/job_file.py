@@ -17,7 +17,7 @@ Word = Annotated[str, Field(max_length=4096)]
 
 
 class JobFile(PrintableRecord):
-    """What was started; fields as in `Job`."""
+    """What was started; fields as in `StudioJob`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -32,7 +32,7 @@ TAIL = 4000
 TAIL_BYTES = 4 * TAIL
 MOST_KNOWN = 10_000
 _STARTED: list[subprocess.Popen[bytes]] = []
-_KNOWN: dict[Path, Job] = {}
+_KNOWN: dict[Path, StudioJob] = {}
 # Writes the exit code when the command has ended, also after the studio has. An
 # interrupt is for the command, which has work to save.
 _WRAPPED = """
@@ -48,7 +48,7 @@ pathlib.Path(sys.argv[1]).write_text(str(code))
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class StudioJob:
     """A command that was started.
 
     Attributes:
@@ -115,7 +115,7 @@ class Job:
             os.killpg(self.pid, signal.SIGINT)
 
 
-def start(place: Path, words: Sequence[str], about: str) -> Job:
+def start(place: Path, words: Sequence[str], about: str) -> StudioJob:
     """Starts `tdac` with some words, unless the same command is at work already.
 
     Args:
@@ -155,18 +155,18 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
     return _job(folder, facts, ours=True)
 
 
-def jobs(place: Path) -> list[Job]:
+def jobs(place: Path) -> list[StudioJob]:
     """The jobs that were started in a folder: ours, then others, the newest first."""
     files = (place / JOBS).glob(f"*/{ABOUT}")
     found = [job for job in map(_read, files) if job is not None]
     return sorted(found, key=_order, reverse=True)
 
 
-def _order(job: Job) -> tuple[bool, datetime, str]:
+def _order(job: StudioJob) -> tuple[bool, datetime, str]:
     return job.ours, job.started, job.folder.name
 
 
-def _read(file: Path) -> Job | None:
+def _read(file: Path) -> StudioJob | None:
     """A job from its file, which never changes; None if it is damaged."""
     if file in _KNOWN:
         return _KNOWN[file]
@@ -180,13 +180,13 @@ def _read(file: Path) -> Job | None:
     return _KNOWN[file]
 
 
-def _job(folder: Path, facts: JobFile, *, ours: bool) -> Job:
-    return Job(
+def _job(folder: Path, facts: JobFile, *, ours: bool) -> StudioJob:
+    return StudioJob(
         folder, facts.words, facts.started, facts.pid, facts.born, facts.about, ours
     )
 
 
-def job_of(place: Path, about: str) -> Job | None:
+def job_of(place: Path, about: str) -> StudioJob | None:
     """The newest job that works on something: one of ours, if there is one."""
     return next((job for job in jobs(place) if job.about == about), None)
 

@@ -43,7 +43,7 @@ LASTING = 7 * 24 * 3600
 """For how long a cookie is accepted, s."""
 
 
-class Gate:
+class SessionCheck:
     """An ASGI application in front of another one.
 
     Args:

@@ -36,7 +36,7 @@ SHARE = 0.75
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Board:
+class SourceView:
     """A picture, and the conversion between its pixels and places.
 
     Attributes:
@@ -81,8 +81,8 @@ def names_of(kind: Kind) -> tuple[str, ...]:
     return tuple(bundled_maps() if kind == "map" else bundled_worlds())
 
 
-def board_of(kind: Kind, source: str, polarity: str | None = None) -> Board:
-    """The board of a bundled map or world, or of a file.
+def view_of(kind: Kind, source: str, polarity: str | None = None) -> SourceView:
+    """The view of a bundled map or world, or of a file.
 
     Args:
         kind: Which of them.
@@ -110,7 +110,7 @@ def as_it_is(source: str) -> bytes:
     return png(_laid_over(image, none, _zoom(none)))
 
 
-def _of_map(source: str, polarity: str | None) -> Board:
+def _of_map(source: str, polarity: str | None) -> SourceView:
     bundled = bundled_map(source) if source in bundled_maps() else None
     image = load_image(bundled.image if bundled else Path(source))
     said = ReadingOptions(None if image.occupied is not None else polarity, None)  # type: ignore[arg-type]
@@ -135,7 +135,7 @@ def _of_map(source: str, polarity: str | None) -> Board:
 
     size = f"{params.width} x {params.height} px"
     text = f"{size}: {obstacles_text(params)}; {scale_text(params.resolution)}"
-    return Board(
+    return SourceView(
         "map",
         png(picture),
         picture.shape[1],
@@ -154,7 +154,7 @@ def _of_map(source: str, polarity: str | None) -> Board:
     )
 
 
-def _of_world(source: str) -> Board:
+def _of_world(source: str) -> SourceView:
     world = load_world(world_file(source))
     view = View(bounds_of(world), strip=0)
     draw_things(view, world, bodies(world))
@@ -175,7 +175,7 @@ def _of_world(source: str) -> Board:
         return view.at(points) + 0.5
 
     text = f"Webots {world.version}: {len(world.obstacles)} obstacles; places in metres"
-    return Board(
+    return SourceView(
         "world",
         png(picture),
         picture.shape[1],

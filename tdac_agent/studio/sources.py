@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from tdac_agent.studio.board import names_of
 from tdac_agent.studio.folder import FILES
+from tdac_agent.studio.source_view import names_of
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 YAML = ".yaml", ".yml"

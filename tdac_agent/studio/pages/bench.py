@@ -18,7 +18,7 @@ from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE, UNFINISHED
 from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_verify import MOST_EPISODES
 from tdac_agent.studio.folder import as_word, lines_in, within
-from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
+from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
     JobButtons,
     ShownCommand,
@@ -56,7 +56,7 @@ def add(place: Path) -> None:
     @ui.page("/benches")
     async def benches() -> None:
         with framed("Benches"):
-            Starting(place).show()
+            BenchForm(place).show()
             show_benches(place, "Benches of this folder")
 
     @ui.page("/bench")
@@ -66,10 +66,10 @@ def add(place: Path) -> None:
             if folder is None or not at or not _is_bench(place, at, folder):
                 ui.label(f"There is no bench {at!r} in this folder.").classes("problem")
                 return
-            await Watching(place, at, folder).show()
+            await BenchPage(place, at, folder).show()
 
 
-class Starting:
+class BenchForm:
     """The form that starts a bench.
 
     Args:
@@ -128,7 +128,7 @@ class Starting:
         ui.navigate.to(address_of("/bench", folder))
 
 
-class Watching:
+class BenchPage:
     """The page of one bench.
 
     Args:
@@ -199,7 +199,7 @@ class Watching:
             self._look()
 
 
-def bench_job(place: Path, at: str) -> Job | None:
+def bench_job(place: Path, at: str) -> StudioJob | None:
     """The newest command of the form that works on a bench."""
     job = job_of(place, at)
     return job if job is not None and bench_words(job) else None
@@ -220,7 +220,7 @@ def named_entrants(chosen: Sequence[str]) -> list[str]:
     return words
 
 
-def progress_of(job: Job, folder: Path) -> tuple[float, str]:
+def progress_of(job: StudioJob, folder: Path) -> tuple[float, str]:
     """The share of a bench that has been driven, from 0 to 1, and a line about it.
 
     Args:
@@ -265,13 +265,13 @@ def show_benches(place: Path, title: str) -> None:
             ui.label(bench_words(job) if job else "").classes("note text-sm")
 
 
-def bench_words(job: Job) -> str:
+def bench_words(job: StudioJob) -> str:
     """What drives where in a bench of the form; empty for another command."""
     entrants, sets, worlds = _form_of(job)
     return f"{', '.join(entrants)} on {','.join(sets)}" if worlds else ""
 
 
-def _form_of(job: Job) -> tuple[Sequence[str], Sequence[str], int]:
+def _form_of(job: StudioJob) -> tuple[Sequence[str], Sequence[str], int]:
     """Entrants, task sets and worlds of each set; no worlds for another command."""
     match job.words:
         case ["bench", *_] if {"--set", "-n"} <= {*job.words[:-1]}:
@@ -283,7 +283,7 @@ def _form_of(job: Job) -> tuple[Sequence[str], Sequence[str], int]:
     return (), (), 0
 
 
-def status_of(folder: Path, job: Job | None) -> str:
+def status_of(folder: Path, job: StudioJob | None) -> str:
     """Status of a bench.
 
     Args:

@@ -13,7 +13,7 @@ from tdac_agent.library.listing import row_of
 from tdac_agent.runs.run_record import RUN_FILE, load_run
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.folder import as_word, within
-from tdac_agent.studio.jobs import Job, job_of, start
+from tdac_agent.studio.jobs import StudioJob, job_of, start
 from tdac_agent.studio.pages.layout import (
     JobButtons,
     ShownCommand,
@@ -25,7 +25,7 @@ from tdac_agent.studio.pages.layout import (
 )
 from tdac_agent.studio.pages.questions import Questions
 from tdac_agent.studio.pages.robustness import Robustness
-from tdac_agent.studio.standing import (
+from tdac_agent.studio.run_status import (
     SELECTED,
     about_given,
     asked_by,
@@ -56,10 +56,10 @@ def add(place: Path) -> None:
             if folder is None or not at or not known:
                 ui.label(f"There is no run {at!r} in this folder.").classes("problem")
                 return
-            await Watching(place, at, folder).show()
+            await RunPage(place, at, folder).show()
 
 
-class Watching:
+class RunPage:
     """The state of one opened page.
 
     Args:
@@ -122,7 +122,9 @@ class Watching:
             with self._report:
                 report_frame(self._at, version)
 
-    def _show_row(self, row: dict[str, Any], running: bool, job: Job | None) -> None:
+    def _show_row(
+        self, row: dict[str, Any], running: bool, job: StudioJob | None
+    ) -> None:
         status = row["status"] if row else "running" if running else "not begun"
         self._badge.clear()
         with self._badge:
@@ -154,7 +156,7 @@ class Watching:
                 last = job.output().strip().splitlines()[-1:] or ["nothing was printed"]
                 ui.label(f"The run did not start: {last[0]}").classes("problem")
 
-    def _show_clock(self, state: _State, job: Job | None) -> None:
+    def _show_clock(self, state: _State, job: StudioJob | None) -> None:
         """Where the run stands, and for how long its command has run."""
         row, running, driven, version, output = state
         text = progress_of(row, running)
@@ -219,7 +221,7 @@ class Watching:
 _State = tuple[dict[str, Any], bool, str, str, str]
 
 
-def _state(folder: Path, job: Job | None) -> _State:
+def _state(folder: Path, job: StudioJob | None) -> _State:
     """Row of the list, whether it runs, how far, version of its report, and output."""
     running = job is not None and job.running
     output = job.output() if job is not None else ""

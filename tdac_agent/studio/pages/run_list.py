@@ -16,7 +16,7 @@ from tdac_agent.library.listing import folders_of, row_of, variations_text
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
 from tdac_agent.studio.folder import within
-from tdac_agent.studio.jobs import Job, jobs
+from tdac_agent.studio.jobs import StudioJob, jobs
 from tdac_agent.studio.pages.bench import show_benches
 from tdac_agent.studio.pages.layout import (
     address_of,
@@ -62,11 +62,11 @@ def add(place: Path) -> None:
     async def page() -> None:
         with framed("Runs"):
             ui.add_css(f"@media (max-width: 699px) {{ {CARDS} }}")
-            shelf = Shelf(place)
+            run_list = RunList(place)
             _show_upload(place)
             await shown_first()
-            await shelf.look()
-            ui.timer(SECONDS, shelf.look)
+            await run_list.look()
+            ui.timer(SECONDS, run_list.look)
 
     @ui.page("/campaign")
     async def campaign(at: str = "") -> None:
@@ -79,7 +79,7 @@ def add(place: Path) -> None:
             report_frame(at, str(time.time_ns()))
 
 
-class Shelf:
+class RunList:
     """The list of one opened page, and what is at work.
 
     Args:
@@ -90,7 +90,7 @@ class Shelf:
         self._place = place
         self._rows: list[dict[str, Any]] | None = None
         self._table: ui.table | None = None
-        self._others: list[Job] | None = None
+        self._others: list[StudioJob] | None = None
         self._list = ui.column().classes("w-full")
         with self._list:
             ui.label("reading the folder …").classes("note")
@@ -208,7 +208,7 @@ def _show_table(rows: list[dict[str, Any]]) -> ui.table | None:
     return table
 
 
-def _show_others(place: Path, at_work: list[Job]) -> None:
+def _show_others(place: Path, at_work: list[StudioJob]) -> None:
     """Campaigns and benches, and commands that still run."""
     campaigns = folders_with(place, CONFIG_FILE)
     if campaigns:

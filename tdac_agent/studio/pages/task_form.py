@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from nicegui import ui
 
-from tdac_agent.studio.board import Board
-from tdac_agent.studio.draft import Checked, Draft
-from tdac_agent.studio.findings import LEAST_RADIUS, RADIUS_STEP, fitting_radius
+from tdac_agent.studio.check_text import LEAST_RADIUS, RADIUS_STEP, fitting_radius
+from tdac_agent.studio.draft import Checked, TaskDraft
+from tdac_agent.studio.source_view import SourceView
 
 NAMES = "start x", "start y", "heading, rad", "goal x", "goal y"
 RADIUS = 15.0
 """Of the robot on a map that names none, px."""
 
 
-class Places:
+class TaskForm:
     """The numbers of a draft, what was found about it, and help if it is refused.
 
     Args:
@@ -55,7 +55,7 @@ class Places:
         self._fit = ui.button(on_click=fit).props("outline no-caps dense")
         self._snap.visible = self._fit.visible = False
 
-    def written(self, draft: Draft) -> Draft:
+    def written(self, draft: TaskDraft) -> TaskDraft:
         """A draft with the numbers of the page."""
         x, y, heading, goal_x, goal_y = (self._numbers[name].value for name in NAMES)
         start = None if x is None or y is None else (x, y)
@@ -67,7 +67,7 @@ class Places:
         """Where the slider is, px."""
         return float(self._radius.value)
 
-    def show(self, draft: Draft) -> None:
+    def show(self, draft: TaskDraft) -> None:
         """Shows the numbers of a draft."""
         places = (*(draft.start or (None, None)), draft.heading)
         shown = (*places, *(draft.goal or (None, None)))
@@ -76,11 +76,13 @@ class Places:
         self._sized.visible = draft.kind == "map"
         self._radius.value = draft.radius or RADIUS
 
-    def show_checked(self, draft: Draft, checked: Checked | None, board: Board) -> None:
+    def show_checked(
+        self, draft: TaskDraft, checked: Checked | None, view: SourceView
+    ) -> None:
         """Shows the widest radius, and what helps if the draft is refused."""
         stuck = checked is not None and checked.task is None
         fitting = fitting_radius(draft, checked) if stuck else None
-        self._snap.visible = stuck and board.kind == "map" and fitting is None
+        self._snap.visible = stuck and view.kind == "map" and fitting is None
         self._fit.visible = fitting is not None
         if fitting is not None:
             self._fit.text = f"Use a radius of {fitting:g} px"

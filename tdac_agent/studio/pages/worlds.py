@@ -16,7 +16,7 @@ from tdac_agent.evaluation.set_play import SHOWN
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.set_synthesis.synthesize import EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
-from tdac_agent.studio.driving import Drive
+from tdac_agent.studio.driving import KeyboardDrive
 from tdac_agent.studio.folder import FILES, STATE, as_word, keep, made_within
 from tdac_agent.studio.jobs import free_folder, start
 from tdac_agent.studio.pages.films import show_film
@@ -47,10 +47,10 @@ def add(place: Path) -> None:
     @ui.page("/worlds")
     async def page(level: str = "unknown") -> None:
         with framed("Worlds"):
-            await Looking(place).show(level)
+            await WorldsPage(place).show(level)
 
 
-class Looking:
+class WorldsPage:
     """The state of one opened page.
 
     Args:
@@ -60,7 +60,7 @@ class Looking:
     def __init__(self, place: Path) -> None:
         self._place = place
         self._tasks: TaskSet | None = None
-        self._drive: Drive | None = None
+        self._drive: KeyboardDrive | None = None
         self._chosen: tuple[str, str, int] | None = None
 
     async def show(self, level: str) -> None:
@@ -161,7 +161,10 @@ class Looking:
     async def _begin_drive(self) -> None:
         """Puts the robot at the start, and listens to the keys."""
         self._drive = await asyncio.to_thread(
-            Drive.of, self._name.value, self._split.value, int(self._index.value or 0)
+            KeyboardDrive.of,
+            self._name.value,
+            self._split.value,
+            int(self._index.value or 0),
         )
         self._timer.interval = max(SECONDS, self._drive.dt)
         self._timer.activate()

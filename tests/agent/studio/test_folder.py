@@ -18,9 +18,9 @@ from tdac_agent.studio.folder import STATE, as_word, keep, lines_in, made_within
 from tdac_agent.studio.jobs import start
 from tdac_agent.studio.pages.questions import asked_for
 from tdac_agent.studio.pages.worlds import policies_in
+from tdac_agent.studio.run_status import episodes_driven
 from tdac_agent.studio.serve import opened_port
 from tdac_agent.studio.sources import sources_in
-from tdac_agent.studio.standing import episodes_driven
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ pytest.importorskip("nicegui", reason="needs tdac[studio]")
 from tdac_agent.studio import jobs as module
 from tdac_agent.studio.folder import STATE
 from tdac_agent.studio.job_file import JobFile, read_job, write_job
-from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
+from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import bench_job, bench_words, progress_of
 
 WORDS = ["bench", "builtin", "--set", "known", "-n", "10"]
@@ -174,7 +174,7 @@ def test_no_group_but_that_of_a_job_is_interrupted(tmp_path, monkeypatch, pid):
     now = datetime.now(UTC)
     if pid == "parent's" and os.getpgid(number) == number != os.getpgrp():
         pytest.skip("the parent leads a group, as a job does")
-    job = Job(tmp_path, ("x",), now, number, module._born(number), "x", ours=True)
+    job = StudioJob(tmp_path, ("x",), now, number, module._born(number), "x", ours=True)
     job.stop()
     assert sent == []
 

@@ -218,7 +218,7 @@ def test_a_person_answers(page, plan):
 
 @pytest.mark.slow
 def test_the_keyboard_alone(page, plan):
-    """Places are typed, the button is reached by Tab and pressed by Enter."""
+    """TaskForm are typed, the button is reached by Tab and pressed by Enter."""
     upload(page, plan)
     says(page, "Click the start")
     places = {"start x": 60, "start y": 60, "goal x": 340, "goal y": 250}
@@ -396,9 +396,9 @@ def test_a_map_and_what_was_found_are_in_sight(page, studio, tmp_path):
         says(page, "are not connected")
         height = SIZES[name][1]
         page.execute_script("scrollTo(0, 0)")
-        board = page.find_element(By.CSS_SELECTOR, ".board").rect
-        assert board["width"] > 100
-        assert board["y"] + board["height"] < height
+        view = page.find_element(By.CSS_SELECTOR, ".board").rect
+        assert view["width"] > 100
+        assert view["y"] + view["height"] < height
         found = page.find_element(By.CSS_SELECTOR, ".found").rect
         assert found["y"] + found["height"] <= height
     resize(page, "desktop")

@@ -27,7 +27,7 @@ from tdac_agent.runs.ownership import sign
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import append_record
-from tdac_agent.studio.board import board_of, names_of
+from tdac_agent.studio.check_text import fitting_radius, sentence_of
 from tdac_agent.studio.comparison import (
     difference,
     figures_of,
@@ -35,21 +35,21 @@ from tdac_agent.studio.comparison import (
     settings_of,
 )
 from tdac_agent.studio.deployable import deployable
-from tdac_agent.studio.draft import Checked, Draft, check
-from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.findings import fitting_radius, sentence_of
-from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
+from tdac_agent.studio.draft import Checked, TaskDraft, check
+from tdac_agent.studio.driving import KeyboardDrive
+from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
-from tdac_agent.studio.pages.shelf import unpack
+from tdac_agent.studio.pages.run_list import unpack
 from tdac_agent.studio.pages.writers import Writers
-from tdac_agent.studio.standing import (
+from tdac_agent.studio.run_status import (
     about_given,
     asked_by,
     episodes_driven,
     is_from_elsewhere,
     last_step,
 )
+from tdac_agent.studio.source_view import names_of, view_of
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 SECONDS = 120
@@ -90,42 +90,42 @@ def flags_of(words):
 @pytest.mark.parametrize(("kind", "source"), [("map", "office"), ("world", "maze")])
 def test_a_draft_is_the_task_of_its_command(kind, source, tmp_path):
     """What the page checks is what the shown command does."""
-    board = board_of(kind, source)
-    draft = Draft.of(board, source)
-    checked = check(draft, board, tmp_path)
+    view = view_of(kind, source)
+    draft = TaskDraft.of(view, source)
+    checked = check(draft, view, tmp_path)
     assert checked.problem == ""
     assert flags_of(draft.words()).load().sha256() == checked.task.sha256()
-    assert checked.narrowest.width > 2.0 * (board.radius or BODY_RADIUS)
+    assert checked.narrowest.width > 2.0 * (view.radius or BODY_RADIUS)
 
 
 @pytest.mark.parametrize("kind", ["map", "world"])
 def test_clicks_lead_back_to_places(kind):
     for name in names_of(kind):
-        board = board_of(kind, name)
-        assert board.goal is not None
-        ((x, y),) = board.at([board.goal]).tolist()
-        assert 0 <= x <= board.width
-        assert 0 <= y <= board.height
-        assert board.place(x, y) == pytest.approx(board.goal)
+        view = view_of(kind, name)
+        assert view.goal is not None
+        ((x, y),) = view.at([view.goal]).tolist()
+        assert 0 <= x <= view.width
+        assert 0 <= y <= view.height
+        assert view.place(x, y) == pytest.approx(view.goal)
 
 
 def test_what_cannot_be_driven(tmp_path):
-    board = board_of("map", "maze")
-    draft = Draft.of(board, "maze")
-    wide = check(replace(draft, radius=30.0), board, tmp_path)
+    view = view_of("map", "maze")
+    draft = TaskDraft.of(view, "maze")
+    wide = check(replace(draft, radius=30.0), view, tmp_path)
     assert wide.task is None
     assert "too near" in wide.problem
     assert wide.widest == pytest.approx(20.4, abs=0.2)
-    assert check(replace(draft, radius=wide.widest - 0.5), board, tmp_path).task
-    outside = check(replace(draft, goal=(5.0, 5.0)), board, tmp_path)
+    assert check(replace(draft, radius=wide.widest - 0.5), view, tmp_path).task
+    outside = check(replace(draft, goal=(5.0, 5.0)), view, tmp_path)
     assert "outside of the closed wall" in outside.problem
 
 
 @pytest.mark.parametrize("source", ["maze", "rooms", "street"])
 def test_the_narrowest_passage_limits_the_robot(source, tmp_path):
     """On maps with one way, it and the widest robot that gets through agree."""
-    board = board_of("map", source)
-    checked = check(Draft.of(board, source), board, tmp_path)
+    view = view_of("map", source)
+    checked = check(TaskDraft.of(view, source), view, tmp_path)
     narrowest = checked.narrowest
     assert narrowest.at == "path"
     assert math.dist(*narrowest.ends) == pytest.approx(narrowest.width, rel=1e-3)
@@ -141,28 +141,28 @@ def test_a_path_through_the_narrower_of_two_doors(tmp_path):
     plan[50:90, 190:210] = 255
     plan[170:250, 190:210] = 255
     cv2.imwrite(str(tmp_path / "plan.png"), plan)
-    board = board_of("map", str(tmp_path / "plan.png"))
-    draft = Draft("map", "plan.png", (60.0, 70.0), (340.0, 70.0), 0.0, 15.0)
-    narrow = check(draft, board, tmp_path)
+    view = view_of("map", str(tmp_path / "plan.png"))
+    draft = TaskDraft("map", "plan.png", (60.0, 70.0), (340.0, 70.0), 0.0, 15.0)
+    narrow = check(draft, view, tmp_path)
     assert narrow.narrowest.width == pytest.approx(40.0, abs=0.1)
     assert sorted(y for _, y in narrow.narrowest.ends) == [49.5, 89.5]
     assert narrow.widest == pytest.approx(39.4, abs=0.6)
-    assert "(bar) is 40 px wide; another path has room" in sentence_of(narrow, board)[0]
-    wide = check(replace(draft, radius=25.0), board, tmp_path)
+    assert "(bar) is 40 px wide; another path has room" in sentence_of(narrow, view)[0]
+    wide = check(replace(draft, radius=25.0), view, tmp_path)
     assert wide.narrowest.width == pytest.approx(80.0, abs=0.1)
-    assert "(bar) is 80 px wide: room for a radius of" in sentence_of(wide, board)[0]
+    assert "(bar) is 80 px wide: room for a radius of" in sentence_of(wide, view)[0]
     near = check(
-        replace(draft, start=(25.0, 210.0), goal=(60.0, 210.0)), board, tmp_path
+        replace(draft, start=(25.0, 210.0), goal=(60.0, 210.0)), view, tmp_path
     )
     assert near.narrowest.at == "start"
     assert near.narrowest.width == pytest.approx(2 * 17.5, abs=0.1)
-    assert "narrowest at the start, 17.5 px from a wall" in sentence_of(near, board)[0]
+    assert "narrowest at the start, 17.5 px from a wall" in sentence_of(near, view)[0]
 
 
 def test_a_passage_of_a_world(tmp_path):
     """The bundled corridor has passages of 0.2 m beside its boxes."""
-    board = board_of("world", "corridor")
-    checked = check(Draft.of(board, "corridor"), board, tmp_path)
+    view = view_of("world", "corridor")
+    checked = check(TaskDraft.of(view, "corridor"), view, tmp_path)
     assert checked.narrowest.width == pytest.approx(0.2, abs=1e-3)
 
 
@@ -222,7 +222,7 @@ def test_files_of_one_name_are_told_apart():
 def test_a_bench_tells_how_far_it_is(tmp_path):
     words = ("bench", "builtin", "dwa", "--set", "known,lost", "-n", "10")
     now = datetime.now(UTC)
-    job = Job(tmp_path, words, now, 2, "", "bench-1", ours=True)
+    job = StudioJob(tmp_path, words, now, 2, "", "bench-1", ours=True)
     assert progress_of(job, tmp_path)[0] == 0.0
     for name, file in (
         ("known/a", "set.json"),
@@ -288,7 +288,7 @@ def test_a_run_from_elsewhere_always_asks():
 
 def test_keys_drive(tmp_path):
     """Up drives ahead; left turns to the left, as a person sees it."""
-    drive = Drive.of("unknown", "dev", 0)
+    drive = KeyboardDrive.of("unknown", "dev", 0)
     env = drive._env
     drive.press("ArrowUp", True)
     assert drive.action() == (1.0, 1.0)
@@ -324,7 +324,7 @@ def test_a_controller_is_downloaded_with_what_it_reads(tmp_path):
 )
 def test_a_radius_that_gets_through(widest, radius, fits):
     """A step of the slider below the widest one, if a smaller radius helps."""
-    draft = Draft.of(board_of("map", "maze", None), "maze", None)
+    draft = TaskDraft.of(view_of("map", "maze", None), "maze", None)
     checked = Checked(None, widest=widest)
     assert fitting_radius(replace(draft, radius=radius), checked) == fits
 
