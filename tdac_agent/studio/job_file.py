@@ -17,7 +17,16 @@ Word = Annotated[str, Field(max_length=4096)]
 
 
 class JobFile(PrintableRecord):
-    """What was started; fields as in `StudioJob`."""
+    """What was started.
+
+    Attributes:
+        words: The words after `tdac`.
+        started: When.
+        pid: Process group.
+        born: Start time of the process, which tells it from a later one with its pid.
+        about: What it works on: a run folder, or a folder of results.
+        mark: MAC of all of it.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -26,7 +35,7 @@ class JobFile(PrintableRecord):
     pid: int = Field(gt=1, lt=2**31)
     born: str = Field(pattern=r"^[0-9]{0,20}$")
     about: Word
-    mark: str = Field("", max_length=64, description="MAC of all of it.")
+    mark: str = Field("", max_length=64)
 
     def marked(self, file: Path) -> Self:
         """The same with the mark of this installation.
@@ -51,9 +60,11 @@ def read_job(file: Path) -> JobFile:
     return JobFile.model_validate(parse_json(read_file(file, TEXT_BYTES)))
 
 
-def write_job(file: Path, job: JobFile) -> None:
-    """Marks and writes the file of a job."""
-    write_atomic(file, job.marked(file).model_dump_json() + "\n")
+def write_job(file: Path, job: JobFile) -> JobFile:
+    """Marks and writes the file of a job; returns what was written."""
+    marked = job.marked(file)
+    write_atomic(file, marked.model_dump_json() + "\n")
+    return marked
 
 
 def _mark(job: BaseModel, file: Path) -> str:

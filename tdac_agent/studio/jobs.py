@@ -8,11 +8,14 @@ that this installation did not write is shown, and is never started or stopped.
 from __future__ import annotations
 
 import errno
+import functools
+import itertools
 import os
 import shlex
 import signal
 import subprocess
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,9 +33,7 @@ JOBS, ABOUT, OUTPUT, ENDING = f"{STATE}/jobs", "job.json", "output.txt", "exit"
 TAIL = 4000
 """Characters of an output that are shown."""
 TAIL_BYTES = 4 * TAIL
-MOST_KNOWN = 10_000
 _STARTED: list[subprocess.Popen[bytes]] = []
-_KNOWN: dict[Path, StudioJob] = {}
 # Writes the exit code when the command has ended, also after the studio has. An
 # interrupt is for the command, which has work to save.
 _WRAPPED = """
@@ -53,26 +54,18 @@ class StudioJob:
 
     Attributes:
         folder: Its folder.
-        words: The words after `tdac`.
-        started: When.
-        pid: Process group.
-        born: Start time of the process, which tells it from a later one with its pid.
-        about: What it works on: a run folder, or a folder of results.
+        file: What was started.
         ours: Whether this installation started it, and its file is unchanged.
     """
 
     folder: Path
-    words: tuple[str, ...]
-    started: datetime
-    pid: int
-    born: str
-    about: str
+    file: JobFile
     ours: bool
 
     @property
     def command(self) -> str:
         """The command as a user would type it."""
-        return shlex.join(["tdac", *self.words])
+        return shlex.join(["tdac", *self.file.words])
 
     @property
     def running(self) -> bool:
@@ -80,7 +73,8 @@ class StudioJob:
         for process in list(_STARTED):
             if process.poll() is not None:
                 _STARTED.remove(process)
-        return self.ours and bool(self.born) and _born(self.pid) == self.born
+        born = self.file.born
+        return self.ours and bool(born) and _born(self.file.pid) == born
 
     @property
     def code(self) -> int | None:
@@ -93,7 +87,7 @@ class StudioJob:
     @property
     def seconds(self) -> float:
         """Time since it was started, s."""
-        return (datetime.now(UTC) - self.started).total_seconds()
+        return (datetime.now(UTC) - self.file.started).total_seconds()
 
     def output(self) -> str:
         """The end of what it has printed."""
@@ -111,8 +105,8 @@ class StudioJob:
 
     def stop(self) -> None:
         """Interrupts it, as Ctrl-C does."""
-        if self.running and _leads_group(self.pid):
-            os.killpg(self.pid, signal.SIGINT)
+        if self.running and _leads_group(self.file.pid):
+            os.killpg(self.file.pid, signal.SIGINT)
 
 
 def start(place: Path, words: Sequence[str], about: str) -> StudioJob:
@@ -133,7 +127,7 @@ def start(place: Path, words: Sequence[str], about: str) -> StudioJob:
     except ValidationError as error:
         raise OSError(errno.EINVAL, one_line_reason(error)) from error
     before = job_of(place, about)
-    if before is not None and before.running and before.words == tuple(words):
+    if before is not None and before.running and before.file.words == facts.words:
         return before
     folder = _new_folder(made_within(place, JOBS))
     command = python("-m", "tdac_agent", *words)
@@ -150,64 +144,55 @@ def start(place: Path, words: Sequence[str], about: str) -> StudioJob:
         )
     _STARTED.append(process)
     own = {"pid": process.pid, "born": _born(process.pid)}
-    facts = facts.model_copy(update=own)
-    write_job(folder / ABOUT, facts)
-    return _job(folder, facts, ours=True)
+    marked = write_job(folder / ABOUT, facts.model_copy(update=own))
+    return StudioJob(folder, marked, ours=True)
 
 
 def jobs(place: Path) -> list[StudioJob]:
     """The jobs that were started in a folder: ours, then others, the newest first."""
-    files = (place / JOBS).glob(f"*/{ABOUT}")
-    found = [job for job in map(_read, files) if job is not None]
-    return sorted(found, key=_order, reverse=True)
-
-
-def _order(job: StudioJob) -> tuple[bool, datetime, str]:
-    return job.ours, job.started, job.folder.name
-
-
-def _read(file: Path) -> StudioJob | None:
-    """A job from its file, which never changes; None if it is damaged."""
-    if file in _KNOWN:
-        return _KNOWN[file]
-    try:
-        facts = read_job(file)
-    except (OSError, ValueError):
-        return None
-    if len(_KNOWN) >= MOST_KNOWN:
-        _KNOWN.clear()
-    _KNOWN[file] = _job(file.parent, facts, ours=facts.is_ours(file))
-    return _KNOWN[file]
-
-
-def _job(folder: Path, facts: JobFile, *, ours: bool) -> StudioJob:
-    return StudioJob(
-        folder, facts.words, facts.started, facts.pid, facts.born, facts.about, ours
+    known = []
+    for file in (place / JOBS).glob(f"*/{ABOUT}"):
+        with suppress(OSError, ValueError):  # a damaged one
+            known.append(_read(file))
+    return sorted(
+        known,
+        key=lambda job: (job.ours, job.file.started, job.folder.name),
+        reverse=True,
     )
+
+
+@functools.lru_cache(maxsize=10_000)
+def _read(file: Path) -> StudioJob:
+    """A job from its file, which never changes."""
+    facts = read_job(file)
+    return StudioJob(file.parent, facts, ours=facts.is_ours(file))
 
 
 def job_of(place: Path, about: str) -> StudioJob | None:
     """The newest job that works on something: one of ours, if there is one."""
-    return next((job for job in jobs(place) if job.about == about), None)
+    return next((job for job in jobs(place) if job.file.about == about), None)
+
+
+def stop_job(place: Path, about: str) -> None:
+    """Interrupts the newest job that works on something, if it runs."""
+    job = job_of(place, about)
+    if job is not None:
+        job.stop()
 
 
 def free_folder(name: str, place: Path) -> str:
     """The next `runs/NAME-N` that neither exists nor was given to a command."""
-    given = {job.about for job in jobs(place)}
-    return str(next_folder(name, place, given))
+    taken = {job.file.about for job in jobs(place)}
+    return str(next_folder(name, place, taken))
 
 
 def _new_folder(parent: Path) -> Path:
-    parent.mkdir(parents=True, exist_ok=True)
-    number = 1
-    while True:
-        folder = parent / f"{number:05}"
-        try:
+    for number in itertools.count(1):
+        with suppress(FileExistsError):
+            folder = parent / f"{number:05}"
             folder.mkdir(0o700)
-        except FileExistsError:
-            number += 1
-        else:
             return folder
+    raise AssertionError("unreachable")
 
 
 def _leads_group(pid: int) -> bool:

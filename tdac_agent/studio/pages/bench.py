@@ -20,12 +20,11 @@ from tdac_agent.evaluation.set_verify import MOST_EPISODES
 from tdac_agent.studio.folder import as_word, lines_in, within
 from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
-    JobButtons,
+    JobPage,
     ShownCommand,
     address_of,
     file_frame,
     framed,
-    job_heading,
     shown_first,
     status_badge,
 )
@@ -66,7 +65,7 @@ def add(place: Path) -> None:
             if folder is None or not at or not _is_bench(place, at, folder):
                 ui.label(f"There is no bench {at!r} in this folder.").classes("problem")
                 return
-            await BenchPage(place, at, folder).show()
+            await BenchPage(place, at).show()
 
 
 class BenchForm:
@@ -128,26 +127,17 @@ class BenchForm:
         ui.navigate.to(address_of("/bench", folder))
 
 
-class BenchPage:
-    """The page of one bench.
-
-    Args:
-        place: Folder of the studio.
-        at: The bench, relative to it.
-        folder: Its folder.
-    """
-
-    def __init__(self, place: Path, at: str, folder: Path) -> None:
-        self._place, self._at, self._folder = place, at, folder
-        self._shown = ""
+class BenchPage(JobPage):
+    """The page of one bench."""
 
     async def show(self) -> None:
         """Builds the page, and keeps it up to date."""
-        self._badge, self._now = job_heading(self._at)
+        self._shown = ""
+        self._build_heading()
         self._bar = ui.linear_progress(0.0, show_value=False).props("rounded")
         self._command = ShownCommand()
         with ui.row().classes("gap-2"):
-            self._buttons = JobButtons(self._interrupt, self._go_on)
+            self._build_buttons(self._go_on)
         self._foreign = ui.label(FOREIGN).classes("note text-sm")
         self._results = ui.column().classes("w-full")
         with ui.element("pre").classes("output") as self._printed:
@@ -162,14 +152,12 @@ class BenchPage:
         running = job is not None and job.running
         page = self._folder / PAGE
         done = page.is_file() and not running
-        self._badge.clear()
-        with self._badge:
-            status_badge(status_of(self._folder, job))
+        continues = job is not None and job.ours and not done
+        status = status_of(self._folder, job)
+        self._show_status(status, running=running, continues=continues)
         show = shlex.join(["tdac", "bench", "show", as_word(self._at)])
         self._command.show(show if job is None else job.command)
         self._foreign.visible = job is not None and not job.ours
-        continues = job is not None and job.ours and not done
-        self._buttons.show(running=running, continues=continues)
         self._printed.visible = not done
         self._bar.visible = job is not None and not done
         self._output.text = job.output() if job is not None else ""
@@ -186,16 +174,11 @@ class BenchPage:
                 with self._results:
                     file_frame(f"{self._at}/{PAGE}", version, f"Bench {self._at}")
 
-    def _interrupt(self) -> None:
-        job = bench_job(self._place, self._at)
-        if job is not None:
-            job.stop()
-
     def _go_on(self) -> None:
         """Starts the same command again: it goes on with the next episode."""
         job = bench_job(self._place, self._at)
         if job is not None and job.ours:
-            start(self._place, job.words, self._at)
+            start(self._place, job.file.words, self._at)
             self._look()
 
 
@@ -252,7 +235,7 @@ def _is_bench(place: Path, at: str, folder: Path) -> bool:
 
 def show_benches(place: Path, title: str) -> None:
     """Links to the benches of the folder, if there are any."""
-    begun = {job.about: job for job in reversed(jobs(place)) if bench_words(job)}
+    begun = {job.file.about: job for job in reversed(jobs(place)) if bench_words(job)}
     names = {*folders_with(place, RESULTS), *begun}
     if not names:
         return
@@ -273,12 +256,12 @@ def bench_words(job: StudioJob) -> str:
 
 def _form_of(job: StudioJob) -> tuple[Sequence[str], Sequence[str], int]:
     """Entrants, task sets and worlds of each set; no worlds for another command."""
-    match job.words:
-        case ["bench", *_] if {"--set", "-n"} <= {*job.words[:-1]}:
-            at, number = job.words.index("--set"), job.words.index("-n")
-            worlds = job.words[number + 1]
+    words = job.file.words
+    match words:
+        case ["bench", *_] if {"--set", "-n"} <= {*words[:-1]}:
+            at, worlds = words.index("--set"), words[words.index("-n") + 1]
             known = worlds.isascii() and worlds.isdecimal() and len(worlds) < 8
-            entrants, sets = job.words[1:at], job.words[at + 1].split(",")
+            entrants, sets = words[1:at], words[at + 1].split(",")
             return entrants, sets, int(worlds) if known and entrants else 0
     return (), (), 0
 

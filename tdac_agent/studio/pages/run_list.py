@@ -220,9 +220,9 @@ def _show_others(place: Path, at_work: list[StudioJob]) -> None:
         ui.label("Running now").classes("text-lg font-bold")
     for job in at_work:
         with ui.row().classes("items-center"):
-            page = {"synth": "/run", "bench": "/bench"}.get(job.words[0])
+            page = {"synth": "/run", "bench": "/bench"}.get(job.file.words[0])
             if page:
-                ui.link(job.about, address_of(page, job.about))
+                ui.link(job.file.about, address_of(page, job.file.about))
             ui.label(job.command).classes("font-mono text-sm")
             ui.button("Stop", on_click=job.stop).props("flat dense")
 

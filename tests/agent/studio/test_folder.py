@@ -113,4 +113,4 @@ def test_a_journal_with_other_types(tmp_path):
     for driven in ("x", None, [1], True, 3):
         record = {"event": "drive.end", "what": "feedback", "driven": driven}
         append_record(folder / "journal.jsonl", record)
-    assert episodes_driven(folder) == "3 of at most 40 episodes driven"
+    assert episodes_driven(load_run(folder)) == "3 of at most 40 episodes driven"

@@ -128,7 +128,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     ActionChains(page).double_click(page.find_element(By.XPATH, button)).perform()
     wait(page, lambda b: "/run?" in b.current_url)
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
-    begun = [job.about for job in jobs(studio.place)]
+    begun = [job.file.about for job in jobs(studio.place)]
     assert [about for about in begun if "plan" in about] == ["runs/plan-1"]
     assert "not begun here" not in text_of(page)
     frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))

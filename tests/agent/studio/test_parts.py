@@ -37,15 +37,16 @@ from tdac_agent.studio.comparison import (
 from tdac_agent.studio.deployable import deployable
 from tdac_agent.studio.draft import Checked, TaskDraft, check
 from tdac_agent.studio.driving import KeyboardDrive
+from tdac_agent.studio.job_file import JobFile
 from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run_list import unpack
 from tdac_agent.studio.pages.writers import Writers
 from tdac_agent.studio.run_status import (
-    about_given,
     asked_by,
     episodes_driven,
+    initial_controller_text,
     is_from_elsewhere,
     last_step,
 )
@@ -183,18 +184,18 @@ def test_a_job_is_found_again(tmp_path):
     other = start(tmp_path, ["runs", "missing"], "runs/y")
     wait_for(other)
     assert other.code == 2
-    assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
+    assert [each.file.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
     assert shlex.split(other.command)[0] == "tdac"
     # A damaged record hides no other one.
     (other.folder.with_name("99999")).mkdir()
     (other.folder.with_name("99999") / "job.json").write_text("{")
-    assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
+    assert [each.file.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
 
 
 def test_a_command_at_work_is_not_started_twice(tmp_path):
     """As by a double click; and its folder is given to no other one."""
     job = start(tmp_path, ["runs", "."], free_folder("demo", tmp_path))
-    assert job.about == "runs/demo-1"
+    assert job.file.about == "runs/demo-1"
     assert start(tmp_path, ["runs", "."], "runs/demo-1") == job
     assert start(tmp_path, ["sets"], "runs/demo-1") != job
     assert free_folder("demo", tmp_path) == "runs/demo-2"
@@ -221,8 +222,8 @@ def test_files_of_one_name_are_told_apart():
 
 def test_a_bench_tells_how_far_it_is(tmp_path):
     words = ("bench", "builtin", "dwa", "--set", "known,lost", "-n", "10")
-    now = datetime.now(UTC)
-    job = StudioJob(tmp_path, words, now, 2, "", "bench-1", ours=True)
+    facts = {"words": words, "started": datetime.now(UTC), "born": "", "about": "b"}
+    job = StudioJob(tmp_path, JobFile(**facts, pid=2), ours=True)
     assert progress_of(job, tmp_path)[0] == 0.0
     for name, file in (
         ("known/a", "set.json"),
@@ -271,7 +272,7 @@ def test_a_run_from_elsewhere_is_marked():
     """Such as the recorded run that `tdac demo` replays."""
     folder = Path(tdac_agent.__file__).parent / "runs" / "demo"
     assert load_run(folder).status == "verified"
-    assert is_from_elsewhere(folder)
+    assert is_from_elsewhere(load_run(folder))
 
 
 def test_a_run_from_elsewhere_always_asks():
@@ -332,12 +333,12 @@ def test_a_radius_that_gets_through(widest, radius, fits):
 def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(DEMO, folder)
-    assert about_given(folder) == ""  # it began with no file
+    assert initial_controller_text(load_run(folder)) == ""  # it began with no file
     run = load_run(folder)
     given = run.model_copy(update={"given_sha256": "0" * 64, "optimizer": "builtin"})
     (folder / "run.json").write_text(given.model_dump_json())
     failed = len(run.attempts[0].failed_tests)
-    text = about_given(folder)
+    text = initial_controller_text(load_run(folder))
     begin = (
         f"Your controller failed {failed} tests: see iteration 1 below. The verified"
     )
@@ -403,7 +404,7 @@ def test_the_last_step_of_a_run_is_in_words():
 
 def test_a_run_on_a_set_tells_how_far_it_is(tmp_path):
     """Episodes of the limit alone: those of a comparison at the end are others."""
-    assert episodes_driven(DEMO) == ""  # it is on one task
+    assert episodes_driven(load_run(DEMO)) == ""  # it is on one task
     folder = tmp_path / "run"
     shutil.copytree(DEMO, folder)
     run = load_run(folder).model_copy(update={"episodes": 40, "improve": 8})
@@ -415,4 +416,4 @@ def test_a_run_on_a_set_tells_how_far_it_is(tmp_path):
         rows = folder / "iterations/k01/j0" / name / "unfinished/episodes.jsonl"
         rows.parent.mkdir(parents=True)
         rows.write_text("{}\n" * 3)
-    assert episodes_driven(folder) == "16 of at most 48 episodes driven"
+    assert episodes_driven(load_run(folder)) == "16 of at most 48 episodes driven"
