@@ -7,7 +7,6 @@ folder. Its slots are file locks, so that a process that dies frees its slot.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import random
@@ -26,7 +25,7 @@ from tdac_agent.models.provider import (
     served_at,
 )
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.locks import wait_for
+from tdac_agent.storage.locks import first_free, wait_for
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 
 FIRST = 8.0
@@ -85,16 +84,9 @@ class ConcurrencyLimit:
 
     def _free(self) -> int | None:
         """Locks a slot and returns its descriptor; None if all are taken."""
-        for number in range(int(self.slots)):
-            file = self._folder / f"place-{number:03d}"
-            handle = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                os.close(handle)
-                continue
-            return handle
-        return None
+        numbers = range(int(self.slots))
+        free = first_free(self._folder / f"place-{number:03d}" for number in numbers)
+        return None if free is None else free[1]
 
     def _read(self) -> tuple[float, float]:
         """The number of slots, and when it was last halved."""

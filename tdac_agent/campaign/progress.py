@@ -59,7 +59,7 @@ class Doing:
 
     planned: PlannedRun
     since: float
-    said: str = "beginning"
+    activity: str = "beginning"
 
 
 @dataclass(slots=True)
@@ -141,7 +141,7 @@ class CampaignProgress:
             case Started():
                 self.doing[name] = Doing(update.job, time.monotonic())
             case Reported() if name in self.doing:
-                self.doing[name].said = _activity(update.record)
+                self.doing[name].activity = _activity(update.record)
             case Died():
                 self.deaths += 1
                 self.doing.pop(name, None)

@@ -21,13 +21,20 @@ from tdac_agent.campaign.drive import (
     unplanned_folders,
 )
 from tdac_agent.campaign.perform import Terms
-from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
+from tdac_agent.campaign.plan import (
+    Plan,
+    PlannedRun,
+    Shard,
+    make_plan,
+    models_of,
+    setting_of,
+)
 from tdac_agent.campaign.progress import CampaignProgress
 from tdac_agent.cli.campaign_live import LiveView
 from tdac_agent.cli.campaign_table import make_console, progress_line
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
-from tdac_agent.executors.choice import executor_of
+from tdac_agent.executors.local import executor_of
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.provider import Provider
@@ -147,7 +154,7 @@ def check_models(
         models += choose_models(
             cell.learner,
             cell.optimizer,
-            plan.setting(cell),
+            setting_of(plan.problem(cell)),
             cell.base_url,
             key_over_http=key_over_http,
         )

@@ -12,7 +12,14 @@ from rich.table import Table
 from tdac_agent.campaign.config import find_config, read_config
 from tdac_agent.campaign.drive import read_progress
 from tdac_agent.campaign.perform import RUNS
-from tdac_agent.campaign.plan import Cell, Plan, Shard, make_plan, models_of
+from tdac_agent.campaign.plan import (
+    Cell,
+    Plan,
+    Shard,
+    make_plan,
+    models_of,
+    question_of,
+)
 from tdac_agent.cli.campaign import CampaignCommand, with_limits
 from tdac_agent.cli.campaign_table import labels_of, make_console, make_table
 from tdac_agent.cli.sentences import print_sentences
@@ -109,7 +116,7 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
 def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
     forecast: CostForecast = cost_of(
         cell.task_name,
-        plan.question(cell, load_template(cell.prompt)),
+        question_of(plan.problem(cell), load_template(cell.prompt)),
         cell.learner,
         cell.optimizer,
         prices,

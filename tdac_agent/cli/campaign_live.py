@@ -117,7 +117,9 @@ class LiveView:
         for one in doing:
             labels = " ".join(self._labels.of(one.planned.cell))
             name = f"[cyan]▸[/] {escape(labels)} [dim]r{one.planned.index:04d}[/]"
-            grid.add_row(name, format_duration(time.monotonic() - one.since), one.said)
+            grid.add_row(
+                name, format_duration(time.monotonic() - one.since), one.activity
+            )
         return grid
 
     def _bar(self) -> Padding:

@@ -16,6 +16,7 @@ from typing import IO, Any
 from tdac_agent.executors.cores import core_locks
 from tdac_agent.executors.executor import (
     Ended,
+    Executor,
     ExecutorJob,
     J,
     Next,
@@ -202,3 +203,12 @@ def _receive(
             yield Ended(job, jobs.work.read(message["outcome"]))
         else:
             yield Reported(job, message["record"])
+
+
+def executor_of(name: str) -> Executor[Any, Any]:
+    """The executor `local` or `ray`."""
+    if name == "ray":
+        from tdac_agent.executors.on_ray import run_on_ray  # an extra
+
+        return run_on_ray
+    return run_locally

@@ -56,8 +56,8 @@ def run_on_ray(work: Work[O], next_job: Next[J]) -> Generator[Update[J, O]]:
                 job = jobs.next()
                 if job is None:
                     break
-                given = job.to_json(), work.module, work.terms, os.getcwd()
-                pending[task.remote(*given)] = job
+                arguments = job.to_json(), work.module, work.terms, os.getcwd()
+                pending[task.remote(*arguments)] = job
                 yield Started(job)
             if not pending:
                 return

@@ -112,7 +112,7 @@ def export_set(tasks: TaskSet, out: Path, worlds: int = WORLDS) -> Path:
 
 
 def _write_common(
-    problem: Problem, out: Path, about: dict[str, Any], facts: dict[str, Any]
+    problem: Problem, out: Path, labels: dict[str, Any], facts: dict[str, Any]
 ) -> Path:
     """Writes all files but the problem itself; returns the folder of the tests."""
     question, solution = problem.question(), problem.reference()
@@ -123,7 +123,7 @@ def _write_common(
         folder.mkdir(parents=True)
     wheel = write_wheel(tests)
     values = {
-        **about,
+        **labels,
         "facts": {"tdac_version": version("tdac"), **facts},
         "question": question,
         "wheel": wheel.name,

@@ -112,13 +112,13 @@ def _number(value: float, form: str) -> str:
 
 def _assumptions(groups: list[RunFrames]) -> tuple[str, ...]:
     """The kind of interval of each metric, and what it assumes."""
-    found = [("SR", success_rate(group).method) for group in groups]
-    found += [("CS(K), first pass", first_pass(group).method) for group in groups]
+    methods = [("SR", success_rate(group).method) for group in groups]
+    methods += [("CS(K), first pass", first_pass(group).method) for group in groups]
     return tuple(
         f"{name}: {ASSUMPTIONS[method]}"
         if method == "none"
         else f"{name}: {method}: {ASSUMPTIONS[method]}"
-        for name, method in dict.fromkeys(found)
+        for name, method in dict.fromkeys(methods)
     )
 
 

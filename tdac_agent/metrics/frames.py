@@ -57,7 +57,8 @@ class RunFrames:
         """Selects the runs whose columns have these values, and their candidates."""
         chosen = self.runs
         for name, value in columns.items():
-            chosen = chosen[chosen[name] == value]
+            same = chosen[name].isna() if pd.isna(value) else chosen[name] == value
+            chosen = chosen[same]
         kept = self.candidates["run"].isin(chosen["run"])
         return RunFrames(chosen, self.candidates[kept])
 
@@ -68,10 +69,10 @@ def find_runs(folder: Path) -> Iterator[Run]:
     Raises:
         RunError: There is no run, or one cannot be read.
     """
-    found = sorted(path.parent for path in folder.rglob("run.json"))
-    if not found:
+    folders = sorted(path.parent for path in folder.rglob("run.json"))
+    if not folders:
         raise RunError(f"there is no run at or below {folder}: no file run.json")
-    yield from map(load_run, found)
+    yield from map(load_run, folders)
 
 
 def load_frames(*folders: Path) -> RunFrames:
@@ -200,8 +201,8 @@ def frames_from_tau(
     ):
         run = f"{' '.join(labels.values())} {number + 1}"
         status = "verified" if first else "interrupted" if cut else "not verified"
-        about = {"run": run, "K": most, "status": status, "tau": first, "done": done}
-        rows.append(dict.fromkeys(RUN_COLUMNS) | about | {"censored": cut, **labels})
+        facts = {"run": run, "K": most, "status": status, "tau": first, "done": done}
+        rows.append(dict.fromkeys(RUN_COLUMNS) | facts | {"censored": cut, **labels})
         for k in range(1, done + 1):
             passed = k == first
             valid = passed or left == 0

@@ -152,7 +152,7 @@ def _resampled(
 
     from scipy.stats import bootstrap  # slow to import
 
-    found = bootstrap(
+    interval = bootstrap(
         (passed, tried),
         ratio,
         paired=True,
@@ -162,4 +162,4 @@ def _resampled(
         method="percentile",
         rng=np.random.default_rng(seed),
     ).confidence_interval
-    return float(found.low), float(found.high), "runs resampled"
+    return float(interval.low), float(interval.high), "runs resampled"

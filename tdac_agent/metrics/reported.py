@@ -60,11 +60,11 @@ def _kind(row: dict[str, str], labels: list[str], path: Path, most: int) -> RunF
     tau: list[int] = []
     ended: list[int] = []
     for word in row["tau"].split():
-        found = _WORD.fullmatch(word)
-        if found is None:
+        match = _WORD.fullmatch(word)
+        if match is None:
             wanted = "expected iterations such as 1 2 5+"
             raise RunError(f"{path}: {wanted}, got {row['tau']!r}")
-        (ended if found[2] else tau).append(int(found[1]))
+        (ended if match[2] else tau).append(int(match[1]))
     return frames_from_tau(
         tau,
         most,

@@ -39,17 +39,8 @@ def summarise(frames: RunFrames, by: Sequence[str] = KIND) -> pd.DataFrame:
     rows = []
     for names, _ in frames.runs.groupby(columns, sort=False, dropna=False):
         label = dict(zip(columns, names, strict=True))
-        rows.append(label | _metrics(_kind(frames, label)))
+        rows.append(label | _metrics(frames.only(**label)))
     return pd.DataFrame(rows)
-
-
-def _kind(frames: RunFrames, label: dict[str, object]) -> RunFrames:
-    chosen = frames.runs
-    for name, value in label.items():
-        same = chosen[name].isna() if pd.isna(value) else chosen[name] == value
-        chosen = chosen[same]
-    kept = frames.candidates["run"].isin(chosen["run"])
-    return RunFrames(chosen, frames.candidates[kept])
 
 
 def _metrics(frames: RunFrames) -> dict[str, object]:

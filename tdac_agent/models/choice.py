@@ -181,9 +181,9 @@ def check_name(name: str) -> None:
 def _meant(name: str) -> str:
     """What a name without a provider, or with another program's name, stands for."""
     for pattern, form in MEANT.items():
-        found = re.fullmatch(pattern, name)
-        if found:
-            return f" (did you mean {form.format(found[1])}?)"
+        match = re.fullmatch(pattern, name)
+        if match:
+            return f" (did you mean {form.format(match[1])}?)"
     return ""
 
 

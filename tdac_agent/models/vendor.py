@@ -78,16 +78,16 @@ class VendorModel(ABC, Generic[C]):
     @property
     def missing(self) -> tuple[str, ...]:
         """A line each for the package and the key, if they are missing."""
-        vendor, found = self.vendor, []
+        vendor, missing = self.vendor, []
         # The import takes a second or two, so it is left to the first question.
         if importlib.util.find_spec(vendor.package) is None:
             install = install_command(vendor.extra)
-            found.append(f"{self.name} needs a package: {install}")
+            missing.append(f"{self.name} needs a package: {install}")
         try:
             self._read_key()
         except ProviderError as error:
-            found.append(str(error))
-        return tuple(found)
+            missing.append(str(error))
+        return tuple(missing)
 
     @classmethod
     def make(cls, words: str, options: Options) -> VendorModel[C]:

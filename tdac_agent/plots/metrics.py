@@ -160,8 +160,8 @@ def plot_cumulative_panels(
     if curves:
         _frame(grid.flat[0], curves)
     figure.supxlabel("iteration k", fontsize=9.5, color=TEXT)
-    about = f"{heading}\n{provenance}" if provenance else heading
-    figure.suptitle(about, x=0.01, ha="left", fontsize=10.5, color=TEXT)
+    text = f"{heading}\n{provenance}" if provenance else heading
+    figure.suptitle(text, x=0.01, ha="left", fontsize=10.5, color=TEXT)
     return figure
 
 

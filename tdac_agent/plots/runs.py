@@ -99,8 +99,8 @@ def plot_breakdown(run: Run) -> Figure:
     ]
     _stack(panels[0], spent, ("writing", "editing", "rules", "testing"), "seconds")
     counted = "" if run.tokens else "; tokens were not counted"
-    about = learner_named(run.learner) + counted
-    title(panels[0], f"Time of {run.folder.name}", about)
+    subtitle = learner_named(run.learner) + counted
+    title(panels[0], f"Time of {run.folder.name}", subtitle)
     if run.tokens:
         _stack(panels[1], spent, ("tokens in", "tokens out"), "tokens")
         panels[1].yaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))

@@ -108,12 +108,12 @@ def _outermost(folders: set[str]) -> list[str]:
 
 
 def _foreign(folders: list[str]) -> list[str]:
-    found: set[str] = set()
+    paths: set[str] = set()
     for folder in folders:
         for name in FOREIGN_PACKAGES:
             for pattern in (name, f"*/{name}"):
-                found.update(str(path) for path in Path(folder).glob(pattern))
-    return sorted(found)
+                paths.update(str(path) for path in Path(folder).glob(pattern))
+    return sorted(paths)
 
 
 @functools.cache

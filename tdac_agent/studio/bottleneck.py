@@ -109,7 +109,7 @@ def outlines_of(solid: Prisms, between: float) -> Points:
         solid: The parts.
         between: Largest distance between neighbours.
     """
-    found = []
+    points = []
     for part in range(len(solid.extent)):
         outline, radius = solid.outline(part), float(solid.extent[part, ROUND])
         if radius > 0.0:
@@ -118,9 +118,9 @@ def outlines_of(solid: Prisms, between: float) -> Points:
             ring = np.column_stack([np.cos(angles), np.sin(angles)])
             outline = outline[0] + radius * ring
         closed = np.vstack([outline, outline[:1]])
-        found.append(_sampled(closed, between)[0])
-        found.append(outline)
-    return np.concatenate(found)
+        points.append(_sampled(closed, between)[0])
+        points.append(outline)
+    return np.concatenate(points)
 
 
 def _at_end(tree: Any, end: Points, name: Literal["start", "goal"]) -> Bottleneck:
@@ -154,14 +154,14 @@ def _nearest_on_sides(
     """
     begins, ends = np.delete(path[:-1], leg, 0), np.delete(path[1:], leg, 0)
     side = _cross(path[leg + 1] - path[leg], walls - point)
-    found = []
+    points = []
     for here in (side > 0, side < 0):
         own = walls[here][np.argsort(np.hypot(*(walls[here] - point).T))]
         seen = np.flatnonzero(~_crosses(point, own, begins, ends))
         if not seen.size:
             return None
-        found.append(own[seen[0]])
-    return found[0], found[1]
+        points.append(own[seen[0]])
+    return points[0], points[1]
 
 
 def _crosses(point: Points, to: Points, begins: Points, ends: Points) -> Any:

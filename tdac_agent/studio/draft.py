@@ -15,10 +15,16 @@ from tdac_agent.studio.source_view import Kind, Place, SourceView
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.core.errors import TdacError
+from tdac_envs.grid.plan import path_length
 from tdac_envs.map2d.task import Map2DTask
 
 DIGITS = {"px": 1, "m": 3}
 """Decimals of clicked places."""
+LEAST_RADIUS, RADIUS_STEP = 1.0, 0.5
+"""Of the slider for the robot's radius, px."""
+ELSEWHERE = 0.5
+"""By how much half of a passage must be less than the widest radius, px, if that gets
+through elsewhere: it is measured between walls, the radius from pixel to pixel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,12 +93,12 @@ class TaskDraft:
         start: tuple[float, ...] | None = self.start
         if start is not None and self.heading is not None:
             start = (*start, self.heading)
-        given: dict[str, Any] = {"start": start, "goal": self.goal}
+        values: dict[str, Any] = {"start": start, "goal": self.goal}
         if self.kind == "world":
-            given |= {"env": "TDAC-EPuck-v0", "world": self.source}
-            return TaskFile(**given)
-        given |= {"map": self.source, "robot": {"radius": self.radius}}
-        return TaskFile(**given, polarity=self.polarity)
+            values |= {"env": "TDAC-EPuck-v0", "world": self.source}
+            return TaskFile(**values)
+        values |= {"map": self.source, "robot": {"radius": self.radius}}
+        return TaskFile(**values, polarity=self.polarity)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,6 +161,43 @@ def snapped(draft: TaskDraft, place: Path) -> TaskDraft:
         start=(float(start[0]), float(start[1])),
         goal=(float(goal[0]), float(goal[1])),
     )
+
+
+def fitting_radius(draft: TaskDraft, checked: Checked | None) -> float | None:
+    """The largest radius of the slider that gets through; None if that is no help."""
+    if checked is None or checked.widest is None or draft.radius is None:
+        return None
+    fitting = math.floor(checked.widest / RADIUS_STEP) * RADIUS_STEP
+    return fitting if LEAST_RADIUS <= fitting < draft.radius else None
+
+
+def sentence_of(checked: Checked, view: SourceView) -> tuple[str, bool]:
+    """What was found, and whether it is good."""
+    if checked.task is None:
+        return checked.problem, False
+    reach = checked.task.nominal.goal_tolerance
+    text = (
+        f"A path of {path_length(checked.path):.4g} {view.unit}; the goal is reached "
+        f"within {reach:.3g} {view.unit} (green disc)"
+    )
+    return f"{text}.{_about_passage(checked, view.unit)}", True
+
+
+def _about_passage(checked: Checked, unit: str) -> str:
+    """How wide the narrowest passage of the path is, and for which robots."""
+    narrowest, widest = checked.narrowest, checked.widest
+    if narrowest is None:
+        return ""
+    if narrowest.at != "path":
+        away = narrowest.width / 2.0
+        text = f"It is narrowest at the {narrowest.at}, {away:.3g} {unit} from a wall"
+    else:
+        text = f"Its narrowest passage (bar) is {narrowest.width:.3g} {unit} wide"
+    if widest is None:
+        return f" {text}."
+    if narrowest.width / 2.0 > widest - ELSEWHERE:
+        return f" {text}: room for a radius of {widest:g} {unit}."
+    return f" {text}; another path has room for a radius of {widest:g} {unit}."
 
 
 def _rounded(place: Place, unit: str) -> Place:

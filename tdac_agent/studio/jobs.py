@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import functools
+import hmac
 import itertools
 import os
 import shlex
@@ -19,16 +20,20 @@ from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Annotated, Self
 
-from pydantic import ValidationError
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
 from tdac_agent.interpreter import python, safe_environment
 from tdac_agent.library.listing import next_folder
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.studio.folder import STATE, made_within
-from tdac_agent.studio.job_file import JobFile, read_job, write_job
+from tdac_agent.tasks.installation import keyed
 from tdac_envs.core.errors import one_line_reason
-from tdac_envs.core.intake import read_file
+from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 
+Word = Annotated[str, Field(max_length=4096)]
 JOBS, ABOUT, OUTPUT, ENDING = f"{STATE}/jobs", "job.json", "output.txt", "exit"
 TAIL = 4000
 """Characters of an output that are shown."""
@@ -46,6 +51,63 @@ while code is None:
         pass
 pathlib.Path(sys.argv[1]).write_text(str(code))
 """
+
+
+class JobFile(PrintableRecord):
+    """What was started.
+
+    Attributes:
+        words: The words after `tdac`.
+        started: When.
+        pid: Process group.
+        born: Start time of the process, which tells it from a later one with its pid.
+        about: What it works on: a run folder, or a folder of results.
+        mark: MAC of all of it.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    words: tuple[Word, ...] = Field(min_length=1, max_length=1000)
+    started: AwareDatetime
+    pid: int = Field(gt=1, lt=2**31)
+    born: str = Field(pattern=r"^[0-9]{0,20}$")
+    about: Word
+    mark: str = Field("", max_length=64)
+
+    def marked(self, file: Path) -> Self:
+        """The same with the mark of this installation.
+
+        Args:
+            file: Where it is kept: elsewhere the mark does not hold.
+        """
+        return self.model_copy(update={"mark": _mark(self, file)})
+
+    def is_ours(self, file: Path) -> bool:
+        """Whether this installation wrote it there, as it is."""
+        return hmac.compare_digest(self.mark.encode(), _mark(self, file).encode())
+
+
+def read_job(file: Path) -> JobFile:
+    """Reads the file of a job.
+
+    Raises:
+        OSError: It is missing, not regular, or too large.
+        ValueError: It is damaged.
+    """
+    return JobFile.model_validate(parse_json(read_file(file, TEXT_BYTES)))
+
+
+def write_job(file: Path, job: JobFile) -> JobFile:
+    """Marks and writes the file of a job; returns what was written."""
+    marked = job.marked(file)
+    write_atomic(file, marked.model_dump_json() + "\n")
+    return marked
+
+
+def _mark(job: BaseModel, file: Path) -> str:
+    facts = job.model_dump_json(exclude={"mark"})
+    about = f"job|{file.absolute()}|{facts}"
+    return keyed(about.encode("utf-8", "surrogatepass")).hex()
 
 
 @dataclass(frozen=True, slots=True)

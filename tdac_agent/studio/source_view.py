@@ -45,9 +45,8 @@ class SourceView:
         width: Its width, px.
         height: Its height, px.
         unit: Unit of places, `px` or `m`.
-        scale: Picture px per unit.
-        place: Place at a point of the picture.
-        at: Points of the picture for places, shape (n, 2).
+        scale: Picture px per unit, in x and in y.
+        origin: Point of the picture for the place (0, 0).
         reading: How it was read, in a sentence.
         notes: What the reader is to know.
         start: Where the robot of the file starts, with its heading, if it says so.
@@ -64,9 +63,8 @@ class SourceView:
     width: int
     height: int
     unit: str
-    scale: float
-    place: Callable[[float, float], Place]
-    at: Callable[[ArrayLike], NDArray[np.float64]]
+    scale: tuple[float, float]
+    origin: tuple[float, float]
     reading: str
     notes: tuple[str, ...] = ()
     start: tuple[float, float, float] | None = None
@@ -74,6 +72,15 @@ class SourceView:
     radius: float | None = None
     widest: Callable[[Place, Place], float] | None = None
     laid_over: Callable[[BoolGrid], bytes] | None = None
+
+    def at(self, places: ArrayLike) -> NDArray[np.float64]:
+        """Points of the picture for places, shape (n, 2)."""
+        return np.asarray(places, np.float64).reshape(-1, 2) * self.scale + self.origin
+
+    def place(self, x: float, y: float) -> Place:
+        """The place at a point of the picture."""
+        over, down = np.subtract((x, y), self.origin) / self.scale
+        return float(over), float(down)
 
 
 def names_of(kind: Kind) -> tuple[str, ...]:
@@ -123,12 +130,6 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
     def laid_over(cells: BoolGrid) -> bytes:
         return png(_laid_over(image, cells, zoom))
 
-    def place(x: float, y: float) -> Place:
-        return x / zoom - 0.5, y / zoom - 0.5
-
-    def at(points: ArrayLike) -> NDArray[np.float64]:
-        return (np.asarray(points, np.float64).reshape(-1, 2) + 0.5) * zoom
-
     def widest(start: Place, goal: Place) -> float:
         ends = [_pixel(grid.cells, each) for each in (start, goal)]
         return float(widest_radius(clearance(grid.cells), *ends))
@@ -141,9 +142,8 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
         picture.shape[1],
         picture.shape[0],
         "px",
-        zoom,
-        place,
-        at,
+        (zoom, zoom),
+        (0.5 * zoom, 0.5 * zoom),
         text,
         tuple(params.notes),
         (*bundled.start, bundled.heading) if bundled else None,
@@ -167,12 +167,7 @@ def _of_world(source: str) -> SourceView:
             "unless they are ignored"
         )
     robot = next(iter(world.robots), None)
-
-    def place(x: float, y: float) -> Place:
-        return view.place(x - 0.5, y - 0.5)
-
-    def at(points: ArrayLike) -> NDArray[np.float64]:
-        return view.at(points) + 0.5
+    ((left, low),) = (view.at([0.0, 0.0]) + 0.5).tolist()
 
     text = f"Webots {world.version}: {len(world.obstacles)} obstacles; places in metres"
     return SourceView(
@@ -181,9 +176,8 @@ def _of_world(source: str) -> SourceView:
         picture.shape[1],
         picture.shape[0],
         "m",
-        view.scale,
-        place,
-        at,
+        (view.scale, -view.scale),
+        (left, low),
         text,
         tuple(notes),
         (robot.x, robot.y, robot.heading) if robot else None,

@@ -17,7 +17,7 @@ from tdac_agent.evaluation.entrants import BUILTIN
 from tdac_agent.evaluation.kept_sets import REPORT_FILE, ROWS_FILE, UNFINISHED
 from tdac_agent.evaluation.salt import SEALED
 from tdac_agent.evaluation.set_verify import MOST_EPISODES
-from tdac_agent.studio.folder import as_word, lines_in, within
+from tdac_agent.studio.folder import as_word, folders_with, lines_in, within
 from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
     JobPage,
@@ -29,7 +29,6 @@ from tdac_agent.studio.pages.layout import (
     status_badge,
 )
 from tdac_agent.studio.pages.worlds import policies_in
-from tdac_agent.studio.sources import folders_with
 from tdac_envs.ladder.set_file import shipped_names
 
 FOREIGN = (

@@ -14,8 +14,14 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from tdac_agent.studio.check_text import fitting_radius, sentence_of
-from tdac_agent.studio.draft import Checked, TaskDraft, check, snapped
+from tdac_agent.studio.draft import (
+    Checked,
+    TaskDraft,
+    check,
+    fitting_radius,
+    sentence_of,
+    snapped,
+)
 from tdac_agent.studio.jobs import free_folder, start
 from tdac_agent.studio.pages.clickable_map import ClickableMap, Mode
 from tdac_agent.studio.pages.layout import (
@@ -157,16 +163,21 @@ class StartPage:
         place = self._view.place(x, y)
         nearest = _on_pixel(place, unit)
         if mode == "start":
-            self._draft = self._draft.with_start(nearest, unit)
+            await self._change(self._draft.with_start(nearest, unit))
         elif mode == "heading":
-            self._draft = self._draft.facing(place)
+            await self._change(self._draft.facing(place))
         else:
-            self._draft = self._draft.with_goal(nearest, unit)
-        self._form.show(self._draft)
+            await self._change(self._draft.with_goal(nearest, unit))
+
+    async def _change(self, draft: TaskDraft) -> None:
+        """Shows another draft, and checks it."""
+        self._draft = draft
+        self._form.show(draft)
         await self._check()
 
     async def _typed(self) -> None:
         if self._draft is not None:
+            # Not shown: half of a place may have been typed.
             self._draft = self._form.written(self._draft)
             await self._check()
 
@@ -176,15 +187,9 @@ class StartPage:
         if self._draft is None or len(values) != 6:
             return
         x, y, heading, goal_x, goal_y, radius = values
-        self._draft = replace(
-            self._draft,
-            start=(x, y),
-            heading=heading,
-            goal=(goal_x, goal_y),
-            radius=radius,
-        )
-        self._form.show(self._draft)
-        await self._check()
+        start, goal = (x, y), (goal_x, goal_y)
+        placed = replace(self._draft, start=start, goal=goal, heading=heading)
+        await self._change(replace(placed, radius=radius))
 
     async def _move(self) -> None:
         """Moves start and goal to the nearest free places."""
@@ -196,18 +201,14 @@ class StartPage:
         except (TdacError, ValueError) as error:
             self._form.tell(str(error), good=False)
             return
-        self._draft = moved
-        self._form.show(moved)
-        await self._check()
+        await self._change(moved)
 
     async def _shrink(self) -> None:
         """Takes the largest radius of the slider that gets through."""
         draft = self._draft
         fitting = None if draft is None else fitting_radius(draft, self._checked)
         if draft is not None and fitting is not None:
-            self._draft = replace(draft, radius=fitting)
-            self._form.show(self._draft)
-            await self._check()
+            await self._change(replace(draft, radius=fitting))
 
     async def _resized(self) -> None:
         if self._draft is not None:

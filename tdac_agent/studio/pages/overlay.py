@@ -29,7 +29,7 @@ def overlay(view: SourceView, draft: TaskDraft, checked: Checked | None) -> str:
         ((x, y),) = view.at([draft.goal]).tolist()
         size = 5 * thick
         if checked is not None and checked.task is not None:
-            reach = checked.task.nominal.goal_tolerance * view.scale
+            reach = checked.task.nominal.goal_tolerance * view.scale[0]
             parts.append(_circle(x, y, reach, f"{GOAL}30", GOAL, 0.6 * thick))
         parts.append(_circle(x, y, size, "none", GOAL, 1.6 * thick))
         parts.append(_circle(x, y, 0.4 * size, GOAL, "none", 0))
@@ -45,7 +45,7 @@ def _robot(
     """The body at the start, with a line towards its heading."""
     ((x, y),) = view.at([start]).tolist()
     body = draft.radius if draft.radius is not None else BODY_RADIUS
-    radius = max(body * view.scale, 3 * thick)
+    radius = max(body * view.scale[0], 3 * thick)
     heading = draft.heading or 0.0
     ahead = np.add(start, [math.cos(heading), math.sin(heading)])
     ((to_x, to_y),) = view.at([ahead]).tolist()

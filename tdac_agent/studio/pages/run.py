@@ -13,8 +13,7 @@ from nicegui import ui
 
 from tdac_agent.library.listing import row_of
 from tdac_agent.runs.run_record import RUN_FILE, Run, load_run
-from tdac_agent.studio.deployable import deployable
-from tdac_agent.studio.folder import as_word, within
+from tdac_agent.studio.folder import as_word, deployable, within
 from tdac_agent.studio.jobs import StudioJob, job_of, start
 from tdac_agent.studio.pages.layout import (
     JobPage,

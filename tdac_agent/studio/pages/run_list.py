@@ -15,7 +15,7 @@ from tdac_agent.campaign.drive import CONFIG_FILE
 from tdac_agent.library.listing import folders_of, row_of, variations_text
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
-from tdac_agent.studio.folder import within
+from tdac_agent.studio.folder import folders_with, within
 from tdac_agent.studio.jobs import StudioJob, jobs
 from tdac_agent.studio.pages.bench import show_benches
 from tdac_agent.studio.pages.layout import (
@@ -24,7 +24,6 @@ from tdac_agent.studio.pages.layout import (
     report_frame,
     shown_first,
 )
-from tdac_agent.studio.sources import folders_with
 from tdac_envs.core.intake import read_zip
 
 NONE = "–"
@@ -116,10 +115,10 @@ class RunList:
 
 def rows_in(place: Path) -> list[dict[str, Any]]:
     """A row for each run and training, the newest first."""
-    found = sorted(map(_row, folders_of(place)), key=lambda row: row.get("started", ""))
+    known = sorted(map(_row, folders_of(place)), key=lambda row: row.get("started", ""))
     for folder in [each for each in _known if not each.exists()]:
         del _known[folder]
-    return [_cells(place, row) for row in reversed(found[-MOST_ROWS:])]
+    return [_cells(place, row) for row in reversed(known[-MOST_ROWS:])]
 
 
 def _row(folder: Path) -> dict[str, Any]:

@@ -7,8 +7,13 @@ from dataclasses import replace
 
 from nicegui import ui
 
-from tdac_agent.studio.check_text import LEAST_RADIUS, RADIUS_STEP, fitting_radius
-from tdac_agent.studio.draft import Checked, TaskDraft
+from tdac_agent.studio.draft import (
+    LEAST_RADIUS,
+    RADIUS_STEP,
+    Checked,
+    TaskDraft,
+    fitting_radius,
+)
 from tdac_agent.studio.source_view import SourceView
 
 NAMES = "start x", "start y", "heading, rad", "goal x", "goal y"
@@ -48,7 +53,7 @@ class TaskForm:
                 min=LEAST_RADIUS, max=40, step=RADIUS_STEP, value=RADIUS
             ).props("label aria-label='robot radius, px'")
             self._radius.on("change", resized)
-        self._told = ui.label().classes("found text-sm").props("role=status")
+        self._verdict = ui.label().classes("found text-sm").props("role=status")
         self._snap = ui.button("Use the nearest free place", on_click=snap).props(
             "outline no-caps dense"
         )
@@ -101,7 +106,7 @@ class TaskForm:
 
     def tell(self, text: str, good: bool) -> None:
         """Shows a sentence in its colour."""
-        self._told.text = text
-        self._told.classes(
+        self._verdict.text = text
+        self._verdict.classes(
             add="fine" if good else "problem", remove="problem" if good else "fine"
         )

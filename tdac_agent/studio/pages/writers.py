@@ -109,8 +109,8 @@ class Writers:
             missing = missing_for_name(self._learner, Options(None, self._base_url))
         except ProviderError as error:
             return str(error)
-        told = "; ".join(missing)
-        return f"{told} (where you start the studio)" if missing else None
+        text = "; ".join(missing)
+        return f"{text} (where you start the studio)" if missing else None
 
     def _update(self) -> None:
         who = self._who.value

@@ -22,7 +22,7 @@ from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, reveal
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.set_verify import verify_on_set
-from tdac_agent.executors.choice import executor_of
+from tdac_agent.executors.local import executor_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError

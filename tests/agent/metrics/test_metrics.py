@@ -291,7 +291,7 @@ def test_a_broken_table(tmp_path, text, only, told):
 
 
 def test_a_run_counts_once():
-    """RunFrames that share a run are not joined, and there must be some."""
+    """Frames that share a run are not joined, and there must be some."""
     frames = frames_from_tau([1], 2, learner="one")
     with pytest.raises(RunError, match="twice"):
         join_frames(frames, frames)

@@ -13,8 +13,15 @@ pytest.importorskip("nicegui", reason="needs tdac[studio]")
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import append_record
-from tdac_agent.studio.deployable import deployable
-from tdac_agent.studio.folder import STATE, as_word, keep, lines_in, made_within, within
+from tdac_agent.studio.folder import (
+    STATE,
+    as_word,
+    deployable,
+    keep,
+    lines_in,
+    made_within,
+    within,
+)
 from tdac_agent.studio.jobs import start
 from tdac_agent.studio.pages.questions import asked_for
 from tdac_agent.studio.pages.worlds import policies_in

@@ -11,8 +11,16 @@ pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
 from tdac_agent.studio import jobs as module
 from tdac_agent.studio.folder import STATE
-from tdac_agent.studio.job_file import JobFile, read_job, write_job
-from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
+from tdac_agent.studio.jobs import (
+    JobFile,
+    StudioJob,
+    free_folder,
+    job_of,
+    jobs,
+    read_job,
+    start,
+    write_job,
+)
 from tdac_agent.studio.pages.bench import bench_job, bench_words, progress_of
 
 WORDS = ["bench", "builtin", "--set", "known", "-n", "10"]

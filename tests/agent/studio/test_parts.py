@@ -27,18 +27,22 @@ from tdac_agent.runs.ownership import sign
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import append_record
-from tdac_agent.studio.check_text import fitting_radius, sentence_of
 from tdac_agent.studio.comparison import (
     difference,
     figures_of,
     lines_of,
     settings_of,
 )
-from tdac_agent.studio.deployable import deployable
-from tdac_agent.studio.draft import Checked, TaskDraft, check
+from tdac_agent.studio.draft import (
+    Checked,
+    TaskDraft,
+    check,
+    fitting_radius,
+    sentence_of,
+)
 from tdac_agent.studio.driving import KeyboardDrive
-from tdac_agent.studio.job_file import JobFile
-from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
+from tdac_agent.studio.folder import deployable
+from tdac_agent.studio.jobs import JobFile, StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run_list import unpack
@@ -369,7 +373,7 @@ def test_what_differs_between_two_runs(tmp_path):
 
     def differing(values_of):
         lines = lines_of(values_of(one), values_of(other))
-        return {line.name: (line.one, line.other) for line in lines if line.differs}
+        return {name: (one, other) for name, one, other in lines if one != other}
 
     assert differing(figures_of) == {"time": (f"{run.seconds:.1f} s", "10000.0 s")}
     repairs = str(run.patience), str(run.patience + 1)

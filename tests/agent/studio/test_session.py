@@ -100,7 +100,7 @@ def test_files_outside_of_the_folder(studio, ask, cookie):
 
 
 def test_a_cookie_is_good_for_a_week_and_for_one_folder(tmp_path, monkeypatch):
-    """Also after a restart: the session of another process accepts it."""
+    """Also after a restart: the check of another process accepts it."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     session = SessionCheck(None, 8501, tmp_path)
     now = int(time.time())
