@@ -68,6 +68,7 @@ def section_of(
     run, report = history.run, history.report
     least, most = DIFF_LINES
     share = ALL_DIFF_LINES // max(1, len(history.tried))
+    iterations = itertools.groupby(history.tried, key=lambda one: one.k)
     episodes = []
     if scene is not None and history.task is not None:
         episodes = animations(history, history.task, scene[1])
@@ -77,7 +78,7 @@ def section_of(
         "history": history,
         "run": run,
         "learner": learner_named(run.learner),
-        "iterations": _iterations(history),
+        "iterations": [(k, list(group)) for k, group in iterations],
         "failures": list(_failures(history)),
         "scene": scene,
         "episodes": episodes,
@@ -142,11 +143,6 @@ def spent(history: RunHistory) -> str:
     if run.cost_lost:
         cost += f", and at most {format_usd(run.cost_lost)} for lost answers"
     return f"{run.tokens_in:,} in, {run.tokens_out:,} out; {cost}"
-
-
-def _iterations(history: RunHistory) -> list[tuple[int, list[CandidateHistory]]]:
-    groups = itertools.groupby(history.tried, key=lambda one: one.k)
-    return [(k, list(group)) for k, group in groups]
 
 
 def _failures(history: RunHistory) -> Iterator[tuple[str, list[bool]]]:

@@ -43,7 +43,9 @@ def plot_success_rates(
         heading: Title.
         provenance: Line below the title: source and number of the runs.
     """
-    names = _order(groups, by)
+    names = list(
+        dict.fromkeys(n for frames in groups.values() for n in frames.runs[by])
+    )
     figure, axes = new_figure(max(5.0, 1.1 + 0.95 * len(names)), 3.6)
     colours = colours_of(groups)
     width = 0.8 / max(1, len(groups))
@@ -167,7 +169,9 @@ def plot_cumulative_panels(
 
 def _curves(frames: RunFrames, by: str, most: int | None) -> dict[str, pd.DataFrame]:
     """CS(k) of each kind, starting with CS(0) = 0."""
-    last = most if most is not None else _last_shown_k(frames.runs)
+    # One more than the longest run reached.
+    reached = min(int(frames.runs["K"].max()), int(frames.runs["done"].max()) + 1)
+    last = reached if most is None else most
     begin = pd.DataFrame({"k": [0], "cs": [0.0], "low": [0.0], "high": [0.0]})
     return {
         name: pd.concat([begin, cumulative_success(runs, last)], ignore_index=True)
@@ -214,14 +218,3 @@ def _frame(axes: Axes, curves: dict[str, pd.DataFrame]) -> None:
     axes.set_xlim(0, max(curve["k"].max() for curve in curves.values()) + 0.4)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylim(0, 1.03)
-
-
-def _last_shown_k(runs: pd.DataFrame) -> int:
-    """Last iteration to show: one more than the longest run reached, at most K."""
-    return min(int(runs["K"].max()), int(runs["done"].max()) + 1)
-
-
-def _order(groups: dict[str, RunFrames], by: str) -> list[str]:
-    return list(
-        dict.fromkeys(name for frames in groups.values() for name in frames.runs[by])
-    )

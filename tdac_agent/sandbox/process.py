@@ -50,6 +50,8 @@ class ProgramWorld(Protocol):
 
 
 Answering = EpisodeEnv | ProgramWorld
+Target = str | Handle | tuple[Handle, str]
+"""A function by its name, a callable object, or an object and its method."""
 
 
 class Child:
@@ -150,7 +152,7 @@ class Child:
 
     def call(
         self,
-        target: str | Handle | tuple[Handle, str],
+        target: Target,
         args: tuple[Any, ...] = (),
         kwargs: dict[str, Any] | None = None,
         timeout: float | None = None,
@@ -159,11 +161,7 @@ class Child:
 
         Arguments may contain handles; a result without an encoding becomes a handle.
         """
-        owner, name = _split(target)
-        phase = name if name is not None else "call"
-        request = (owner, name, args, kwargs or {})
-        seconds = timeout or self.limits.call_seconds
-        return self._talk.request(Kind.CALL, request, phase, seconds)
+        return self._use(Kind.CALL, target, (args, kwargs or {}), timeout)
 
     def call_each(
         self,
@@ -172,10 +170,14 @@ class Child:
         timeout: float | None = None,
     ) -> Any:
         """Call a function or method many times; return all results in one answer."""
+        return self._use(Kind.CALL_EACH, target, (calls,), timeout)
+
+    def _use(
+        self, kind: Kind, target: Target, rest: tuple[Any, ...], timeout: float | None
+    ) -> Any:
         owner, name = _split(target)
         seconds = timeout or self.limits.call_seconds
-        phase = name if name is not None else "call"
-        return self._talk.request(Kind.CALL_EACH, (owner, name, calls), phase, seconds)
+        return self._talk.request(kind, (owner, name, *rest), name or "call", seconds)
 
     def reset(self, observation: Any, timeout: float | None = None) -> Any:
         """Call `reset(obs)`, if the controller has it."""
@@ -282,9 +284,7 @@ class Child:
             left = min(left, max_left())
 
 
-def _split(
-    target: str | Handle | tuple[Handle, str],
-) -> tuple[Handle | None, str | None]:
+def _split(target: Target) -> tuple[Handle | None, str | None]:
     if isinstance(target, str):
         return None, target
     return (target, None) if isinstance(target, Handle) else target

@@ -115,7 +115,10 @@ class Zygote:
         # Children must not be able to read this file.
         self.witness = self.parent / "witness"
         try:
-            self._furnish()
+            self.site.mkdir()
+            for target in numpy_folders():
+                (self.site / os.path.basename(target)).symlink_to(target)
+            self.witness.write_text("not for children\n")
             self._folders = [PrivateFolder(self.parent) for _ in range(slots)]
             self._process, self._link, self._output, lifeline = self._start()
         except BaseException:
@@ -213,12 +216,6 @@ class Zygote:
             if printed.strip():
                 return printed.strip()
         return str(error)
-
-    def _furnish(self) -> None:
-        self.site.mkdir()
-        for target in numpy_folders():
-            (self.site / os.path.basename(target)).symlink_to(target)
-        self.witness.write_text("not for children\n")
 
     def _start(self) -> tuple[subprocess.Popen[bytes], socket.socket, int, int]:
         """Return the process, our end of its socket, its output, and its lifeline."""

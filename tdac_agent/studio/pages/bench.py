@@ -61,7 +61,8 @@ def add(place: Path) -> None:
     async def bench(at: str = "") -> None:
         with framed(at or "Bench"):
             folder = within(place, at)
-            if folder is None or not at or not _is_bench(place, at, folder):
+            made = folder is not None and (folder / PAGE).is_file()
+            if folder is None or not at or not (made or bench_job(place, at)):
                 ui.label(f"There is no bench {at!r} in this folder.").classes("problem")
                 return
             await BenchPage(place, at).show()
@@ -226,10 +227,6 @@ def progress_of(job: StudioJob, folder: Path) -> tuple[float, str]:
 def _choice(options: list[str], value: list[str], label: str) -> ui.select:
     chosen = ui.select(options, value=value, label=label, multiple=True)
     return chosen.props("use-chips").classes("w-full sm:w-80")
-
-
-def _is_bench(place: Path, at: str, folder: Path) -> bool:
-    return (folder / PAGE).is_file() or bench_job(place, at) is not None
 
 
 def show_benches(place: Path, title: str) -> None:

@@ -36,7 +36,6 @@ from tdac_agent.studio.pages.task_form import TaskForm
 from tdac_agent.studio.pages.writers import Writers
 from tdac_agent.studio.source_view import (
     Kind,
-    Place,
     SourceView,
     as_it_is,
     names_of,
@@ -161,7 +160,8 @@ class StartPage:
             return
         unit = self._view.unit
         place = self._view.place(x, y)
-        nearest = _on_pixel(place, unit)
+        # On a map, the middle of a pixel.
+        nearest = (round(place[0]), round(place[1])) if unit == "px" else place
         if mode == "start":
             await self._change(self._draft.with_start(nearest, unit))
         elif mode == "heading":
@@ -288,8 +288,3 @@ def numbers_in(task: str) -> list[float]:
 
 def _kind(kind: str) -> Kind:
     return "world" if kind == "world" else "map"
-
-
-def _on_pixel(place: Place, unit: str) -> Place:
-    """A clicked place; on a map, the middle of a pixel."""
-    return (round(place[0]), round(place[1])) if unit == "px" else place
