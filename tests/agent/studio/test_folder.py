@@ -7,6 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from changed_run import change_run
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
@@ -115,8 +116,7 @@ def test_a_journal_with_other_types(tmp_path):
     """Counts that are none are left out."""
     folder = tmp_path / "run"
     shutil.copytree(DEMO, folder)
-    run = load_run(folder).model_copy(update={"episodes": 40})
-    (folder / "run.json").write_text(run.model_dump_json())
+    change_run(folder, episodes=40)
     for driven in ("x", None, [1], True, 3):
         record = {"event": "drive.end", "what": "feedback", "driven": driven}
         append_record(folder / "journal.jsonl", record)

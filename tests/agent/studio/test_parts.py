@@ -14,6 +14,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from changed_run import change_run
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
@@ -338,9 +339,7 @@ def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(DEMO, folder)
     assert initial_controller_text(load_run(folder)) == ""  # it began with no file
-    run = load_run(folder)
-    given = run.model_copy(update={"given_sha256": "0" * 64, "optimizer": "builtin"})
-    (folder / "run.json").write_text(given.model_dump_json())
+    run = change_run(folder, given_sha256="0" * 64, optimizer="builtin")
     failed = len(run.attempts[0].failed_tests)
     text = initial_controller_text(load_run(folder))
     begin = (
@@ -368,8 +367,7 @@ def test_what_differs_between_two_runs(tmp_path):
         (folder / "task.yaml").write_text(f"name: maze\nrobot: {{radius: {radius}}}\n")
         (folder / "controller.py").write_text(f"import math\n\nRADIUS = {radius}\n")
     run = load_run(other)
-    changed = run.model_copy(update={"patience": run.patience + 1, "seconds": 1e4})
-    (other / "run.json").write_text(changed.model_dump_json())
+    change_run(other, patience=run.patience + 1, seconds=1e4)
 
     def differing(values_of):
         lines = lines_of(values_of(one), values_of(other))
@@ -411,8 +409,7 @@ def test_a_run_on_a_set_tells_how_far_it_is(tmp_path):
     assert episodes_driven(load_run(DEMO)) == ""  # it is on one task
     folder = tmp_path / "run"
     shutil.copytree(DEMO, folder)
-    run = load_run(folder).model_copy(update={"episodes": 40, "improve": 8})
-    (folder / "run.json").write_text(run.model_dump_json())
+    change_run(folder, episodes=40, improve=8)
     for what, driven in (("feedback", 8), ("validation", 5), ("comparison", 30)):
         record = {"event": "drive.end", "what": what, "driven": driven}
         append_record(folder / "journal.jsonl", record)
