@@ -65,7 +65,7 @@ def add(place: Path) -> None:
             if folder is None or not at or not (made or bench_job(place, at)):
                 ui.label(f"There is no bench {at!r} in this folder.").classes("problem")
                 return
-            await BenchPage(place, at).show()
+            await BenchPage(place, at, folder).show()
 
 
 class BenchForm:

@@ -166,10 +166,11 @@ class JobPage:
     Args:
         place: Folder of the studio.
         at: The run or bench, relative to it.
+        folder: Its folder, without links.
     """
 
-    def __init__(self, place: Path, at: str) -> None:
-        self._place, self._at, self._folder = place, at, place / at
+    def __init__(self, place: Path, at: str, folder: Path) -> None:
+        self._place, self._at, self._folder = place, at, folder
 
     def _build_heading(self) -> None:
         with ui.row().classes("w-full items-center gap-3"):

@@ -55,7 +55,7 @@ def add(place: Path) -> None:
             if folder is None or not at or not known:
                 ui.label(f"There is no run {at!r} in this folder.").classes("problem")
                 return
-            await RunPage(place, at).show()
+            await RunPage(place, at, folder).show()
 
 
 class RunPage(JobPage):

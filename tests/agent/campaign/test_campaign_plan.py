@@ -132,6 +132,27 @@ def test_a_wrong_file_is_refused_in_a_line(changes, message, written):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("learner", "base_url", "needed"),
+    [
+        ("openai:qwen3", "http://localhost:11434/v1", False),
+        ("openai:qwen3", "http://10.0.0.2:8000/v1", True),
+        ("anthropic:claude-sonnet-5-5", None, True),
+    ],
+)
+def test_only_what_may_cost_money_needs_a_limit(
+    learner, base_url, needed, written, monkeypatch
+):
+    """A model on a server of this machine is free, as `builtin` is."""
+    monkeypatch.delenv("ANTHROPIC_BASE_URL", raising=False)
+    file = written(learners=["builtin", learner], base_url=base_url)
+    if needed:
+        with pytest.raises(CampaignError, match=f"max_cost: required for {learner}"):
+            read_config(file)
+    else:
+        assert read_config(file).max_cost is None
+
+
 @pytest.mark.parametrize("text", ["0/2", "3/2", "1", "1/", "a/b", "1/2/3"])
 def test_a_wrong_shard_is_refused(text):
     with pytest.raises(CampaignError, match="as in 1/4"):
