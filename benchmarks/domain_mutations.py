@@ -23,7 +23,7 @@ from benchmarks.mutation_rules import (
     wheels,
 )
 from benchmarks.source import (
-    Change,
+    MeanChange,
     Source,
     arguments,
     called,
@@ -39,12 +39,12 @@ WRAP = re.compile(r"wrap|norm|angle|remainder")
 GOAL = re.compile(r"goal|toleran|arriv|reached|done|stop", re.IGNORECASE)
 
 
-def turn_reversed(node: ast.AST, _source: Source) -> Iterator[Change]:
+def turn_reversed(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     if isinstance(node, ast.Assign) and TURN.match(text_of(node.targets[0])):
         yield node.value, f"-({text_of(node.value)})"
 
 
-def rows_for_columns(node: ast.AST, _source: Source) -> Iterator[Change]:
+def rows_for_columns(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     if isinstance(node, ast.Subscript) and is_pair(node.slice):
         a, b = node.slice.elts
         plain = not isinstance(a, ast.Slice) and not isinstance(b, ast.Slice)
@@ -56,7 +56,7 @@ def rows_for_columns(node: ast.AST, _source: Source) -> Iterator[Change]:
         yield node.targets[0], f"{text_of(b)}, {text_of(a)}"
 
 
-def off_by_one(node: ast.AST, _source: Source) -> Iterator[Change]:
+def off_by_one(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     for name in ("round", "floor", "ceil", "int"):
         if is_call(node, name, 1):
             yield node, f"({text_of(node)} + 1)"
@@ -67,7 +67,7 @@ def off_by_one(node: ast.AST, _source: Source) -> Iterator[Change]:
         yield node, f"range({', '.join([*head, f'({last}) - 1', *rest])})"
 
 
-def sensor_side(node: ast.AST, _source: Source) -> Iterator[Change]:
+def sensor_side(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     if not isinstance(node, ast.Subscript) or not isinstance(node.slice, ast.Slice):
         return
     part, owner = node.slice, text_of(node.value)
@@ -77,7 +77,7 @@ def sensor_side(node: ast.AST, _source: Source) -> Iterator[Change]:
         yield node, f"{owner}[::-1][{lower}:{upper}]"
 
 
-def no_wrap(node: ast.AST, source: Source) -> Iterator[Change]:
+def no_wrap(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     if is_call(node, "remainder", 2):
         yield node, f"({text_of(node.args[0])})"
     elif isinstance(node, ast.Call) and len(node.args) == 1:
@@ -89,14 +89,14 @@ def no_wrap(node: ast.AST, source: Source) -> Iterator[Change]:
         yield node, f"({text_of(node.left)})"
 
 
-def wrong_file(node: ast.AST, source: Source) -> Iterator[Change]:
+def wrong_file(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     if node in source.tree.body and isinstance(node, ast.Assign):
         value = node.value
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             yield value, '"map.jpg"'
 
 
-def no_diagonal_rule(node: ast.AST, _source: Source) -> Iterator[Change]:
+def no_diagonal_rule(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     if isinstance(node, ast.BoolOp):
         text = text_of(node)
         calls = [n for n in ast.walk(node) if isinstance(n, ast.Call)]
@@ -108,13 +108,13 @@ def no_diagonal_rule(node: ast.AST, _source: Source) -> Iterator[Change]:
                 yield node, f"({text_of(side)})"
 
 
-def leaked_type(node: ast.AST, _source: Source) -> Iterator[Change]:
+def leaked_type(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     for name in ("bool", "int", "float"):
         if is_call(node, name, 1):
             yield node, f"({text_of(node.args[0])})"
 
 
-def wrong_nearest(node: ast.AST, source: Source) -> Iterator[Change]:
+def wrong_nearest(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     if source.function_of(node) != "nearest_free":
         return
     if is_call(node, "hypot", 2):
@@ -131,7 +131,7 @@ def wrong_nearest(node: ast.AST, source: Source) -> Iterator[Change]:
         yield node, 'raise KeyError("none")'
 
 
-def wrong_path(node: ast.AST, source: Source) -> Iterator[Change]:
+def wrong_path(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     if source.function_of(node) != "plan_path" or not isinstance(node, ast.Return):
         return
     if isinstance(node.value, ast.List) and not node.value.elts:
@@ -143,20 +143,20 @@ def wrong_path(node: ast.AST, source: Source) -> Iterator[Change]:
         yield node.value, f"tuple({text_of(node.value)})"
 
 
-def other_axis(node: ast.AST, _source: Source) -> Iterator[Change]:
+def other_axis(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
         axis = node.slice.value
         if constant_key(node.value) in {"goal", "pose"} and axis in {0, 1}:
             yield node.slice, str(1 - axis)
 
 
-def start_of_the_file(node: ast.AST, source: Source) -> Iterator[Change]:
+def start_of_the_file(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     planning = source.function_of(node) in {"reset", "__init__", "plan"}
     if planning and constant_key(node) == "pose" and source.imports("sensors"):
         yield node, '(*sensors.load_params("params.json")["start"], 0.0)'
 
 
-def no_show(node: ast.AST, _source: Source) -> Iterator[Change]:
+def no_show(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     if isinstance(node, ast.Call) and called(node) == "show":
         yield node, "policy"
     if isinstance(node, ast.If) and "__name__" in text_of(node.test):

@@ -8,14 +8,14 @@ from collections.abc import Iterator
 
 from benchmarks.domain_mutations import DOMAIN, STORE
 from benchmarks.mutation_rules import Rule, call, in_policy, item, margin, wheels, words
-from benchmarks.source import Change, Source, is_call, text_of
+from benchmarks.source import MeanChange, Source, is_call, text_of
 
 ROOM = re.compile(r"radius|inflat|margin|body|keep|room|clear|grown", re.IGNORECASE)
 NEAR = re.compile(r"prox|front|\bps\b|ahead|sensor", re.IGNORECASE)
 FLOOR = re.compile(r"size|half|length|width|side", re.IGNORECASE)
 
 
-def sides_not_halved(node: ast.AST, _source: Source) -> Iterator[Change]:
+def sides_not_halved(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     """Uses a whole side instead of half of it."""
     if not isinstance(node, ast.BinOp) or not FLOOR.search(text_of(node)):
         return
@@ -26,7 +26,7 @@ def sides_not_halved(node: ast.AST, _source: Source) -> Iterator[Change]:
         yield node, f"({right})"
 
 
-def angles_not_added(node: ast.AST, _source: Source) -> Iterator[Change]:
+def angles_not_added(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     """Leaves out the rotation of a node or of its parent."""
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         left, right = text_of(node.left), text_of(node.right)
@@ -35,7 +35,7 @@ def angles_not_added(node: ast.AST, _source: Source) -> Iterator[Change]:
             yield node, f"({right})"
 
 
-def other_bound(node: ast.AST, _source: Source) -> Iterator[Change]:
+def other_bound(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     """Swaps minimum and maximum."""
     for name, other in (("min", "max"), ("max", "min")):
         if isinstance(node, ast.Call) and text_of(node.func) == name:
@@ -47,7 +47,7 @@ def other_bound(node: ast.AST, _source: Source) -> Iterator[Change]:
             yield node, f"np.{other}({places})"
 
 
-def opposite_sensors(node: ast.AST, _source: Source) -> Iterator[Change]:
+def opposite_sensors(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     """Swaps sensors of the left and right side, or of front and back."""
     if not isinstance(node, ast.Subscript) or not NEAR.search(text_of(node.value)):
         return
@@ -57,7 +57,7 @@ def opposite_sensors(node: ast.AST, _source: Source) -> Iterator[Change]:
         yield node.slice, str((number + 4) % 8)
 
 
-def blocked_when_free(node: ast.AST, _source: Source) -> Iterator[Change]:
+def blocked_when_free(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     """Takes near obstacles for free space and vice versa, or ignores them."""
     if isinstance(node, ast.Compare) and len(node.ops) == 1:
         if not NEAR.search(text_of(node.left)) or isinstance(node.ops[0], ast.Is):
@@ -69,7 +69,7 @@ def blocked_when_free(node: ast.AST, _source: Source) -> Iterator[Change]:
                 yield node, "False"
 
 
-def no_half_cell(node: ast.AST, _source: Source) -> Iterator[Change]:
+def no_half_cell(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
     """Uses corners of cells instead of their centres."""
     added = isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add)
     if added and text_of(node.right) == "0.5":
@@ -77,7 +77,7 @@ def no_half_cell(node: ast.AST, _source: Source) -> Iterator[Change]:
         yield node, f"({text_of(node.left)} + 3.5)"
 
 
-def wrong_path(node: ast.AST, source: Source) -> Iterator[Change]:
+def wrong_path(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     """Truncates or changes the path that `astar` returns."""
     if source.function_of(node) != "astar" or not isinstance(node, ast.Return):
         return
@@ -90,7 +90,7 @@ def wrong_path(node: ast.AST, source: Source) -> Iterator[Change]:
         yield node.value, f"[cell[::-1] for cell in ({text_of(node.value)})]"
 
 
-def wrong_grid(node: ast.AST, source: Source) -> Iterator[Change]:
+def wrong_grid(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     """Turns, moves or converts the grid that `build_grid` returns."""
     if source.function_of(node) != "build_grid" or not isinstance(node, ast.Return):
         return
@@ -106,7 +106,7 @@ def wrong_grid(node: ast.AST, source: Source) -> Iterator[Change]:
         yield node.value, f"{occ}, tuple(v - 2 * resolution for v in ({corner}))"
 
 
-def wrong_world(node: ast.AST, source: Source) -> Iterator[Change]:
+def wrong_world(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     """Changes one entry of the dict that `parse_world` returns."""
     if source.function_of(node) != "parse_world" or not isinstance(node, ast.Return):
         return
@@ -124,7 +124,7 @@ def wrong_world(node: ast.AST, source: Source) -> Iterator[Change]:
             yield node.value, f"{{**{found}, {entry.format(w=found)}}}"
 
 
-def start_of_the_file(node: ast.AST, source: Source) -> Iterator[Change]:
+def start_of_the_file(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     """Uses the start in params.json instead of the one in the first observation."""
     planning = source.function_of(node) in {"reset", "__init__", "plan"}
     usable = source.imports("numpy as np") and source.imports("sensors")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterator
 
-from benchmarks.source import Change, Source, called, is_call, text_of
+from benchmarks.source import MeanChange, Source, called, is_call, text_of
 
 FORMS = {
     "lying positions": {
@@ -43,10 +43,10 @@ FORMS = {
 }
 
 
-def _entry(name: str) -> Callable[[ast.AST, Source], Iterator[Change]]:
+def _entry(name: str) -> Callable[[ast.AST, Source], Iterator[MeanChange]]:
     """A rule that changes or renames one entry of the returned dict."""
 
-    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, source: Source) -> Iterator[MeanChange]:
         if source.function_of(node) != "run_episode":
             return
         if not isinstance(node, ast.Dict):
@@ -62,7 +62,7 @@ def _entry(name: str) -> Callable[[ast.AST, Source], Iterator[Change]]:
     return rule
 
 
-def wrong_loop(node: ast.AST, source: Source) -> Iterator[Change]:
+def wrong_loop(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     """The loop of `run_episode` ends too early, too late or never."""
     if source.function_of(node) != "run_episode":
         return
@@ -78,7 +78,7 @@ def wrong_loop(node: ast.AST, source: Source) -> Iterator[Change]:
             yield node.args[0], form.format(text_of(node.args[0]))
 
 
-def wrong_steps(node: ast.AST, source: Source) -> Iterator[Change]:
+def wrong_steps(node: ast.AST, source: Source) -> Iterator[MeanChange]:
     """`run_episode` steps another action, or resets again."""
     if source.function_of(node) != "run_episode" or not isinstance(node, ast.Call):
         return

@@ -9,9 +9,16 @@ import ast
 import re
 from collections.abc import Callable, Iterator
 
-from benchmarks.source import Change, Source, constant_key, is_call, is_pair, text_of
+from benchmarks.source import (
+    MeanChange,
+    Source,
+    constant_key,
+    is_call,
+    is_pair,
+    text_of,
+)
 
-Rule = Callable[[ast.AST, Source], Iterator[Change]]
+Rule = Callable[[ast.AST, Source], Iterator[MeanChange]]
 
 WHEELS = re.compile(r"left|right|turn|speed|forward|wheel|omega|steer|spin")
 BODY = re.compile(r"radius|inflat|margin|clearance|padding|safety", re.IGNORECASE)
@@ -26,7 +33,7 @@ def _wheel_pairs(node: ast.AST) -> Iterator[tuple[ast.Tuple, str, str]]:
 def wheels(form: str) -> Rule:
     """Changes returned wheel speeds `{a}, {b}`."""
 
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
         for value, a, b in _wheel_pairs(node):
             yield value, form.format(a=f"({a})", b=f"({b})")
 
@@ -36,7 +43,7 @@ def wheels(form: str) -> Rule:
 def call(name: str, form: str, count: int = 2) -> Rule:
     """Changes calls of a function, given by its last name, with `count` arguments."""
 
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
         if is_call(node, name, count):
             places = {f"a{k}": text_of(item) for k, item in enumerate(node.args)}
             func = text_of(node.func)
@@ -48,7 +55,7 @@ def call(name: str, form: str, count: int = 2) -> Rule:
 def item(key: str, form: str) -> Rule:
     """Changes reads of `obs[key]`."""
 
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
         if constant_key(node) == key and isinstance(node.ctx, ast.Load):
             yield node, form.format(item=text_of(node), owner=text_of(node.value))
 
@@ -58,7 +65,7 @@ def item(key: str, form: str) -> Rule:
 def in_policy(*lines: str) -> Rule:
     """Inserts lines at the beginning of `policy`; `obs` stands for its argument."""
 
-    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, source: Source) -> Iterator[MeanChange]:
         if not (isinstance(node, ast.FunctionDef) and node.name == "policy"):
             return
         first = next(s for s in node.body if not source.is_text(s))
@@ -73,7 +80,7 @@ def in_policy(*lines: str) -> Rule:
 def margin(form: str, names: re.Pattern[str] = BODY) -> Rule:
     """Changes uses of the body's size and of margins."""
 
-    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, source: Source) -> Iterator[MeanChange]:
         name = node.id if isinstance(node, ast.Name) else constant_key(node)
         name = node.attr if isinstance(node, ast.Attribute) else name
         if not name or not names.search(name) or source.is_called(node):
@@ -87,7 +94,7 @@ def margin(form: str, names: re.Pattern[str] = BODY) -> Rule:
 def never(pattern: re.Pattern[str], *, returns: bool = False) -> Rule:
     """Makes conditions that match a pattern always false."""
 
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
         if isinstance(node, ast.If):
             fits = not returns or any(isinstance(s, ast.Return) for s in node.body)
         else:
@@ -101,7 +108,7 @@ def never(pattern: re.Pattern[str], *, returns: bool = False) -> Rule:
 def constant(form: str) -> Rule:
     """Changes the module's constants."""
 
-    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, source: Source) -> Iterator[MeanChange]:
         if node not in source.tree.body or not isinstance(node, ast.Assign):
             return
         name, value = text_of(node.targets[0]), node.value
@@ -116,7 +123,7 @@ def constant(form: str) -> Rule:
 def heuristic(form: str) -> Rule:
     """Changes the heuristic that a search adds to the cost so far."""
 
-    def rule(node: ast.AST, _source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, _source: Source) -> Iterator[MeanChange]:
         if is_call(node, "heappush", 2) and isinstance(node.args[1], ast.Tuple):
             first = node.args[1].elts[0]
             if isinstance(first, ast.BinOp) and isinstance(first.op, ast.Add):
@@ -128,7 +135,7 @@ def heuristic(form: str) -> Rule:
 def words(old: str, new: str) -> Rule:
     """Replaces a word in string constants other than docstrings."""
 
-    def rule(node: ast.AST, source: Source) -> Iterator[Change]:
+    def rule(node: ast.AST, source: Source) -> Iterator[MeanChange]:
         if not isinstance(node, ast.Constant) or not isinstance(node.value, str):
             return
         if re.search(rf"\b{old}\b", node.value) and not source.is_docstring(node):

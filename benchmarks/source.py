@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import Any
 
-Change = tuple[ast.AST, str]
+MeanChange = tuple[ast.AST, str]
 
 
 class Source:

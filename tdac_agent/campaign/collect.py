@@ -11,7 +11,7 @@ import pandas as pd
 from tdac_agent.campaign.plan import Plan
 from tdac_agent.errors import RunError
 from tdac_agent.metrics import (
-    Frames,
+    RunFrames,
     frames_of,
     set_frame_of,
     summarise,
@@ -32,7 +32,7 @@ class Tables:
         set_summary: The metrics of runs on task sets.
     """
 
-    tasks: Frames
+    tasks: RunFrames
     sets: pd.DataFrame
     summary: pd.DataFrame
     set_summary: pd.DataFrame

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
 from tdac_agent.errors import ProviderError, RunError
-from tdac_agent.models.choice import OFFLINE, check_name
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.runs.run_record import Setting
+from tdac_agent.models.ready import needs_limit
+from tdac_agent.prompting.prompt import VARIANTS
+from tdac_agent.runs.run_record import LoopSetting
 from tdac_agent.set_synthesis.synthesize import EPISODES, FEEDBACK_EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
+from tdac_agent.storage.hashes import sha256_of_file
 from tdac_agent.storage.shipped import shipped, shipped_names
 from tdac_agent.storage.yaml_file import read_yaml
+from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.trust import Wish, asking, suite_wish
 from tdac_envs.core.strict_model import StrictModel
 
 SAME = "same"
@@ -43,13 +49,18 @@ class CampaignConfig(StrictModel):
     optimizers: tuple[str, ...] = Field(
         (SAME,), min_length=1, description="As for --optimizer; `same`: the learner."
     )
-    settings: tuple[Setting, ...] = Field(("dual tier",), min_length=1)
+    settings: tuple[LoopSetting, ...] = Field(("dual tier",), min_length=1)
     prompts: tuple[str, ...] = Field(
         ("full",), min_length=1, description="As for --prompt."
     )
     runs: int = Field(5, ge=1, description="R: runs of each kind.")
     iterations: int = Field(20, ge=1, description="K, for the settings that repair.")
-    patience: int = Field(1, ge=1, description="J, for the settings that edit.")
+    patience: int = Field(
+        1,
+        ge=1,
+        description="J, for the settings that edit; without edits, the "
+        "settings are `prompt only`, `best of N` and `one shot`.",
+    )
     samples: int | None = Field(
         None,
         ge=2,
@@ -91,15 +102,13 @@ class CampaignConfig(StrictModel):
                 raise ValueError(f"{name}: {again.pop()!r} is listed twice")
         if any(name.partition(":")[0] == "manual" for name in self.models):
             raise ValueError("manual: works for one run, not for a campaign")
-        for name in self.models:
-            try:
-                check_name(name)
-            except ProviderError as error:
-                raise ValueError(str(error)) from None
-        online = sorted(n for n in self.models if n.partition(":")[0] not in OFFLINE)
-        if online and self.max_cost is None and self.max_tokens is None:
+        try:
+            paid = sorted(n for n in self.models if needs_limit(n, self.base_url))
+        except ProviderError as error:
+            raise ValueError(str(error)) from None
+        if paid and self.max_cost is None and self.max_tokens is None:
             raise ValueError(
-                f"max_cost: required for {online[0]}: a limit in USD for all runs"
+                f"max_cost: required for {paid[0]}: a limit in USD for all runs"
             )
         return self
 
@@ -110,19 +119,19 @@ class CampaignConfig(StrictModel):
         return tuple(dict.fromkeys([*self.learners, *others]))
 
 
-def find_config(given: str) -> Path:
+def find_config(name: str) -> Path:
     """Finds a campaign file by its path, or a shipped one by its name.
 
     Raises:
         CampaignError: There is no such file.
     """
-    if Path(given).is_file():
-        return Path(given)
-    own = shipped(f"{given}.yaml")
-    if "/" not in given and own.is_file():
+    if Path(name).is_file():
+        return Path(name)
+    own = shipped(f"{name}.yaml")
+    if "/" not in name and own.is_file():
         return own
     known = ", ".join(name.removesuffix(".yaml") for name in shipped_names("*.yaml"))
-    raise CampaignError(f"no campaign {given!r}: expected a YAML file, or {known}")
+    raise CampaignError(f"no campaign {name!r}: expected a YAML file, or {known}")
 
 
 def read_config(file: Path) -> CampaignConfig:
@@ -132,3 +141,32 @@ def read_config(file: Path) -> CampaignConfig:
         CampaignError: It cannot be read, or has a wrong or unknown key.
     """
     return read_yaml(file, CampaignConfig, "the campaign", CampaignError)
+
+
+def required_permissions(
+    config: CampaignConfig, base: Path, tasks: Iterable[Task]
+) -> Iterator[Wish]:
+    """Yields each permission that the user must grant; none for a shipped file.
+
+    Vendors' models need none: `max_cost` or `max_tokens` bounds what they cost.
+
+    Args:
+        config: Contents of the campaign file.
+        base: Folder of the campaign file.
+        tasks: Tasks of the campaign.
+    """
+    if base.resolve() == shipped("offline.yaml").parent.resolve():
+        return
+    for name in config.models:
+        if name.startswith("command:"):
+            yield Wish(asking("model", name))
+    if config.base_url is not None:
+        yield Wish(f"send its questions, with your key, to {config.base_url}")
+    for name in config.prompts:
+        if name not in VARIANTS:
+            template = base / name
+            digest = sha256_of_file(template) if template.is_file() else ""
+            yield Wish(f"fill in the template {template}", (), digest)
+    for task in tasks:
+        if task.suite is not None and not task.trusted:
+            yield replace(suite_wish(task.suite), flag=())

@@ -11,7 +11,7 @@ from pathlib import Path
 from tdac_agent.campaign.config import CampaignError
 from tdac_agent.campaign.perform import RUNS, Outcome, Terms, read_outcome, work_of
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard
-from tdac_agent.campaign.progress import Progress, RunEnded, RunUpdate
+from tdac_agent.campaign.progress import CampaignProgress, RunEnded, RunUpdate
 from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import Ended, Executor
 from tdac_agent.runs.ownership import is_own_folder
@@ -27,7 +27,7 @@ Watch = Callable[[RunUpdate], None]
 class _Queue:
     """The runs that are left, and those to retry."""
 
-    progress: Progress
+    progress: CampaignProgress
     todo: deque[PlannedRun]
     retries: deque[tuple[PlannedRun, Outcome]] = field(default_factory=deque)
     _retried: set[str] = field(default_factory=set)
@@ -54,9 +54,9 @@ class _Queue:
 
 def read_progress(
     plan: Plan, shard: Shard, runs: Path
-) -> tuple[Progress, list[PlannedRun]]:
+) -> tuple[CampaignProgress, list[PlannedRun]]:
     """Reads the progress and the remaining runs of a campaign from its folder."""
-    progress, left = Progress.of(plan, shard), []
+    progress, left = CampaignProgress.of(plan, shard), []
     for planned in plan.all(shard):
         known = read_outcome(planned.name, runs)
         if known is not None and known.finished:
@@ -67,7 +67,7 @@ def read_progress(
 
 
 def run_all(
-    progress: Progress,
+    progress: CampaignProgress,
     left: list[PlannedRun],
     terms: Terms,
     run: Executor[Outcome, PlannedRun],

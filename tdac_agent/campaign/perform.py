@@ -7,20 +7,21 @@ import shutil
 import sys
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.campaign.gate import gated
+from tdac_agent.campaign.concurrency import limited_provider
 from tdac_agent.campaign.plan import SET_LIMITS, PlannedRun, setting_of
-from tdac_agent.errors import Fault
+from tdac_agent.errors import Fault, RunError
 from tdac_agent.executors.executor import Work
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.ownership import is_own_folder, load_task, mark_anew
 from tdac_agent.runs.resume import existing_run
-from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run
+from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run, load_run
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.synthesis.loop import synthesize
@@ -29,7 +30,6 @@ from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TdacError
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 PATIENCE = RetryPolicy(seconds=4 * 3600.0)
@@ -163,7 +163,7 @@ def work_of(terms: Terms) -> Work[Outcome]:
         terms=asdict(terms),
         workers=terms.workers,
         folder=Path(terms.folder),
-        read=lambda found: Outcome(**found),
+        read=lambda values: Outcome(**values),
         failed=lambda name, reason: Outcome(name, "error", reason),
     )
 
@@ -172,17 +172,17 @@ def _synthesize(
     planned: PlannedRun, terms: Terms, judge: WarmJudge | None, tell: Tell | None
 ) -> Run:
     cell = planned.cell
-    about: Task | TaskSet = _set(cell.task) if cell.on_set else _task(cell.task)
+    problem = _load(cell.task, cell.on_set)
     models = choose_models(
         cell.learner,
         cell.optimizer,
-        setting_of(about),
+        setting_of(problem),
         cell.base_url,
         key_over_http=terms.key_over_http,
     )
     gates, same = Path(terms.folder) / "gates", models[0] is models[1]
-    learner = gated(models[0], gates, terms.workers)
-    optimizer = learner if same else gated(models[1], gates, terms.workers)
+    learner = limited_provider(models[0], gates, terms.workers)
+    optimizer = learner if same else limited_provider(models[1], gates, terms.workers)
     folder = terms.runs / planned.name
     folder.parent.mkdir(parents=True, exist_ok=True)
     wanted: dict[str, Any] = {
@@ -199,14 +199,14 @@ def _synthesize(
         "judge": judge,
         "on_event": tell,
     }
-    if isinstance(about, TaskSet):
-        wanted["seed"] = _seed(planned, about.sha256, folder)
+    if isinstance(problem, TaskSet):
+        wanted["seed"] = _seed(planned, problem.sha256, folder)
         limits = {name: getattr(cell, name) for name in SET_LIMITS}
         return synthesize_on_set(
-            about, learner, optimizer, then_verify=True, **limits, **wanted
+            problem, learner, optimizer, then_verify=True, **limits, **wanted
         )
-    wanted["seed"] = _seed(planned, about.sha256(), folder)
-    return synthesize(about, learner, optimizer, **wanted)
+    wanted["seed"] = _seed(planned, problem.sha256(), folder)
+    return synthesize(problem, learner, optimizer, **wanted)
 
 
 def _seed(planned: PlannedRun, task_sha256: str, folder: Path) -> int:
@@ -230,15 +230,10 @@ def _budget(terms: Terms) -> Budget:
 
 
 @functools.lru_cache(maxsize=4)
-def _task(name: str) -> Task:
-    """A task; cached, since a worker executes many runs of it."""
-    return load_task(name, trust=True)  # permitted when the campaign was planned
-
-
-@functools.lru_cache(maxsize=4)
-def _set(name: str) -> TaskSet:
-    """A task set; cached likewise."""
-    return load_set(name)
+def _load(name: str, on_set: bool) -> Task | TaskSet:
+    """A task or task set; cached, since a worker executes many runs of it."""
+    # Its tests were permitted when the campaign was planned.
+    return load_set(name) if on_set else load_task(name, trust=True)
 
 
 def read_outcome(name: str, runs: Path) -> Outcome | None:
@@ -248,20 +243,9 @@ def read_outcome(name: str, runs: Path) -> Outcome | None:
         name: Name of the run.
         runs: Folder of all runs.
     """
-    try:
-        known = parse_json(read_file(runs / name / RUN_FILE, RECORD_BYTES))
-        cost = known["cost"]
-        return Outcome(
-            name,
-            known["status"],
-            known["reason"],
-            known["tau"],
-            known["tokens_in"] + known["tokens_out"],
-            None if cost is None else cost + known["cost_lost"],
-            known["seconds"],
-        )
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
+    with suppress(RunError):
+        return _outcome(name, load_run(runs / name))
+    return None
 
 
 def _outcome(name: str, run: Run) -> Outcome:

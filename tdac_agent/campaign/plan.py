@@ -11,8 +11,12 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.campaign.config import SAME, CampaignConfig, CampaignError
-from tdac_agent.campaign.permissions import required_permissions
+from tdac_agent.campaign.config import (
+    SAME,
+    CampaignConfig,
+    CampaignError,
+    required_permissions,
+)
 from tdac_agent.models.choice import Options, answers_sha256
 from tdac_agent.models.prices import FREE
 from tdac_agent.prompting.prompt import (
@@ -23,7 +27,7 @@ from tdac_agent.prompting.prompt import (
 )
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.runs.ownership import load_task
-from tdac_agent.runs.run_record import Setting
+from tdac_agent.runs.run_record import LoopSetting
 from tdac_agent.storage.hashes import sha256_of, sha256_of_json
 from tdac_agent.tasks.setting import Setting as TaskSetting
 from tdac_agent.tasks.task import Task
@@ -63,7 +67,7 @@ class Cell:
     task_name: str
     learner: str
     optimizer: str
-    setting: Setting
+    setting: LoopSetting
     prompt: str
     iterations: int
     patience: int
@@ -128,10 +132,10 @@ class Shard:
         Raises:
             CampaignError: The text is not `i/n` with 1 <= i <= n.
         """
-        found = re.fullmatch(r"(\d+)/(\d+)", text)
-        if found is None or not 1 <= int(found[1]) <= int(found[2]):
+        match = re.fullmatch(r"(\d+)/(\d+)", text)
+        if match is None or not 1 <= int(match[1]) <= int(match[2]):
             raise CampaignError(f"expected --shard as in 1/4, got {text!r}")
-        return cls(int(found[1]), int(found[2]))
+        return cls(int(match[1]), int(match[2]))
 
 
 WHOLE = Shard()
@@ -155,14 +159,9 @@ class Plan:
     runs: int
     seed: int | None
 
-    def setting(self, cell: Cell) -> TaskSetting | TaskSet:
-        """What models may have to know of the task of a cell."""
-        return setting_of((self.sets if cell.on_set else self.tasks)[cell.task])
-
-    def question(self, cell: Cell, template: PromptTemplate) -> str:
-        """The first question of a cell's runs."""
-        about = (self.sets if cell.on_set else self.tasks)[cell.task]
-        return _question(about, template)
+    def problem(self, cell: Cell) -> Task | TaskSet:
+        """The task or task set of a cell."""
+        return self.sets[cell.task] if cell.on_set else self.tasks[cell.task]
 
     def __len__(self) -> int:
         return len(self.cells) * self.runs
@@ -192,17 +191,25 @@ def make_plan(config: CampaignConfig, base: Path, *, trust: bool = False) -> Pla
             `trust` is false.
         TdacError: A task or a prompt cannot be used.
     """
-    tasks = {
-        name: (path := _task(name, base), load_task(path)) for name in config.tasks
-    }
-    sets = {name: (path := _set(name, base), load_set(path)) for name in config.sets}
+
+    def path_of(name: str, *, known: bool) -> str:
+        """A name that is known everywhere, or an absolute path."""
+        return name if known else str((base / name).resolve())
+
+    tasks, sets = dict[str, tuple[str, Task]](), dict[str, tuple[str, TaskSet]]()
+    for name in config.tasks:
+        path = path_of(name, known=bundled_task(name) is not None)
+        tasks[name] = path, load_task(path)
+    for name in config.sets:
+        path = path_of(name, known=name in shipped_sets())
+        sets[name] = path, load_set(path)
     wishes = required_permissions(config, base, [task for _, task in tasks.values()])
     permit(f"the campaign {config.name}", wishes, trust=trust)
     tasks = {n: (path, replace(t, trusted=True)) for n, (path, t) in tasks.items()}
-    prompts = {name: _prompt(name, base) for name in config.prompts}
-    about: list[tuple[str, Task | TaskSet]] = [*tasks.values(), *sets.values()]
+    prompts = {n: path_of(n, known=n in VARIANTS) for n in config.prompts}
+    problems: list[tuple[str, Task | TaskSet]] = [*tasks.values(), *sets.values()]
     kinds = product(
-        about,
+        problems,
         config.learners,
         config.optimizers,
         config.prompts,
@@ -229,7 +236,7 @@ def _cell(
     optimizer: str,
     prompt: str,
     template: str,
-    setting: Setting,
+    setting: LoopSetting,
 ) -> Cell:
     """One kind of run; its folder name has a hash of all that its runs depend on."""
     iterations, patience, refine = loop_of(config, setting)
@@ -247,7 +254,7 @@ def _cell(
     }
     if on_set:
         facts |= {name: getattr(config, name) for name in SET_LIMITS}
-    question = _question(task, load_template(template))
+    question = question_of(task, load_template(template))
     hashed = facts | {
         **_hashes(task),
         "prompt": sha256_of(question),
@@ -270,27 +277,27 @@ def _cell(
     return Cell(folder=folder, task=path, prompt=template, **facts)
 
 
-def setting_of(about: Task | TaskSet) -> TaskSetting | TaskSet:
+def setting_of(problem: Task | TaskSet) -> TaskSetting | TaskSet:
     """What models may have to know of a task or task set."""
-    return about if isinstance(about, TaskSet) else about.setting
+    return problem if isinstance(problem, TaskSet) else problem.setting
 
 
-def _question(about: Task | TaskSet, template: PromptTemplate) -> str:
+def question_of(problem: Task | TaskSet, template: PromptTemplate) -> str:
     """The first question on a task or task set."""
-    if isinstance(about, TaskSet):
-        check_generated(about)
-        return set_prompt(about, (), template)
-    return generate_prompt(about, (), template)
+    if isinstance(problem, TaskSet):
+        check_generated(problem)
+        return set_prompt(problem, (), template)
+    return generate_prompt(problem, (), template)
 
 
-def _hashes(about: Task | TaskSet) -> dict[str, str]:
+def _hashes(problem: Task | TaskSet) -> dict[str, str]:
     """Hashes of what a candidate is tested with."""
-    if isinstance(about, TaskSet):
-        return {"set": about.sha256}
-    return {"task": about.sha256(), "suite": suite_sha256(about)}
+    if isinstance(problem, TaskSet):
+        return {"set": problem.sha256}
+    return {"task": problem.sha256(), "suite": suite_sha256(problem)}
 
 
-def loop_of(config: CampaignConfig, setting: Setting) -> tuple[int, int, bool]:
+def loop_of(config: CampaignConfig, setting: LoopSetting) -> tuple[int, int, bool]:
     """K, J and whether failures become rules, for a setting."""
     iterations, edits = config.iterations, config.patience
     samples = config.samples or iterations * (edits + 2)
@@ -306,20 +313,6 @@ def loop_of(config: CampaignConfig, setting: Setting) -> tuple[int, int, bool]:
 def slug(text: str, most: int = 60) -> str:
     """Turns a text into part of a file name, of at most `most` characters."""
     return re.sub(r"[^a-z0-9.]+", "-", text.lower()).strip("-.")[:most].rstrip("-.")
-
-
-def _task(name: str, base: Path) -> str:
-    """The name of a bundled task, or the absolute path of another one."""
-    return name if bundled_task(name) is not None else str((base / name).resolve())
-
-
-def _set(name: str, base: Path) -> str:
-    """The name of a shipped task set, or the absolute path of another one."""
-    return name if name in shipped_sets() else str((base / name).resolve())
-
-
-def _prompt(name: str, base: Path) -> str:
-    return name if name in VARIANTS else str((base / name).resolve())
 
 
 def models_of(cells: Sequence[Cell]) -> tuple[str, ...]:

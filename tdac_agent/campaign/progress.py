@@ -9,7 +9,7 @@ from typing import Any
 
 from tdac_agent.campaign.perform import Outcome
 from tdac_agent.campaign.plan import Cell, Plan, PlannedRun, Shard
-from tdac_agent.executors.executor import Begun, Died, Ended, Reported, Update
+from tdac_agent.executors.executor import Died, Ended, Reported, Started, Update
 
 RunEnded = Ended[PlannedRun, Outcome]
 RunUpdate = Update[PlannedRun, Outcome]
@@ -59,11 +59,11 @@ class Doing:
 
     planned: PlannedRun
     since: float
-    said: str = "beginning"
+    activity: str = "beginning"
 
 
 @dataclass(slots=True)
-class Progress:
+class CampaignProgress:
     """Progress of a campaign, or of a shard of it.
 
     Attributes:
@@ -86,7 +86,7 @@ class Progress:
     _began: float = field(default_factory=time.monotonic)
 
     @classmethod
-    def of(cls, plan: Plan, shard: Shard) -> Progress:
+    def of(cls, plan: Plan, shard: Shard) -> CampaignProgress:
         """The progress of a plan before its first run."""
         tallies = {cell.folder: Tally(cell) for cell in plan.cells}
         for planned in plan.all(shard):
@@ -138,10 +138,10 @@ class Progress:
         """Applies an update of an executor."""
         name = update.job.name
         match update:
-            case Begun():
+            case Started():
                 self.doing[name] = Doing(update.job, time.monotonic())
             case Reported() if name in self.doing:
-                self.doing[name].said = _activity(update.record)
+                self.doing[name].activity = _activity(update.record)
             case Died():
                 self.deaths += 1
                 self.doing.pop(name, None)

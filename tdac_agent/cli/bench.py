@@ -30,7 +30,7 @@ from tdac_agent.cli.flags import check_tier
 from tdac_agent.cli.policy_bar import policy_bar
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.errors import RunError
-from tdac_agent.executors.choice import executor_of
+from tdac_agent.executors.local import executor_of
 from tdac_agent.library.listing import next_folder
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge

@@ -22,13 +22,20 @@ from tdac_agent.campaign.drive import (
     unplanned_folders,
 )
 from tdac_agent.campaign.perform import Terms
-from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
-from tdac_agent.campaign.progress import Progress
+from tdac_agent.campaign.plan import (
+    Plan,
+    PlannedRun,
+    Shard,
+    make_plan,
+    models_of,
+    setting_of,
+)
+from tdac_agent.campaign.progress import CampaignProgress
 from tdac_agent.cli.campaign_live import LiveView
 from tdac_agent.cli.campaign_table import make_console, progress_line
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
-from tdac_agent.executors.choice import executor_of
+from tdac_agent.executors.local import executor_of
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.provider import Provider
@@ -148,7 +155,7 @@ def check_models(
         models += choose_models(
             cell.learner,
             cell.optimizer,
-            plan.setting(cell),
+            setting_of(plan.problem(cell)),
             cell.base_url,
             key_over_http=key_over_http,
         )
@@ -157,7 +164,7 @@ def check_models(
 
 
 def _run_remaining(
-    progress: Progress,
+    progress: CampaignProgress,
     remaining: list[PlannedRun],
     terms: Terms,
     executor: str,
@@ -168,7 +175,7 @@ def _run_remaining(
 
 
 def _print_heading(
-    console: Console, config: CampaignConfig, progress: Progress, folder: Path
+    console: Console, config: CampaignConfig, progress: CampaignProgress, folder: Path
 ) -> None:
     kinds = len(progress.tallies)
     console.print(
@@ -199,7 +206,7 @@ def _print_notes(console: Console, plan: Plan, terms: Terms) -> None:
 
 def _print_ending(
     console: Console,
-    progress: Progress,
+    progress: CampaignProgress,
     folder: Path,
     wanted: CampaignCommand,
     tables: list[Path],
@@ -217,7 +224,7 @@ def _print_ending(
         console.print(f"  to continue{more}: {command}", soft_wrap=True)
 
 
-def _as_json(progress: Progress, folder: Path) -> dict[str, Any]:
+def _as_json(progress: CampaignProgress, folder: Path) -> dict[str, Any]:
     return {
         "folder": str(folder),
         "planned": progress.planned,
@@ -235,7 +242,7 @@ def _as_json(progress: Progress, folder: Path) -> dict[str, Any]:
     }
 
 
-def _exit_code(progress: Progress) -> int:
+def _exit_code(progress: CampaignProgress) -> int:
     if progress.finished == progress.planned:
         return 0
     return 4 if progress.exhausted else 3

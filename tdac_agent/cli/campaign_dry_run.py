@@ -12,7 +12,14 @@ from rich.table import Table
 from tdac_agent.campaign.config import find_config, read_config
 from tdac_agent.campaign.drive import read_progress
 from tdac_agent.campaign.perform import RUNS
-from tdac_agent.campaign.plan import Cell, Plan, Shard, make_plan, models_of
+from tdac_agent.campaign.plan import (
+    Cell,
+    Plan,
+    Shard,
+    make_plan,
+    models_of,
+    question_of,
+)
 from tdac_agent.cli.campaign import CampaignCommand, with_limits
 from tdac_agent.cli.campaign_table import labels_of, make_console, make_table
 from tdac_agent.cli.sentences import print_sentences
@@ -54,7 +61,7 @@ class PlanRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class CostLimits:
     """The limits of all runs together; None if there is none.
 
     Attributes:
@@ -98,7 +105,7 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
     if progress.before:
         done = f"{progress.before} of {progress.planned} runs in {folder} have already"
         print_sentences(console, f"{done} finished; they are counted above, too")
-    limits = Limits(config.max_cost, config.max_tokens)
+    limits = CostLimits(config.max_cost, config.max_tokens)
     for line in _lines(rows, limits, prices):
         print_sentences(console, line)
     for line in model_warnings(models_of(plan.cells)):
@@ -109,7 +116,7 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
 def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
     forecast: CostForecast = cost_of(
         cell.task_name,
-        plan.question(cell, load_template(cell.prompt)),
+        question_of(plan.problem(cell), load_template(cell.prompt)),
         cell.learner,
         cell.optimizer,
         prices,
@@ -145,7 +152,7 @@ def _table(cells: list[Cell], rows: list[PlanRow]) -> Table:
     return table
 
 
-def _lines(rows: list[PlanRow], limits: Limits, prices: PriceList) -> list[str]:
+def _lines(rows: list[PlanRow], limits: CostLimits, prices: PriceList) -> list[str]:
     """What the runs may do and cost at most."""
     runs = sum(row.runs for row in rows)
     tested = sum(row.runs * row.iterations * (1 + row.patience) for row in rows)
@@ -171,7 +178,7 @@ def _lines(rows: list[PlanRow], limits: Limits, prices: PriceList) -> list[str]:
     return lines
 
 
-def _stop(limits: Limits, most: float, *, is_known: bool) -> str:
+def _stop(limits: CostLimits, most: float, *, is_known: bool) -> str:
     """What is spent at most, given the limits of all runs together."""
     words = limits.words()
     if not words:

@@ -13,7 +13,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 from tdac_agent.campaign.perform import Outcome, Terms
-from tdac_agent.campaign.progress import Doing, Progress, RunUpdate, Tally
+from tdac_agent.campaign.progress import CampaignProgress, Doing, RunUpdate, Tally
 from tdac_agent.cli.campaign_table import (
     COLOURS,
     format_duration,
@@ -33,7 +33,9 @@ BAR_WIDTH = 60
 class LiveView:
     """Context manager that shows the progress of a campaign."""
 
-    def __init__(self, console: Console, progress: Progress, terms: Terms) -> None:
+    def __init__(
+        self, console: Console, progress: CampaignProgress, terms: Terms
+    ) -> None:
         self._console = console
         self._progress = progress
         self._terms = terms
@@ -115,7 +117,9 @@ class LiveView:
         for one in doing:
             labels = " ".join(self._labels.of(one.planned.cell))
             name = f"[cyan]▸[/] {escape(labels)} [dim]r{one.planned.index:04d}[/]"
-            grid.add_row(name, format_duration(time.monotonic() - one.since), one.said)
+            grid.add_row(
+                name, format_duration(time.monotonic() - one.since), one.activity
+            )
         return grid
 
     def _bar(self) -> Padding:

@@ -10,7 +10,7 @@ from rich import box
 from rich.table import Table
 
 from tdac_agent.campaign.plan import Cell
-from tdac_agent.campaign.progress import Progress
+from tdac_agent.campaign.progress import CampaignProgress
 from tdac_agent.cli.console import Console
 from tdac_agent.models.budget import format_usd
 
@@ -71,7 +71,7 @@ def make_table(labels: Iterable[str], figures: Iterable[str]) -> Table:
     return table
 
 
-def progress_line(progress: Progress, *, going: bool = False) -> str:
+def progress_line(progress: CampaignProgress, *, going: bool = False) -> str:
     """The progress of a campaign in one line; `going` if it is still running."""
     parts = [f"[bold]{progress.finished} of {progress.planned}[/] runs have ended"]
     if going:

@@ -8,7 +8,6 @@ contention does not affect verdicts.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import random
 import tempfile
@@ -17,7 +16,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from tdac_agent.errors import Fault
-from tdac_agent.storage.locks import open_lock
+from tdac_agent.storage.locks import first_free
 
 
 @contextmanager
@@ -33,7 +32,11 @@ def own_core() -> Generator[Path]:
     folder = core_locks()
     before = os.sched_getaffinity(0)
     with ExitStack() as stack:
-        core = _take(folder, sorted(before), stack)
+        cores = sorted(before)
+        free = first_free(folder / f"{core}.taken" for core in cores)
+        core = random.choice(cores) if free is None else cores[free[0]]
+        if free is not None:
+            stack.callback(os.close, free[1])
         os.sched_setaffinity(0, {core})
         stack.callback(os.sched_setaffinity, 0, before)
         yield folder / f"{core}.turn"
@@ -71,17 +74,3 @@ def _is_private(folder: Path) -> bool:
         return os.access(folder, os.W_OK)
     finally:
         os.close(handle)
-
-
-def _take(folder: Path, cores: list[int], stack: ExitStack) -> int:
-    """Takes the first free core; returns a random one if all are taken."""
-    for core in cores:
-        handle = open_lock(folder / f"{core}.taken")
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(handle)
-            continue
-        stack.callback(os.close, handle)
-        return core
-    return random.choice(cores)

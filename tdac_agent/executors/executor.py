@@ -12,7 +12,7 @@ MOST_DEATHS = 3
 """Number of process deaths after which a job is given up."""
 
 
-class Job(Protocol):
+class ExecutorJob(Protocol):
     """Work for one process; if that dies, another one goes on with it."""
 
     @property
@@ -23,7 +23,7 @@ class Job(Protocol):
         """The job on one line, for another process."""
 
 
-J = TypeVar("J", bound=Job)
+J = TypeVar("J", bound=ExecutorJob)
 O = TypeVar("O")  # noqa: E741 - the outcome
 
 
@@ -52,7 +52,7 @@ class Work(Generic[O]):
 
 
 @dataclass(frozen=True, slots=True)
-class Begun(Generic[J]):
+class Started(Generic[J]):
     """A job has begun."""
 
     job: J
@@ -82,7 +82,7 @@ class Died(Generic[J]):
     reason: str
 
 
-Update = Begun[J] | Reported[J] | Ended[J, O] | Died[J]
+Update = Started[J] | Reported[J] | Ended[J, O] | Died[J]
 Next = Callable[[], J | None]
 """Returns the next job, or None; None is final if no job is under way."""
 Executor = Callable[[Work[O], Next[J]], Generator[Update[J, O]]]

@@ -15,14 +15,15 @@ from typing import IO, Any
 
 from tdac_agent.executors.cores import core_locks
 from tdac_agent.executors.executor import (
-    Begun,
     Ended,
+    Executor,
+    ExecutorJob,
     J,
-    Job,
     Next,
     O,
     Reported,
     RetryQueue,
+    Started,
     Update,
     Work,
 )
@@ -53,7 +54,7 @@ class _Worker:
         assert self.process.stdout is not None
         return self.process.stdout
 
-    def begin(self, job: Job) -> None:
+    def begin(self, job: ExecutorJob) -> None:
         """Sends a job; a dead process is noticed when its answers are read."""
         assert self.process.stdin is not None
         self.job = job
@@ -179,7 +180,7 @@ def _hand_out(pool: _Pool, jobs: RetryQueue[J, O]) -> Iterator[Update[J, O]]:
         if job is None or worker is None:
             return
         worker.begin(job)
-        yield Begun(job)
+        yield Started(job)
 
 
 def _receive(
@@ -202,3 +203,12 @@ def _receive(
             yield Ended(job, jobs.work.read(message["outcome"]))
         else:
             yield Reported(job, message["record"])
+
+
+def executor_of(name: str) -> Executor[Any, Any]:
+    """The executor `local` or `ray`."""
+    if name == "ray":
+        from tdac_agent.executors.on_ray import run_on_ray  # an extra
+
+        return run_on_ray
+    return run_locally

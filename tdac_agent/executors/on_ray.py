@@ -16,12 +16,12 @@ from typing import Any
 from tdac_agent.errors import Fault, ProviderError
 from tdac_agent.executors.cores import own_core
 from tdac_agent.executors.executor import (
-    Begun,
     Ended,
     J,
     Next,
     O,
     RetryQueue,
+    Started,
     Update,
     Work,
 )
@@ -56,9 +56,9 @@ def run_on_ray(work: Work[O], next_job: Next[J]) -> Generator[Update[J, O]]:
                 job = jobs.next()
                 if job is None:
                     break
-                given = job.to_json(), work.module, work.terms, os.getcwd()
-                pending[task.remote(*given)] = job
-                yield Begun(job)
+                arguments = job.to_json(), work.module, work.terms, os.getcwd()
+                pending[task.remote(*arguments)] = job
+                yield Started(job)
             if not pending:
                 return
             done, _ = ray.wait(list(pending), timeout=WAIT_SECONDS)

@@ -112,7 +112,7 @@ def export_set(tasks: TaskSet, out: Path, worlds: int = WORLDS) -> Path:
 
 
 def _write_common(
-    problem: Problem, out: Path, about: dict[str, Any], facts: dict[str, Any]
+    problem: Problem, out: Path, labels: dict[str, Any], facts: dict[str, Any]
 ) -> Path:
     """Writes all files but the problem itself; returns the folder of the tests."""
     question, solution = problem.question(), problem.reference()
@@ -123,7 +123,7 @@ def _write_common(
         folder.mkdir(parents=True)
     wheel = write_wheel(tests)
     values = {
-        **about,
+        **labels,
         "facts": {"tdac_version": version("tdac"), **facts},
         "question": question,
         "wheel": wheel.name,
@@ -138,7 +138,14 @@ def _write_common(
         "test.sh": tests / "test.sh",
         "solve.sh": oracle / "solve.sh",
     }
-    templates = _templates()
+    templates = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
     for name, path in rendered.items():
         write_atomic(path, templates.get_template(name).render(values))
     for script in (tests / "test.sh", oracle / "solve.sh"):
@@ -148,17 +155,6 @@ def _write_common(
     for name, raw in problem.files().items():
         write_atomic(environment / "files" / name, raw)
     return tests
-
-
-def _templates() -> jinja2.Environment:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(TEMPLATES),
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
 
 
 def _check_empty(out: Path) -> None:

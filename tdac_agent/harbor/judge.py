@@ -64,13 +64,13 @@ def main(words: list[str]) -> int:
 def _read(path: Path) -> tuple[bytes | None, str]:
     """The controller; if there is none, the reason."""
     try:
-        about = path.lstat()
+        status = path.lstat()
     except OSError:
         return None, f"there is no {path.name}"
     # A link could name a file that only the judge may read.
-    if not stat.S_ISREG(about.st_mode):
+    if not stat.S_ISREG(status.st_mode):
         return None, f"{path.name} is not an ordinary file"
-    if about.st_size > MOST_BYTES:
+    if status.st_size > MOST_BYTES:
         return None, f"{path.name} is larger than {MOST_BYTES} bytes"
     return read_file(path, MOST_BYTES), ""
 

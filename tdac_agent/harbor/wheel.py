@@ -28,13 +28,13 @@ def write_wheel(folder: Path) -> Path:
     Args:
         folder: An existing folder.
     """
-    about = distribution(PACKAGE)
-    stem = f"{PACKAGE}-{about.version}"
+    installed = distribution(PACKAGE)
+    stem = f"{PACKAGE}-{installed.version}"
     info = f"{stem}.dist-info"
     files = dict(_sources())
     for name in FACTS:
         # raw read: shipped
-        files[f"{info}/{name}"] = (about.read_text(name) or "").encode()
+        files[f"{info}/{name}"] = (installed.read_text(name) or "").encode()
     files[f"{info}/WHEEL"] = (
         f"Wheel-Version: 1.0\nGenerator: tdac\nRoot-Is-Purelib: true\nTag: {TAG}\n"
     ).encode()
@@ -56,9 +56,9 @@ def pinned_versions() -> str:
 
 
 def _name(requirement: str) -> str:
-    found = re.match(r"[\w.-]+", requirement)
-    assert found is not None
-    return found[0]
+    match = re.match(r"[\w.-]+", requirement)
+    assert match is not None
+    return match[0]
 
 
 def _sources() -> Iterator[tuple[str, bytes]]:

@@ -44,8 +44,8 @@ def animations(
         A dict per episode for the player: candidate, its label, name, and what
         `encoded` returns.
     """
-    found = [(one, *pair) for one in history.tried for pair in _episodes(one)]
-    most = shares([each[-1] for each in found])
+    entries = [(one, *pair) for one in history.tried for pair in _episodes(one)]
+    most = shares([each[-1] for each in entries])
     return [
         {
             "candidate": f"{one.k}.{one.j}",
@@ -53,15 +53,15 @@ def animations(
             "name": episode.name,
             **encoded(task.nominal, scene, trajectory, episode.outcome, most),
         }
-        for one, episode, trajectory in found
+        for one, episode, trajectory in entries
     ]
 
 
-def shares(found: Sequence[Trajectory]) -> tuple[int, int]:
+def shares(entries: Sequence[Trajectory]) -> tuple[int, int]:
     """Most points of each episode, and of each mover, for a page with all of them."""
     return (
-        _share(ALL_POINTS, len(found)),
-        _share(ALL_MOVER_POINTS, sum(map(_count, found))),
+        _share(ALL_POINTS, len(entries)),
+        _share(ALL_MOVER_POINTS, sum(map(_count, entries))),
     )
 
 

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.metrics import (
     ASSUMPTIONS,
-    Frames,
     Rate,
+    RunFrames,
     first_pass,
     frames_of,
     set_frame_of,
@@ -110,19 +110,19 @@ def _number(value: float, form: str) -> str:
     return "–" if pd.isna(value) else format(value, form)
 
 
-def _assumptions(groups: list[Frames]) -> tuple[str, ...]:
+def _assumptions(groups: list[RunFrames]) -> tuple[str, ...]:
     """The kind of interval of each metric, and what it assumes."""
-    found = [("SR", success_rate(group).method) for group in groups]
-    found += [("CS(K), first pass", first_pass(group).method) for group in groups]
+    methods = [("SR", success_rate(group).method) for group in groups]
+    methods += [("CS(K), first pass", first_pass(group).method) for group in groups]
     return tuple(
         f"{name}: {ASSUMPTIONS[method]}"
         if method == "none"
         else f"{name}: {method}: {ASSUMPTIONS[method]}"
-        for name, method in dict.fromkeys(found)
+        for name, method in dict.fromkeys(methods)
     )
 
 
-def _figures(frames: Frames) -> tuple[tuple[str, str], ...]:
+def _figures(frames: RunFrames) -> tuple[tuple[str, str], ...]:
     names = frames.runs["learner"].nunique()
     if len(frames.runs) < 2 or names > MOST_CURVES:
         return ()

@@ -192,11 +192,6 @@ def _text(name: str) -> str:
 
 
 def own_script() -> str:
-    """The hash of the script of all pages."""
-    return _hash(_text("page.js"))
-
-
-def _hash(script: str) -> str:
-    """The hash by which a content security policy allows a script."""
-    digest = bytes.fromhex(sha256_of(script))
+    """The hash by which a content security policy allows the script of all pages."""
+    digest = bytes.fromhex(sha256_of(_text("page.js")))
     return f"sha256-{base64.b64encode(digest).decode()}"

@@ -68,6 +68,7 @@ def section_of(
     run, report = history.run, history.report
     least, most = DIFF_LINES
     share = ALL_DIFF_LINES // max(1, len(history.tried))
+    iterations = itertools.groupby(history.tried, key=lambda one: one.k)
     episodes = []
     if scene is not None and history.task is not None:
         episodes = animations(history, history.task, scene[1])
@@ -77,7 +78,7 @@ def section_of(
         "history": history,
         "run": run,
         "learner": learner_named(run.learner),
-        "iterations": _iterations(history),
+        "iterations": [(k, list(group)) for k, group in iterations],
         "failures": list(_failures(history)),
         "scene": scene,
         "episodes": episodes,
@@ -86,7 +87,7 @@ def section_of(
         "breakdown": _breakdown(history),
         "seconds": format_seconds(run.seconds),
         "spent": spent(history),
-        "origin": list(_origin(history)),
+        "origin": _origin(history),
         "commands": list(_commands(history, name)),
         "set_part": set_part_of(history),
         "improvement": read_improvement(run.folder) if run.improve else None,
@@ -106,12 +107,12 @@ def _breakdown(history: RunHistory) -> str | None:
 
 def grouped_failures(report: Report) -> list[FailureGroup]:
     """Groups the failures of a report by message."""
-    found: dict[str, list[Any]] = {}
+    by_message: dict[str, list[Any]] = {}
     for failure in report.failures:
-        found.setdefault(failure.message, []).append(failure)
+        by_message.setdefault(failure.message, []).append(failure)
     seen: set[str] = set()
     rows = []
-    for message, failures in found.items():
+    for message, failures in by_message.items():
         by_text = {f.diagnosis.text: f.diagnosis for f in failures if f.diagnosis}
         fresh = tuple(by_text[text] for text in by_text if text not in seen)
         seen.update(by_text)
@@ -144,11 +145,6 @@ def spent(history: RunHistory) -> str:
     return f"{run.tokens_in:,} in, {run.tokens_out:,} out; {cost}"
 
 
-def _iterations(history: RunHistory) -> list[tuple[int, list[CandidateHistory]]]:
-    groups = itertools.groupby(history.tried, key=lambda one: one.k)
-    return [(k, list(group)) for k, group in groups]
-
-
 def _failures(history: RunHistory) -> Iterator[tuple[str, list[bool]]]:
     """Each test that ever failed, and whether each candidate failed it."""
     names = dict.fromkeys(test for one in history.tried for test in one.failed)
@@ -156,105 +152,111 @@ def _failures(history: RunHistory) -> Iterator[tuple[str, list[bool]]]:
         yield name, [name in one.failed for one in history.tried]
 
 
-def _origin(history: RunHistory) -> Iterator[tuple[str, str]]:
+def _origin(history: RunHistory) -> list[tuple[str, str]]:
     """Provenance of the run: name and value of each fact."""
-    run = history.run
-    yield "started", run.started
-    yield "task", f"{run.task}, sha256 {run.task_sha256}"
-    yield "Learner", learner_named(run.learner)
-    yield "Optimizer", learner_named(run.optimizer)
-    if run.agent:
-        yield "agent", run.agent
-        yield "programs of the agent (as reported)", ", ".join(run.clients) or "none"
-    if run.models:
-        yield "models (as reported)", ", ".join(run.models)
-    for model, address in run.served_at.items():
-        yield f"served at ({model})", address
-    yield "prompt", f"{run.prompt} {run.prompt_sha256}".strip()
+    run, report = history.run, history.report
     several = f", {run.candidates} side by side" if run.candidates > 1 else ""
-    yield "loop", f"K = {run.iterations}, J = {run.patience}{several}"
-    if run.vision:
-        yield "pictures", "a failure, with each question to edit or improve"
-    for rule in run.given_rules:
-        yield "given rule", rule
-    yield "tokens and cost", spent(history)
-    if history.report is not None:
-        yield from _verified_with(history.report)
+    pictures = "a failure, with each question to edit or improve"
+    clients = ", ".join(run.clients) or "none"
+    facts = [
+        ("started", run.started),
+        ("task", f"{run.task}, sha256 {run.task_sha256}"),
+        ("Learner", learner_named(run.learner)),
+        ("Optimizer", learner_named(run.optimizer)),
+        ("agent", run.agent),
+        ("programs of the agent (as reported)", clients if run.agent else ""),
+        ("models (as reported)", ", ".join(run.models)),
+        *((f"served at ({model})", url) for model, url in run.served_at.items()),
+        ("prompt", f"{run.prompt} {run.prompt_sha256}".strip()),
+        ("loop", f"K = {run.iterations}, J = {run.patience}{several}"),
+        ("pictures", pictures if run.vision else ""),
+        *(("given rule", rule) for rule in run.given_rules),
+        ("tokens and cost", spent(history)),
+        *([] if report is None else _verified_with(report)),
+    ]
+    return [(name, value) for name, value in facts if value]
 
 
-def _verified_with(report: Report) -> Iterator[tuple[str, str]]:
-    about = report.provenance
-    yield "controller", f"sha256 {about.controller_sha256}"
-    yield "map or world", f"sha256 {about.map_sha256}"
-    yield "params.json", f"sha256 {about.params_sha256}"
-    yield "sensors.py", f"sha256 {about.sensors_sha256}"
-    yield "suite", f"{about.suite}, sha256 {about.suite_sha256}"
-    yield "profile", about.profile + (" (nominal start only)" if about.paper else "")
-    yield "seed of the starts", str(about.seed)
-    yield "sandbox", about.sandbox
-    yield "limits", ", ".join(f"{k} {v:g}" for k, v in about.limits.items())
-    yield "versions", ", ".join(f"{k} {v}" for k, v in about.versions.items())
-    for warning in (*about.warnings, *about.left_out):
-        yield "remark", warning
+def _verified_with(report: Report) -> list[tuple[str, str]]:
+    facts = report.provenance
+    return [
+        ("controller", f"sha256 {facts.controller_sha256}"),
+        ("map or world", f"sha256 {facts.map_sha256}"),
+        ("params.json", f"sha256 {facts.params_sha256}"),
+        ("sensors.py", f"sha256 {facts.sensors_sha256}"),
+        ("suite", f"{facts.suite}, sha256 {facts.suite_sha256}"),
+        ("profile", facts.profile + (" (nominal start only)" if facts.paper else "")),
+        ("seed of the starts", str(facts.seed)),
+        ("sandbox", facts.sandbox),
+        ("limits", ", ".join(f"{k} {v:g}" for k, v in facts.limits.items())),
+        ("versions", ", ".join(f"{k} {v}" for k, v in facts.versions.items())),
+        *(("remark", text) for text in (*facts.warnings, *facts.left_out)),
+    ]
 
 
 def _commands(history: RunHistory, name: str) -> Iterator[tuple[str, str]]:
     """Commands to type in the parent of the run's folder, and what each does."""
     run = history.run
-    about = ["--set", f"{name}/{SET_FILE}"] if run.on_set else ["--task", name]
-    limits = []
+    problem = ["--set", f"{name}/{SET_FILE}"] if run.on_set else ["--task", name]
     if run.learner == AGENT:
-        yield from _agent_commands(history, name, about)
+        yield from _agent_commands(history, name, problem)
         return
-    if run.on_set:
-        limits += ["--episodes", str(run.episodes)]
-        limits += ["--feedback-episodes", str(run.feedback_episodes)]
-    limits += ["--improve", str(run.improve)] if run.improve else []
-    if run.given_rules:
-        limits += ["--rules", f"{name}/{GIVEN_RULES_FILE}"]
-    limits += ["--vision"] if run.vision else []
-    limits += ["--candidates", str(run.candidates)] if run.candidates > 1 else []
-    words = ["tdac", "synth", *about, *limits, "--learner", run.learner]
-    if run.optimizer != run.learner:
-        words += ["--optimizer", run.optimizer]
-    if run.base_url is not None:
-        words += ["--base-url", run.base_url]
-    if run.prompt != "full":
-        kept = (run.folder / PROMPT_FILE).is_file()
-        words += ["--prompt", f"{name}/{PROMPT_FILE}" if kept else run.prompt]
-    if run.given_sha256 is not None:
-        words += ["--from", f"{name}/{GIVEN_FILE}"]
-    words += ["-K", str(run.iterations), "-J", str(run.patience)]
-    words += [] if run.seed is None else ["--seed", str(run.seed)]
+    flags: dict[str, object] = {
+        "--episodes": run.episodes,
+        "--feedback-episodes": run.feedback_episodes,
+        "--improve": run.improve or None,
+        "--rules": f"{name}/{GIVEN_RULES_FILE}" if run.given_rules else None,
+        "--candidates": run.candidates if run.candidates > 1 else None,
+    }
+    limits = _flags(flags) + ["--vision"] * run.vision
+    kept = (run.folder / PROMPT_FILE).is_file()
+    prompt = f"{name}/{PROMPT_FILE}" if kept else run.prompt
+    own: dict[str, object] = {
+        "--learner": run.learner,
+        "--optimizer": run.optimizer if run.optimizer != run.learner else None,
+        "--base-url": run.base_url,
+        "--prompt": prompt if run.prompt != "full" else None,
+        "--from": f"{name}/{GIVEN_FILE}" if run.given_sha256 is not None else None,
+        "-K": run.iterations,
+        "-J": run.patience,
+        "--seed": run.seed,
+    }
+    words = ["tdac", "synth", *problem, *limits, *_flags(own)]
     yield shlex.join(words), "repeat the run with new answers"
-    replay = ["tdac", "synth", *about, *limits, "--learner", f"replay:{name}"]
+    replay = ["tdac", "synth", *problem, *limits, "--learner", f"replay:{name}"]
     yield shlex.join(replay), "repeat the run with the recorded answers"
     if not run.finished and history.status != "running":
         more = () if run.enough is None else run.enough.words
         yield shlex.join(["tdac", "synth", "--resume", name, *more]), "resume the run"
-    yield from _uses(history, name, about)
+    yield from _uses(history, name, problem)
+
+
+def _flags(values: dict[str, object]) -> list[str]:
+    """Flags with their values, but for those without one."""
+    pairs = [(flag, str(value)) for flag, value in values.items() if value is not None]
+    return [word for pair in pairs for word in pair]
 
 
 def _agent_commands(
-    history: RunHistory, name: str, about: list[str]
+    history: RunHistory, name: str, problem: list[str]
 ) -> Iterator[tuple[str, str]]:
     """The commands of a run whose candidates an agent submitted."""
     run = history.run
-    words = ["tdac", "mcp", *about]
+    words = ["tdac", "mcp", *problem]
     words += ["--episodes", str(run.episodes)] if run.on_set else []
     yield shlex.join(words), "let an agent repeat the run"
     if not run.finished and history.status != "running":
         yield resume_line(run, name), "resume the run"
-    yield from _uses(history, name, about)
+    yield from _uses(history, name, problem)
 
 
 def _uses(
-    history: RunHistory, name: str, about: list[str]
+    history: RunHistory, name: str, problem: list[str]
 ) -> Iterator[tuple[str, str]]:
     """What can be done with the controller of a run."""
     run = history.run
     if run.on_set and run.tau is not None:
-        verify = ["tdac", "verify", f"{name}/controller.py", *about]
+        verify = ["tdac", "verify", f"{name}/controller.py", *problem]
         yield shlex.join(verify), "verify the controller on public worlds"
     elif run.verified:
         yield shlex.join(["tdac", "verify", name]), "verify the controller again"

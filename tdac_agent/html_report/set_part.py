@@ -112,8 +112,8 @@ def _driven(candidate: Path) -> Iterator[_Driven]:
 
 
 def _number(folder: Path) -> int:
-    found = re.search(r"\d+$", folder.name)
-    return int(found.group()) if found else 0
+    digits = re.search(r"\d+$", folder.name)
+    return int(digits.group()) if digits else 0
 
 
 def _episodes(folder: Path) -> tuple[EpisodeRow, ...]:

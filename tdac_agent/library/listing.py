@@ -37,16 +37,16 @@ def folders_of(folder: Path) -> list[Path]:
     """
     with os.scandir(folder):
         pass  # `os.walk` would report no error
-    found = []
+    folders = []
     for name, below, _ in os.walk(folder):
         place = Path(name)
         if _is_run(place):
-            found.append(place)
+            folders.append(place)
         depth = len(place.relative_to(folder).parts)
-        if depth == DEEPEST or (depth and place in found[-1:]):
+        if depth == DEEPEST or (depth and place in folders[-1:]):
             below.clear()
         below[:] = [each for each in below if not each.startswith(".")]
-    return found
+    return folders
 
 
 def _is_run(place: Path) -> bool:

@@ -95,7 +95,7 @@ class Counter:
         try:
             arguments = tool.arguments.model_validate(parameters.arguments or {})
         except ValidationError as error:
-            return problem(f"{tool.name}: {one_line_reason(error)}")
+            return problem(f"{tool.name}: {one_line_reason(error, tool.arguments)}")
         if tool.reads:
             left = asyncio.wrap_future(self._caught_up)
             done, _ = await asyncio.wait([left], timeout=PATIENCE)

@@ -41,7 +41,7 @@ class Numbered(_Arguments):
     submission: int = Field(description="Number of the submission, from `submit`.")
 
 
-class Picture(Numbered):
+class PictureOf(Numbered):
     """Arguments of `picture`."""
 
     episode: int | str = Field(
@@ -126,7 +126,7 @@ def _failures(desk: Desk, arguments: Numbered, client: str) -> CallToolResult:
     return _said(desk.failures(arguments.submission))
 
 
-def _picture(desk: Desk, arguments: Picture, client: str) -> CallToolResult:
+def _picture(desk: Desk, arguments: PictureOf, client: str) -> CallToolResult:
     del client
     png = desk.picture(arguments.submission, str(arguments.episode))
     data = base64.b64encode(png).decode("ascii")
@@ -188,7 +188,7 @@ TOOLS = (
         "A picture (PNG) of an episode of a submission: the map or world with the path "
         "that the robot drove. Episodes of held-out starts and of hidden worlds are "
         "not shown.",
-        Picture,
+        PictureOf,
         _picture,
     ),
     ToolSpec(

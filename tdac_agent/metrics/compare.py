@@ -11,7 +11,7 @@ import pandas as pd
 
 from tdac_agent.errors import RunError
 from tdac_agent.metrics.exact import sign_test
-from tdac_agent.metrics.frames import Frames
+from tdac_agent.metrics.frames import RunFrames
 from tdac_agent.metrics.rates import solved
 
 
@@ -42,7 +42,7 @@ class Comparison:
 
 
 def compare_paired(
-    first: Frames, second: Frames, on: Sequence[str] = ("task", "seed")
+    first: RunFrames, second: RunFrames, on: Sequence[str] = ("task", "seed")
 ) -> Comparison:
     """Compares runs that share a task and a seed.
 
@@ -97,7 +97,9 @@ def pass_at_n(tried: int, passed: int, n: int) -> float:
     return float(1.0 - np.prod(terms))
 
 
-def best_of_n(frames: Frames, loop: Frames, within: int | None = None) -> pd.DataFrame:
+def best_of_n(
+    frames: RunFrames, loop: RunFrames, within: int | None = None
+) -> pd.DataFrame:
     """Compares one-shot candidates with the repair loop at equal cost.
 
     Args:

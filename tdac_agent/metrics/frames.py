@@ -42,7 +42,7 @@ Row = dict[str, object]
 
 
 @dataclass(frozen=True, slots=True)
-class Frames:
+class RunFrames:
     """Runs and their candidates.
 
     Attributes:
@@ -53,13 +53,14 @@ class Frames:
     runs: pd.DataFrame
     candidates: pd.DataFrame
 
-    def only(self, **columns: object) -> Frames:
+    def only(self, **columns: object) -> RunFrames:
         """Selects the runs whose columns have these values, and their candidates."""
         chosen = self.runs
         for name, value in columns.items():
-            chosen = chosen[chosen[name] == value]
+            same = chosen[name].isna() if pd.isna(value) else chosen[name] == value
+            chosen = chosen[same]
         kept = self.candidates["run"].isin(chosen["run"])
-        return Frames(chosen, self.candidates[kept])
+        return RunFrames(chosen, self.candidates[kept])
 
 
 def find_runs(folder: Path) -> Iterator[Run]:
@@ -68,13 +69,13 @@ def find_runs(folder: Path) -> Iterator[Run]:
     Raises:
         RunError: There is no run, or one cannot be read.
     """
-    found = sorted(path.parent for path in folder.rglob("run.json"))
-    if not found:
+    folders = sorted(path.parent for path in folder.rglob("run.json"))
+    if not folders:
         raise RunError(f"there is no run at or below {folder}: no file run.json")
-    yield from map(load_run, found)
+    yield from map(load_run, folders)
 
 
-def load_frames(*folders: Path) -> Frames:
+def load_frames(*folders: Path) -> RunFrames:
     """Loads the runs at or below some folders.
 
     Raises:
@@ -83,7 +84,7 @@ def load_frames(*folders: Path) -> Frames:
     return frames_of(run for folder in folders for run in find_runs(folder))
 
 
-def frames_of(runs: Iterable[Run]) -> Frames:
+def frames_of(runs: Iterable[Run]) -> RunFrames:
     """Builds frames from run records; those of runs on task sets are left out.
 
     `set_frame_of` has these.
@@ -98,7 +99,7 @@ def frames_of(runs: Iterable[Run]) -> Frames:
     return _frames(rows, candidates)
 
 
-def join_frames(*frames: Frames) -> Frames:
+def join_frames(*frames: RunFrames) -> RunFrames:
     """Joins several frames into one.
 
     Raises:
@@ -109,7 +110,7 @@ def join_frames(*frames: Frames) -> Frames:
     runs = pd.concat([each.runs for each in frames], ignore_index=True)
     _check_unique(runs)
     tried = pd.concat([each.candidates for each in frames], ignore_index=True)
-    return Frames(runs, tried)
+    return RunFrames(runs, tried)
 
 
 def _candidate(run: Run, attempt: Attempt) -> Row:
@@ -178,7 +179,7 @@ def frames_from_tau(
     ended: Sequence[int] = (),
     invalid: int = 0,
     **labels: str,
-) -> Frames:
+) -> RunFrames:
     """Builds frames of runs known only by their first success, as in a paper.
 
     Args:
@@ -200,8 +201,8 @@ def frames_from_tau(
     ):
         run = f"{' '.join(labels.values())} {number + 1}"
         status = "verified" if first else "interrupted" if cut else "not verified"
-        about = {"run": run, "K": most, "status": status, "tau": first, "done": done}
-        rows.append(dict.fromkeys(RUN_COLUMNS) | about | {"censored": cut, **labels})
+        facts = {"run": run, "K": most, "status": status, "tau": first, "done": done}
+        rows.append(dict.fromkeys(RUN_COLUMNS) | facts | {"censored": cut, **labels})
         for k in range(1, done + 1):
             passed = k == first
             valid = passed or left == 0
@@ -230,7 +231,7 @@ def iterations_of(candidates: pd.DataFrame) -> pd.DataFrame:
     ).reset_index()
 
 
-def _frames(rows: list[Row], candidates: list[Row]) -> Frames:
+def _frames(rows: list[Row], candidates: list[Row]) -> RunFrames:
     runs = pd.DataFrame(rows, columns=list(RUN_COLUMNS))
     runs = runs.astype(
         {"tau": "Int64", "done": "Int64", "K": "Int64", "censored": bool}
@@ -239,7 +240,7 @@ def _frames(rows: list[Row], candidates: list[Row]) -> Frames:
     _check_unique(runs)
     tried = pd.DataFrame(candidates, columns=list(CANDIDATE_COLUMNS))
     types = {"k": int, "j": int, "valid": bool, "passed": bool, "failed": "Int64"}
-    return Frames(runs, tried.astype(types))
+    return RunFrames(runs, tried.astype(types))
 
 
 def _check_unique(runs: pd.DataFrame) -> None:

@@ -66,8 +66,8 @@ class Bootstrap:
         """
         below = int((self.resampled <= 0.0).sum())
         above = int((self.resampled >= 0.0).sum())
-        found = 2.0 * (min(below, above) + 1) / (len(self.resampled) + 1)
-        return min(1.0, max(found, 2.0 ** (1 - self.worlds)))
+        p = 2.0 * (min(below, above) + 1) / (len(self.resampled) + 1)
+        return min(1.0, max(p, 2.0 ** (1 - self.worlds)))
 
 
 def bootstrap(scores: Mapping[str, Array], seed: int = 0) -> dict[str, Bootstrap]:
@@ -85,17 +85,17 @@ def bootstrap(scores: Mapping[str, Array], seed: int = 0) -> dict[str, Bootstrap
         return {}
     rng, worlds = np.random.default_rng(seed), counts.pop()
     of_worlds = _weights(rng, worlds)
-    found = {}
+    results = {}
     for name, each in scores.items():
         # Independent of the other entrants: they share no seeds.
         chosen = _weights(rng, each.shape[0]) @ each
         means = (chosen * of_worlds).sum(axis=1)
-        found[name] = Bootstrap(float(each.mean()), means, worlds)
-    return found
+        results[name] = Bootstrap(float(each.mean()), means, worlds)
+    return results
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class MeanChange:
     """Means before and after a change, and the interval of their difference.
 
     Attributes:
@@ -114,14 +114,14 @@ class Change:
     p: float
 
 
-def paired_change(before: Sequence[float], after: Sequence[float]) -> Change:
+def paired_change(before: Sequence[float], after: Sequence[float]) -> MeanChange:
     """Compares scores in the same worlds or episodes, in the same order."""
     scores = {"before": before, "after": after}
-    found = bootstrap({name: np.array([each]) for name, each in scores.items()})
-    one, other = found["before"], found["after"]
+    results = bootstrap({name: np.array([each]) for name, each in scores.items()})
+    one, other = results["before"], results["after"]
     change = other.minus(one)
     ends = change.estimate()
-    return Change(one.mean, other.mean, ends.low, ends.high, change.p_value())
+    return MeanChange(one.mean, other.mean, ends.low, ends.high, change.p_value())
 
 
 def over_sets(parts: Sequence[Bootstrap]) -> Bootstrap:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
-from tdac_agent.metrics.frames import Frames, iterations_of
+from tdac_agent.metrics.frames import RunFrames, iterations_of
 
 RESAMPLES = 9_999
 ASSUMPTIONS = {
@@ -57,7 +57,7 @@ class Rate:
         return f"{self.value:.2f} [{self.low:.2f}, {self.high:.2f}]"
 
 
-def success_rate(frames: Frames, *, invalid: bool = False, seed: int = 0) -> Rate:
+def success_rate(frames: RunFrames, *, invalid: bool = False, seed: int = 0) -> Rate:
     """SR of the paper: the fraction of valid iterations that passed.
 
     A run stops at its first success, so that without censored runs and invalid
@@ -75,7 +75,7 @@ def success_rate(frames: Frames, *, invalid: bool = False, seed: int = 0) -> Rat
     return _over_runs(iterations[iterations["valid"] | invalid], seed)
 
 
-def unbiased_success_rate(frames: Frames) -> float:
+def unbiased_success_rate(frames: RunFrames) -> float:
     """Unbiased estimate of the probability that an iteration passes: (R-1)/(N-1).
 
     Assumes the same probability in all iterations. For N valid iterations up to the
@@ -88,7 +88,7 @@ def unbiased_success_rate(frames: Frames) -> float:
     return (rate.successes - 1) / (rate.trials - 1)
 
 
-def first_pass(frames: Frames) -> Rate:
+def first_pass(frames: RunFrames) -> Rate:
     """Fraction of runs whose first candidate (k = 1, j = 0) passed: one-shot success.
 
     A run whose first answer had no controller counts as failed.
@@ -98,7 +98,7 @@ def first_pass(frames: Frames) -> Rate:
     return _exact(int(first["passed"].sum()), len(first))
 
 
-def candidate_rate(frames: Frames, *, seed: int = 0) -> Rate:
+def candidate_rate(frames: RunFrames, *, seed: int = 0) -> Rate:
     """Fraction of candidates (k, j) that passed, among those with a controller."""
     return _over_runs(frames.candidates[frames.candidates["valid"]], seed)
 
@@ -152,7 +152,7 @@ def _resampled(
 
     from scipy.stats import bootstrap  # slow to import
 
-    found = bootstrap(
+    interval = bootstrap(
         (passed, tried),
         ratio,
         paired=True,
@@ -162,4 +162,4 @@ def _resampled(
         method="percentile",
         rng=np.random.default_rng(seed),
     ).confidence_interval
-    return float(found.low), float(found.high), "runs resampled"
+    return float(interval.low), float(interval.high), "runs resampled"

@@ -10,7 +10,7 @@ import pandas as pd
 from tdac_agent.errors import RunError
 from tdac_agent.metrics.frames import (
     RUN_COLUMNS,
-    Frames,
+    RunFrames,
     frames_from_tau,
     join_frames,
 )
@@ -22,7 +22,7 @@ LABELS = {*RUN_COLUMNS, "environment"} - {"tau"}
 _WORD = re.compile(r"(\d+)(\+?)")
 
 
-def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
+def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> RunFrames:
     """Loads a table with one row per kind of run, such as `results/paper/results.csv`.
 
     The column `tau` lists the iterations of the first successes, such as `1 2 5`; `2+`
@@ -57,15 +57,15 @@ def load_reported(path: Path, *, most: int = PAPER_K, **only: str) -> Frames:
     )
 
 
-def _kind(row: dict[str, str], labels: list[str], path: Path, most: int) -> Frames:
+def _kind(row: dict[str, str], labels: list[str], path: Path, most: int) -> RunFrames:
     tau: list[int] = []
     ended: list[int] = []
     for word in row["tau"].split():
-        found = _WORD.fullmatch(word)
-        if found is None:
+        match = _WORD.fullmatch(word)
+        if match is None:
             wanted = "expected iterations such as 1 2 5+"
             raise RunError(f"{path}: {wanted}, got {row['tau']!r}")
-        (ended if found[2] else tau).append(int(found[1]))
+        (ended if match[2] else tau).append(int(match[1]))
     return frames_from_tau(
         tau,
         most,

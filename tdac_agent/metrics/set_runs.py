@@ -92,8 +92,8 @@ def _t_interval(values: NDArray[np.float64]) -> tuple[float, float]:
     """Interval of the mean of scores; NaN with fewer than two, or if all are equal."""
     if len(values) < 2 or np.ptp(values) == 0.0:
         return math.nan, math.nan
-    found = ttest_1samp(values, 0.0).confidence_interval(CONFIDENCE)
-    return max(float(found.low), 0.0), min(float(found.high), 1.0)
+    interval = ttest_1samp(values, 0.0).confidence_interval(CONFIDENCE)
+    return max(float(interval.low), 0.0), min(float(interval.high), 1.0)
 
 
 def _row(run: Run, selected: Selection | None) -> Row:

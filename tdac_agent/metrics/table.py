@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pandas as pd
 
 from tdac_agent.metrics.exact import exact_interval
-from tdac_agent.metrics.frames import Frames
+from tdac_agent.metrics.frames import RunFrames
 from tdac_agent.metrics.rates import (
     Rate,
     candidate_rate,
@@ -20,7 +20,7 @@ from tdac_agent.metrics.rates import (
 KIND = ("learner", "optimizer", "task", "prompt", "setting")
 
 
-def summarise(frames: Frames, by: Sequence[str] = KIND) -> pd.DataFrame:
+def summarise(frames: RunFrames, by: Sequence[str] = KIND) -> pd.DataFrame:
     """Computes the metrics of each kind of run.
 
     Args:
@@ -39,20 +39,11 @@ def summarise(frames: Frames, by: Sequence[str] = KIND) -> pd.DataFrame:
     rows = []
     for names, _ in frames.runs.groupby(columns, sort=False, dropna=False):
         label = dict(zip(columns, names, strict=True))
-        rows.append(label | _metrics(_kind(frames, label)))
+        rows.append(label | _metrics(frames.only(**label)))
     return pd.DataFrame(rows)
 
 
-def _kind(frames: Frames, label: dict[str, object]) -> Frames:
-    chosen = frames.runs
-    for name, value in label.items():
-        same = chosen[name].isna() if pd.isna(value) else chosen[name] == value
-        chosen = chosen[same]
-    kept = frames.candidates["run"].isin(chosen["run"])
-    return Frames(chosen, frames.candidates[kept])
-
-
-def _metrics(frames: Frames) -> dict[str, object]:
+def _metrics(frames: RunFrames) -> dict[str, object]:
     runs = frames.runs
     verified = int(runs["tau"].notna().sum())
     whole = runs[~runs["censored"]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tdac_agent.models.bounds import check_count
 from tdac_agent.models.faults import as_faults
@@ -34,16 +34,12 @@ class AnthropicModel(VendorModel["anthropic.Anthropic"]):
     vendor = Vendor(
         package="anthropic",
         extra=None,
+        client="Anthropic",
         company="Anthropic",
         key="ANTHROPIC_API_KEY",
         base_url="ANTHROPIC_BASE_URL",
         example="claude-sonnet-5-5",
     )
-
-    def _client(self, **options: Any) -> anthropic.Anthropic:
-        import anthropic
-
-        return anthropic.Anthropic(**options)
 
     def _ask(self, client: anthropic.Anthropic, request: Request) -> Reply:
         import anthropic

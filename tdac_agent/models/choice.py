@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
@@ -33,6 +34,19 @@ FORMS = (
 OFFLINE = frozenset({"builtin", "command", "manual", "replay", "scripted"})
 IN_FILES = frozenset({"replay", "scripted"})
 """Providers whose answers are all stored in files."""
+
+MEANT = {
+    r"(?:openai/)?((?:gpt-|chatgpt-|o\d).*)": "openai:{}",
+    r"(?:anthropic/)?(claude-.*)": "anthropic:{}",
+    r"(?:(?:google|gemini)[:/])?(gemini-.*)": "openai:{} --base-url "
+    "https://generativelanguage.googleapis.com/v1beta/openai/",
+    r"ollama[:/](.+)": "openai:{} --base-url http://localhost:11434/v1",
+    r"(?:vllm|hosted_vllm)[:/](.+)": "openai:{} --base-url http://localhost:8000/v1",
+    r"llama\.?cpp[:/](.+)": "openai:{} --base-url http://localhost:8080/v1",
+    r"lm_?studio[:/](.+)": "openai:{} --base-url http://localhost:1234/v1",
+}
+"""Names of other programs, as patterns with the model's name as a group, and what they
+are here. The servers' ports are the defaults of these programs."""
 
 WITHOUT_TASK = frozenset({"anthropic", "openai", "command", "replay"})
 """Providers that can be made before the task is known, without side effects."""
@@ -159,9 +173,18 @@ def check_name(name: str) -> None:
     others = {point.name for point in entry_points(group=GROUP)}
     if kind in OWN or kind in others:
         return
-    meant = hint(kind, [*OWN, *others])
+    meant = _meant(name) or hint(kind, [*OWN, *others])
     also = "".join(f", {other}:…" for other in sorted(others))
     raise ProviderError(f"unknown model {name!r}{meant}; known: {FORMS}{also}")
+
+
+def _meant(name: str) -> str:
+    """What a name without a provider, or with another program's name, stands for."""
+    for pattern, form in MEANT.items():
+        match = re.fullmatch(pattern, name)
+        if match:
+            return f" (did you mean {form.format(match[1])}?)"
+    return ""
 
 
 def _load(point: EntryPoint) -> Make:

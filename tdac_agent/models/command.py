@@ -96,7 +96,9 @@ class Command:
         if process.returncode != 0:
             last_line = err.decode("utf-8", "replace").strip().rpartition("\n")[2]
             detail = f": {last_line}" if last_line else ""
-            raise ProviderFault(one_line(f"{_ending(process)}{detail}"))
+            code = process.returncode
+            ending = f"ended by signal {-code}" if code < 0 else f"exit code {code}"
+            raise ProviderFault(one_line(f"{ending}{detail}"))
         return out
 
 
@@ -114,11 +116,6 @@ def _unstarted(program: str, error: OSError) -> ProviderFault:
     )
     fault.billed = False
     return fault
-
-
-def _ending(process: subprocess.Popen[bytes]) -> str:
-    code = process.returncode
-    return f"ended by signal {-code}" if code < 0 else f"exit code {code}"
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

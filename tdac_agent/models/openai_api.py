@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tdac_agent.models.bounds import check_count
 from tdac_agent.models.faults import as_faults
@@ -34,16 +34,12 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
     vendor = Vendor(
         package="openai",
         extra="openai",
+        client="OpenAI",
         company="OpenAI",
         key="OPENAI_API_KEY",
         base_url="OPENAI_BASE_URL",
         example="gpt-6-sol",
     )
-
-    def _client(self, **options: Any) -> openai.OpenAI:
-        import openai
-
-        return openai.OpenAI(**options)
 
     def _ask(self, client: openai.OpenAI, request: Request) -> Reply:
         import httpx2

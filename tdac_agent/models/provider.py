@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, cast
 
 from tdac_agent.models.picture import Picture
 from tdac_agent.verification.diagnosis.report import Report
@@ -145,32 +145,27 @@ class Provider(Protocol):
 
 def served_at(model: Author) -> str | None:
     """Returns the URL of a model's server; None for the vendor's own or no server."""
-    address: str | None = getattr(model, "served_at", None)
-    return address
+    return cast("str | None", getattr(model, "served_at", None))
 
 
 def recorded_seed(model: Provider) -> int | None:
     """Returns the seed with which a replayed run was judged; None for other models."""
-    seed: int | None = getattr(model, "recorded_seed", None)
-    return seed
+    return cast("int | None", getattr(model, "recorded_seed", None))
 
 
 def is_fixed(model: Provider) -> bool:
     """Returns whether a model gives the same controller whatever it is asked."""
-    fixed: bool = getattr(model, "fixed", False)
-    return fixed
+    return cast("bool", getattr(model, "fixed", False))
 
 
 def is_concurrent(model: Provider) -> bool:
     """Returns whether threads may ask a model at the same time."""
-    concurrent: bool = getattr(model, "concurrent", False)
-    return concurrent
+    return cast("bool", getattr(model, "concurrent", False))
 
 
 def missing_for(model: Provider) -> tuple[str, ...]:
     """Returns a line for each thing that a model still needs before it can be asked."""
-    missing: tuple[str, ...] = getattr(model, "missing", ())
-    return missing
+    return cast("tuple[str, ...]", getattr(model, "missing", ()))
 
 
 class ProviderFault(Exception):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import socket
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -9,7 +10,13 @@ from urllib.parse import urlsplit
 from urllib.request import getproxies, proxy_bypass
 
 from tdac_agent.errors import Fault
-from tdac_agent.models.choice import WITHOUT_TASK, Options, check_names, choose_model
+from tdac_agent.models.choice import (
+    OFFLINE,
+    WITHOUT_TASK,
+    Options,
+    check_names,
+    choose_model,
+)
 from tdac_agent.models.provider import Provider, ProviderFault, served_at
 from tdac_agent.models.tariff import bounds_of, tariffs_of
 from tdac_agent.models.timeout import run_with_timeout
@@ -50,7 +57,8 @@ def check_ready(names: Iterable[str | None], wanted: Mapping[str, Any]) -> None:
 def check_servers(models: Iterable[Provider]) -> None:
     """Checks that the models' own servers accept connections; sends them nothing.
 
-    The vendors' servers are not tried, nor those behind a proxy.
+    The vendors' servers are not tried, nor those behind a proxy, nor one again that has
+    accepted a connection of this process.
 
     Raises:
         Fault: A server does not; the message lists all of them.
@@ -58,33 +66,59 @@ def check_servers(models: Iterable[Provider]) -> None:
     problems = []
     for model in {served_at(model): model for model in models}.values():
         url = served_at(model)
-        problem = None if url is None else _unreachable(url)
-        if problem is not None:
+        try:
+            if url is not None and not _is_proxied(url):
+                connect(url)
+        except (ProviderFault, OSError, ValueError) as error:
+            reason = one_line(getattr(error, "strerror", None) or str(error))
             problems.append(
-                f"no server answers at {url} ({problem}), which {model.name} needs: "
+                f"no server answers at {url} ({reason}), which {model.name} needs: "
                 "start it, or correct the base URL"
             )
     if problems:
         raise Fault("; ".join(problems))
 
 
-def _unreachable(url: str) -> str | None:
-    """Says why there is no connection to a server; None if there is one."""
+def needs_limit(name: str, base_url: str | None) -> bool:
+    """Whether a limit must bound what a model costs; not on a server of this machine.
+
+    Args:
+        name: The model.
+        base_url: URL of the models' server.
+
+    Raises:
+        ProviderError: The name is unknown, or cannot be used.
+    """
+    check_names([name], None)
+    kind = name.partition(":")[0]
+    if kind in OFFLINE:
+        return False
+    own = kind in WITHOUT_TASK
+    url = served_at(choose_model(name, Options(None, base_url))) if own else None
+    return url is None or not is_loopback(url)
+
+
+def _is_proxied(url: str) -> bool:
     parts = urlsplit(url)
-    host = parts.hostname or ""
     proxied = not getproxies().keys().isdisjoint((parts.scheme, "all"))
-    if not is_loopback(url) and proxied and not proxy_bypass(host):
-        return None
+    return not is_loopback(url) and proxied and not proxy_bypass(parts.hostname or "")
 
-    def connect() -> None:
-        port = parts.port or (443 if parts.scheme == "https" else 80)
-        socket.create_connection((host, port), CONNECT_SECONDS).close()
 
-    try:
-        # A name server may take longer than the connection.
-        run_with_timeout(CONNECT_SECONDS, connect, lambda: None)
-    except ProviderFault:
-        return f"no connection within {CONNECT_SECONDS:g} s"
-    except (OSError, ValueError) as error:
-        return one_line(getattr(error, "strerror", None) or str(error))
-    return None
+@functools.cache
+def connect(url: str) -> None:
+    """Connects to a server, and closes the connection; a success is remembered.
+
+    Raises:
+        ProviderFault: It takes too long.
+        OSError: There is no connection.
+        ValueError: The URL is not valid.
+    """
+    parts = urlsplit(url)
+    port = parts.port or (443 if parts.scheme == "https" else 80)
+    address = parts.hostname or "", port
+    # A name server may take longer than the connection.
+    run_with_timeout(
+        CONNECT_SECONDS,
+        lambda: socket.create_connection(address, CONNECT_SECONDS).close(),
+        lambda: None,
+    )

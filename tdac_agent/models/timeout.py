@@ -1,10 +1,11 @@
-"""Run blocking work with a time limit."""
+"""Run blocking work in threads that neither an interrupt nor the end waits for."""
 
 from __future__ import annotations
 
+import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from concurrent.futures import Future, wait
 from typing import TypeVar
 
@@ -23,9 +24,8 @@ def run_with_timeout(
 ) -> T:
     """Returns the result of `work`, or raises a fault if it takes too long.
 
-    It runs in a separate thread, so that neither a slow name server nor a server that
-    sends a byte now and then can delay an interrupt or exceed the time. An abandoned
-    thread ends with the process.
+    Neither a slow name server nor a server that sends a byte now and then can delay an
+    interrupt or exceed the time.
 
     Args:
         seconds: Time limit.
@@ -35,6 +35,20 @@ def run_with_timeout(
     Raises:
         ProviderFault: It took longer.
     """
+    future = in_thread(work)
+    try:
+        wait_for_all([future], seconds)
+        return future.result(0.0)
+    except TimeoutError:
+        let_go()
+        raise ProviderFault(f"no complete answer within {seconds:.3g} s") from None
+    except BaseException:
+        let_go()
+        raise
+
+
+def in_thread(work: Callable[[], T]) -> Future[T]:
+    """Starts work in a thread that ends with the process; its result comes later."""
     future: Future[T] = Future()
 
     def run() -> None:
@@ -44,15 +58,14 @@ def run_with_timeout(
             future.set_exception(error)
 
     threading.Thread(target=run, daemon=True, name="tdac-call").start()
+    return future
+
+
+def wait_for_all(futures: Collection[Future[T]], seconds: float = math.inf) -> None:
+    """Waits until all results are there, or for some time; an interrupt ends it.
+
+    It waits in slices: a signal that comes just before a wait does not end that wait.
+    """
     end = time.monotonic() + seconds
-    try:
-        # In slices: a signal that comes just before a wait does not end it.
-        while time.monotonic() < end and not wait([future], LOOK_SECONDS).done:
-            pass
-        return future.result(0.0)
-    except TimeoutError:
-        let_go()
-        raise ProviderFault(f"no complete answer within {seconds:.3g} s") from None
-    except BaseException:
-        let_go()
-        raise
+    while time.monotonic() < end and wait(futures, LOOK_SECONDS).not_done:
+        pass

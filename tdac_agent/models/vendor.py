@@ -32,6 +32,7 @@ class Vendor:
     Attributes:
         package: Its Python package, also the prefix of model names.
         extra: Extra that installs the package; None if every installation has it.
+        client: Class of a client in the package.
         company: Its name in messages.
         key: Environment variable of the key.
         base_url: Environment variable of another server's URL.
@@ -40,6 +41,7 @@ class Vendor:
 
     package: str
     extra: str | None
+    client: str
     company: str
     key: str
     base_url: str
@@ -78,16 +80,16 @@ class VendorModel(ABC, Generic[C]):
     @property
     def missing(self) -> tuple[str, ...]:
         """A line each for the package and the key, if they are missing."""
-        vendor, found = self.vendor, []
+        vendor, missing = self.vendor, []
         # The import takes a second or two, so it is left to the first question.
         if importlib.util.find_spec(vendor.package) is None:
             install = install_command(vendor.extra)
-            found.append(f"{self.name} needs a package: {install}")
+            missing.append(f"{self.name} needs a package: {install}")
         try:
             self._read_key()
         except ProviderError as error:
-            found.append(str(error))
-        return tuple(found)
+            missing.append(str(error))
+        return tuple(missing)
 
     @classmethod
     def make(cls, words: str, options: Options) -> VendorModel[C]:
@@ -113,10 +115,6 @@ class VendorModel(ABC, Generic[C]):
             )
 
     @abstractmethod
-    def _client(self, **options: Any) -> Any:
-        """Returns a client of the package."""
-
-    @abstractmethod
     def _ask(self, client: C, request: Request) -> Reply:
         """Sends the request and assembles the streamed answer."""
 
@@ -129,7 +127,8 @@ class VendorModel(ABC, Generic[C]):
         # The environment names a proxy that is invalid, or needs another package.
         except (ImportError, ValueError) as error:
             raise PermanentFault(one_line(f"the proxy: {error}")) from None
-        return self._client(
+        client = getattr(package, self.vendor.client)
+        return client(
             api_key=self._read_key(),
             base_url=self._base_url,
             max_retries=0,

@@ -12,10 +12,9 @@ from tdac_agent.plots.style import (
     COLOURS,
     MARKERS,
     TEXT,
-    apply_style,
     legend_above,
     line_style,
-    new_plot,
+    panels,
 )
 
 DIFFICULTY = {
@@ -36,9 +35,8 @@ _KINDS = {
     "learned": "learned",
     "privileged": "knows the true world",
 }
-_COLUMNS = 3
 # Inches that the labels below and above the panels need.
-_NARROWEST = 6.2
+ROOM = {"above": 0.8, "narrowest": 6.2}
 # Characters of a name.
 _LONGEST = 22
 
@@ -55,8 +53,8 @@ def plot_scores(rows: pd.DataFrame) -> Figure:
     mean = rows.groupby("entrant", sort=False)["time"].mean()
     order = list(mean.sort_values(ascending=False, kind="stable").index)
     height = 0.55 + 0.22 * len(order)
-    figure, panels = _panels(len(sets), 2.1, height, left=1.3)
-    for axes, name in zip(panels, sets, strict=False):
+    figure, grid = panels(len(sets), 2.1, height, left=1.3, **ROOM)
+    for axes, name in zip(grid, sets, strict=False):
         own = rows[rows["set"] == name].set_index("entrant")
         for place, entrant in enumerate(order):
             _dot(axes, own, entrant, len(order) - place)
@@ -69,7 +67,7 @@ def plot_scores(rows: pd.DataFrame) -> Figure:
         axes.set_xlim(-0.02, 1.0)
         axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "", "0.5", "", "1"])
         axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
-    legend_above(figure, panels, 4)
+    legend_above(figure, grid, 4)
     label = "time score: mean of success x OT / T, with 95 % intervals"
     if rows["time"].notna().sum() < len(sets) * len(order):
         label += "; –: did not drive"
@@ -107,10 +105,10 @@ def plot_difficulty(worlds: pd.DataFrame, name: str) -> Figure:
     """
     own = worlds[worlds["set"] == name]
     figures = [key for key in DIFFICULTY if own[key].nunique() > BINS]
-    figure, panels = _panels(len(figures), 2.4, 2.1, left=0.4)
+    figure, grid = panels(len(figures), 2.4, 2.1, left=0.4, **ROOM)
     reached = own.groupby("entrant", sort=False)["success"].mean()
     entrants = list(reached.sort_values(ascending=False, kind="stable").index)
-    for axes, key in zip(panels, figures, strict=False):
+    for axes, key in zip(grid, figures, strict=False):
         for number, entrant in enumerate(entrants):
             rows = own[own["entrant"] == entrant]
             centres, success = _binned(rows[key], rows["success"])
@@ -126,7 +124,7 @@ def plot_difficulty(worlds: pd.DataFrame, name: str) -> Figure:
         axes.set_xlabel(DIFFICULTY[key], fontsize=9, color=TEXT)
         axes.set_ylim(-0.02, 1.02)
         axes.xaxis.set_major_locator(MaxNLocator(4))
-    legend_above(figure, panels, 4)
+    legend_above(figure, grid, 4)
     label = f"reached, in {BINS} groups of as many worlds"
     figure.supylabel(label, fontsize=9, color=TEXT)
     return figure
@@ -153,8 +151,8 @@ def plot_training(rows: pd.DataFrame) -> Figure:
     sets = list(learned["set"].drop_duplicates())
     entrants = list(learned["entrant"].drop_duplicates())
     most = (learned["steps"] / learned["files"]).max() / 1e6
-    figure, panels = _panels(len(sets), 2.4, 2.1, left=0.4)
-    for axes, name in zip(panels, sets, strict=False):
+    figure, grid = panels(len(sets), 2.4, 2.1, left=0.4, **ROOM)
+    for axes, name in zip(grid, sets, strict=False):
         for row in learned[learned["set"] == name].itertuples():
             style = line_style(entrants.index(row.entrant))
             axes.errorbar(
@@ -171,7 +169,7 @@ def plot_training(rows: pd.DataFrame) -> Figure:
         axes.set_xlim(0, 1.1 * most)
         axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.set_ylim(0, 1)
-    legend_above(figure, panels, 4)
+    legend_above(figure, grid, 4)
     label = (
         "millions of steps to the kept policy, mean of its trainings; "
         "dashed: the best other entrant"
@@ -183,18 +181,3 @@ def plot_training(rows: pd.DataFrame) -> Figure:
 
 def _short(name: str) -> str:
     return name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…"
-
-
-def _panels(
-    count: int, width: float, height: float, left: float
-) -> tuple[Figure, list[Axes]]:
-    """A figure with `count` panels in rows; sizes of a panel in inches."""
-    columns = max(min(_COLUMNS, count), 1)
-    rows = max(-(-count // columns), 1)
-    width = max(width, (_NARROWEST - left) / columns)
-    figure = new_plot(left + width * columns, 0.8 + height * rows)
-    grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
-    panels = [apply_style(axes) for axes in grid.flat]
-    for axes in panels[count:]:
-        axes.set_visible(False)
-    return figure, panels

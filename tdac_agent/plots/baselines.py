@@ -17,13 +17,15 @@ from tdac_agent.plots.style import (
     LINES,
     MARKERS,
     TEXT,
-    apply_style,
     colours_of,
     legend_above,
     new_plot,
+    panels,
+    title,
 )
 
-_COLUMNS = 3
+SMALL = {"size": 9.5, "pad": 14, "rise": 4, "small": 7.5}
+"""Of the titles of panels."""
 
 
 def plot_learning_curves(curves: pd.DataFrame) -> Figure:
@@ -35,8 +37,8 @@ def plot_learning_curves(curves: pd.DataFrame) -> Figure:
     """
     tasks = list(curves["task"].drop_duplicates())
     algos = list(curves["algo"].drop_duplicates())
-    figure, panels = _panels(len(tasks), 2.5, 2.1)
-    for axes, task in zip(panels, tasks, strict=False):
+    figure, grid = panels(len(tasks), 2.5, 2.1, left=0.3, above=0.7)
+    for axes, task in zip(grid, tasks, strict=False):
         for number, algo in enumerate(algos):
             rows = curves[(curves["task"] == task) & (curves["algo"] == algo)]
             if not rows.empty:
@@ -45,12 +47,12 @@ def plot_learning_curves(curves: pd.DataFrame) -> Figure:
         seeds = ", ".join(
             f"{str(algo).upper()}: {n} seed{'s' * (n > 1)}" for algo, n in count.items()
         )
-        _title(axes, task.replace(" ", ", "), seeds)
+        title(axes, task.replace(" ", ", "), seeds, **SMALL)
         axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.set_ylim(-0.03, 1.05)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:.0f}k"))
-    legend_above(figure, panels, 5)
+    legend_above(figure, grid, 5)
     figure.supxlabel(
         "training steps of all robots; thin: each seed, bold: mean, shaded: range",
         fontsize=9,
@@ -91,22 +93,22 @@ def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
     policies = list(pd.concat([learned, evaluation])["policy"].drop_duplicates())
     colours = colours_of(sorted(evaluation["knows"].drop_duplicates()))
     width, height = 1.9, 0.7 + 0.24 * len(policies)
-    figure, panels = _panels(len(tasks), width, height, shared=True)
+    figure, grid = panels(len(tasks), width, height, left=1.6, above=0.7)
     missing = False
-    for axes, task in zip(panels, tasks, strict=False):
+    for axes, task in zip(grid, tasks, strict=False):
         rows = evaluation[evaluation["task"] == task]
         for place, policy in enumerate(policies):
             known = rows[rows["policy"] == policy].dropna(subset=["episodes"])
             _dots(axes, known, len(policies) - place, colours)
             missing |= known.empty
-        _title(axes, task)
+        axes.set_title(task, loc="left", fontsize=9.5, color=TEXT, pad=4)
         axes.set_yticks(range(len(policies), 0, -1), policies)
         axes.set_ylim(0.4, len(policies) + 0.6)
         axes.set_xlim(-0.05, 1.05)
         axes.set_xticks([0, 0.5, 1])
         axes.xaxis.set_major_formatter(PercentFormatter(1.0))
         axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
-    legend_above(figure, panels, 5)
+    legend_above(figure, grid, 5)
     label = "episodes with goal reached without contact, exact 95 % intervals"
     if evaluation["training"].notna().any():
         label += "; one dot per training seed"
@@ -141,18 +143,18 @@ def _dots(
         )
 
 
-def plot_generalisation(found: pd.DataFrame) -> Figure:
+def plot_generalisation(results: pd.DataFrame) -> Figure:
     """Plots success on the training task and on other tasks, over all seeds, in %.
 
     Args:
-        found: A row per policy and task, with the columns `trained_on`,
+        results: A row per policy and task, with the columns `trained_on`,
             `evaluated_on`, `seen`, `episodes` and `reached`, and `algo` if there are
             several.
     """
-    trained = found["trained_on"].str.replace(" ", ", ")
-    if "algo" in found:
-        trained = found["algo"].str.upper() + ": " + trained
-    sums = found.assign(trained=trained).groupby(
+    trained = results["trained_on"].str.replace(" ", ", ")
+    if "algo" in results:
+        trained = results["algo"].str.upper() + ": " + trained
+    sums = results.assign(trained=trained).groupby(
         ["trained", "evaluated_on"], sort=False
     )
     cells = sums[["reached", "episodes"]].sum()
@@ -182,37 +184,5 @@ def _cell(axes: Axes, x: int, y: int, rate: float, seen: object) -> None:
         x, y, f"{100 * rate:.0f}", ha="center", va="center", color=colour, fontsize=8
     )
     if seen is True or seen is np.True_:
-        frame = axes.add_patch(_frame(x, y))
-        frame.set_clip_on(False)
-
-
-def _frame(x: int, y: int) -> Rectangle:
-    return Rectangle((x - 0.5, y - 0.5), 1, 1, fill=False, ec="#D55E00", lw=2)
-
-
-def _panels(
-    count: int, width: float, height: float, *, shared: bool = False
-) -> tuple[Figure, list[Axes]]:
-    """A figure with `count` panels in rows; width and height of a panel in inches."""
-    columns = min(_COLUMNS, count)
-    rows = math.ceil(count / columns)
-    left = 1.6 if shared else 0.3
-    figure = new_plot(left + width * columns, 0.7 + height * rows)
-    grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
-    panels = [apply_style(axes) for axes in grid.flat]
-    for axes in panels[count:]:
-        axes.set_visible(False)
-    return figure, panels
-
-
-def _title(axes: Axes, text: str, below: str = "") -> None:
-    axes.set_title(text, loc="left", fontsize=9.5, color=TEXT, pad=14 if below else 4)
-    axes.annotate(
-        below,
-        (0, 1),
-        (0, 4),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=7.5,
-        color="#666666",
-    )
+        frame = Rectangle((x - 0.5, y - 0.5), 1, 1, fill=False, ec="#D55E00", lw=2)
+        axes.add_patch(frame).set_clip_on(False)

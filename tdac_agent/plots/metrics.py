@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from tdac_agent.metrics import Frames, Rate, cumulative_success, success_rate
+from tdac_agent.metrics import Rate, RunFrames, cumulative_success, success_rate
 from tdac_agent.plots.style import (
     COLOURS,
     LINES,
@@ -29,7 +29,7 @@ BEHIND = "#D5D5D5"
 
 
 def plot_success_rates(
-    groups: dict[str, Frames],
+    groups: dict[str, RunFrames],
     *,
     by: str = "learner",
     heading: str = "Success rate SR",
@@ -43,7 +43,9 @@ def plot_success_rates(
         heading: Title.
         provenance: Line below the title: source and number of the runs.
     """
-    names = _order(groups, by)
+    names = list(
+        dict.fromkeys(n for frames in groups.values() for n in frames.runs[by])
+    )
     figure, axes = new_figure(max(5.0, 1.1 + 0.95 * len(names)), 3.6)
     colours = colours_of(groups)
     width = 0.8 / max(1, len(groups))
@@ -88,7 +90,7 @@ def _bar(axes: Axes, place: float, rate: Rate, width: float, colour: str) -> Non
 
 
 def plot_cumulative_success(
-    frames: Frames,
+    frames: RunFrames,
     *,
     by: str = "learner",
     most: int | None = None,
@@ -124,7 +126,7 @@ def plot_cumulative_success(
 
 
 def plot_cumulative_panels(
-    frames: Frames,
+    frames: RunFrames,
     *,
     by: str = "learner",
     most: int | None = None,
@@ -160,14 +162,16 @@ def plot_cumulative_panels(
     if curves:
         _frame(grid.flat[0], curves)
     figure.supxlabel("iteration k", fontsize=9.5, color=TEXT)
-    about = f"{heading}\n{provenance}" if provenance else heading
-    figure.suptitle(about, x=0.01, ha="left", fontsize=10.5, color=TEXT)
+    text = f"{heading}\n{provenance}" if provenance else heading
+    figure.suptitle(text, x=0.01, ha="left", fontsize=10.5, color=TEXT)
     return figure
 
 
-def _curves(frames: Frames, by: str, most: int | None) -> dict[str, pd.DataFrame]:
+def _curves(frames: RunFrames, by: str, most: int | None) -> dict[str, pd.DataFrame]:
     """CS(k) of each kind, starting with CS(0) = 0."""
-    last = most if most is not None else _last_shown_k(frames.runs)
+    # One more than the longest run reached.
+    reached = min(int(frames.runs["K"].max()), int(frames.runs["done"].max()) + 1)
+    last = reached if most is None else most
     begin = pd.DataFrame({"k": [0], "cs": [0.0], "low": [0.0], "high": [0.0]})
     return {
         name: pd.concat([begin, cumulative_success(runs, last)], ignore_index=True)
@@ -175,7 +179,7 @@ def _curves(frames: Frames, by: str, most: int | None) -> dict[str, pd.DataFrame
     }
 
 
-def _counted(frames: Frames, by: str, name: str) -> str:
+def _counted(frames: RunFrames, by: str, name: str) -> str:
     return f"{name} (R = {int((frames.runs[by] == name).sum())})"
 
 
@@ -214,14 +218,3 @@ def _frame(axes: Axes, curves: dict[str, pd.DataFrame]) -> None:
     axes.set_xlim(0, max(curve["k"].max() for curve in curves.values()) + 0.4)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylim(0, 1.03)
-
-
-def _last_shown_k(runs: pd.DataFrame) -> int:
-    """Last iteration to show: one more than the longest run reached, at most K."""
-    return min(int(runs["K"].max()), int(runs["done"].max()) + 1)
-
-
-def _order(groups: dict[str, Frames], by: str) -> list[str]:
-    return list(
-        dict.fromkeys(name for frames in groups.values() for name in frames.runs[by])
-    )

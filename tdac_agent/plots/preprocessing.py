@@ -7,7 +7,15 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from tdac_agent.plots.style import COLOURS, FAILED, PASSED, TEXT, apply_style, new_plot
+from tdac_agent.plots.style import (
+    COLOURS,
+    FAILED,
+    PASSED,
+    TEXT,
+    apply_style,
+    new_plot,
+    title,
+)
 from tdac_envs.grid.grid import BoolGrid, OccupancyGrid, body_free, clearance
 from tdac_envs.mapping.image import luminance
 from tdac_envs.mapping.map_folder import planned_path
@@ -17,6 +25,8 @@ from tdac_envs.mapping.preprocessing import Source, as_image
 SIDE = 3.7
 """Width of a panel, inches."""
 FREE, WALL, CLOSED = "#FAF9F5", "#384151", "#6E9FC4"
+SMALL = {"size": 10.5, "pad": 6.0, "rise": 5.0, "small": 8.0}
+"""Of the titles of panels."""
 _SHADES = {"dark": "dark is occupied", "light": "light is occupied"}
 
 
@@ -33,7 +43,12 @@ def plot_preprocessing(image: Source, grid: OccupancyGrid, params: MapParams) ->
     figure = new_plot(2 * SIDE + 0.4, 2 * SIDE * min(1.4, shape) + 1.2)
     first, second, third, last = figure.subplots(2, 2).flat
     first.imshow(source.colour, interpolation="antialiased")
-    _title(first, "1  the image", f"{source.name}, {grid.width} × {grid.height} px")
+    title(
+        first,
+        "1  the image\n",
+        f"{source.name}, {grid.width} × {grid.height} px",
+        **SMALL,
+    )
     _plot_threshold(apply_style(second), luminance(source.colour), params)
     _plot_grid(third, grid.cells, luminance(source.colour), params)
     _plot_room(last, grid, params)
@@ -56,24 +71,24 @@ def _plot_threshold(axes: Axes, grey: np.ndarray, params: MapParams) -> None:
         axes.axvline(params.threshold, color=FAILED, linewidth=1.5)
     shade = _SHADES.get(params.polarity, params.method)
     cut = "" if params.threshold is None else f"cut at {params.threshold:g}; "
-    _title(axes, "2  the threshold", f"{cut}{shade}")
+    title(axes, "2  the threshold\n", f"{cut}{shade}", **SMALL)
 
 
 def _plot_grid(
     axes: Axes, cells: BoolGrid, grey: np.ndarray, params: MapParams
 ) -> None:
     """Draws the grid; cells that differ from the plain threshold are coloured."""
-    shown, about = cells.astype(int), params.method
+    shown, subtitle = cells.astype(int), params.method
     if params.threshold is not None:
         light = grey > params.threshold
         plain = light if params.polarity == "light" else ~light
         shown = shown + 2 * (plain & ~cells) + 2 * (cells & ~plain)
         freed, filled = int((plain & ~cells).sum()), int((cells & ~plain).sum())
         if freed or filled:
-            about = f"{freed:,} px freed (orange), {filled:,} closed (blue)"
+            subtitle = f"{freed:,} px freed (orange), {filled:,} closed (blue)"
     colours = ListedColormap([FREE, WALL, COLOURS[4], CLOSED])
     axes.imshow(shown, cmap=colours, vmin=0, vmax=3, interpolation="nearest")
-    _title(axes, "3  the occupancy grid", about)
+    title(axes, "3  the occupancy grid\n", subtitle, **SMALL)
 
 
 def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
@@ -93,20 +108,7 @@ def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
         if place is not None:
             axes.plot(*place, mark, color=PASSED, markeredgecolor="w", markersize=11)
     margin = f" + {params.inflation:g} px" if params.inflation else ""
-    about = f"for a disc of {params.robot.radius:g} px{margin}"
+    subtitle = f"for a disc of {params.robot.radius:g} px{margin}"
     if params.score_terms is not None:
-        about += f"; grid path {params.score_terms.path_length:.0f} px"
-    _title(axes, "4  space for the robot", about)
-
-
-def _title(axes: Axes, text: str, about: str) -> None:
-    axes.set_title(f"{text}\n", loc="left", fontsize=10.5, color=TEXT)
-    axes.annotate(
-        about,
-        (0, 1),
-        (0, 5),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=8,
-        color="#666666",
-    )
+        subtitle += f"; grid path {params.score_terms.path_length:.0f} px"
+    title(axes, "4  space for the robot\n", subtitle, **SMALL)

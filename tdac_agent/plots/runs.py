@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
@@ -41,7 +43,7 @@ STEPS = {
 
 def plot_failures(run: Run) -> Figure:
     """Plots a row per test that ever failed, and a column per candidate (k, j)."""
-    failed = _ever_failed(run.attempts)
+    failed = list(dict.fromkeys(t for a in run.attempts for t in a.failed_tests))
     shown, left_out = failed[:MOST_TESTS], failed[MOST_TESTS:]
     cells = np.array(
         [
@@ -60,12 +62,14 @@ def plot_failures(run: Run) -> Figure:
         # A second cue besides colour.
         for y, x in np.argwhere(cells == 1):
             axes.text(x + 0.5, y + 0.5, "×", ha="center", va="center", color="w")
-    for place in _iteration_starts(run.attempts)[1:]:
-        axes.axvline(place, color="w", linewidth=5)
-        axes.axvline(place, color="#999999", linewidth=0.8)
+    for place, (before, after) in enumerate(itertools.pairwise(run.attempts), 1):
+        if before.k != after.k:
+            axes.axvline(place, color="w", linewidth=5)
+            axes.axvline(place, color="#999999", linewidth=0.8)
     axes.set_xlim(0, max(6, len(run.attempts)))
     axes.invert_yaxis()
-    _label_tests(axes, shown)
+    axes.set_yticks(np.arange(len(shown)) + 0.5, [short_name(test) for test in shown])
+    axes.tick_params(axis="y", labelsize=7.5, length=0)
     _label_candidates(axes, run.attempts)
     more = f"; {len(left_out)} of them not shown" if left_out else ""
     count = (
@@ -99,23 +103,14 @@ def plot_breakdown(run: Run) -> Figure:
     ]
     _stack(panels[0], spent, ("writing", "editing", "rules", "testing"), "seconds")
     counted = "" if run.tokens else "; tokens were not counted"
-    about = learner_named(run.learner) + counted
-    title(panels[0], f"Time of {run.folder.name}", about)
+    subtitle = learner_named(run.learner) + counted
+    title(panels[0], f"Time of {run.folder.name}", subtitle)
     if run.tokens:
         _stack(panels[1], spent, ("tokens in", "tokens out"), "tokens")
         panels[1].yaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         cost = "" if run.cost is None else f"; {run.cost:.3f} USD"
         title(panels[1], "Tokens", f"{run.tokens:,} in total{cost}")
     return figure
-
-
-def _iteration_starts(attempts: list[Attempt]) -> list[int]:
-    return [n for n, a in enumerate(attempts) if n == 0 or attempts[n - 1].k != a.k]
-
-
-def _label_tests(axes: Axes, shown: list[str]) -> None:
-    axes.set_yticks(np.arange(len(shown)) + 0.5, [short_name(test) for test in shown])
-    axes.tick_params(axis="y", labelsize=7.5, length=0)
 
 
 def _label_candidates(axes: Axes, attempts: list[Attempt]) -> None:
@@ -194,10 +189,6 @@ def _spent(records: list[JournalRecord]) -> dict[str, dict[str, float]]:
             took = seconds - began.pop("verify.start")
             uses["testing"] = uses.get("testing", 0.0) + took
     return spent
-
-
-def _ever_failed(attempts: list[Attempt]) -> list[str]:
-    return list(dict.fromkeys(t for a in attempts for t in a.failed_tests))
 
 
 def short_name(test: str) -> str:

@@ -50,6 +50,36 @@ def new_plot(width: float, height: float) -> Plot:
     return Plot(figsize=(width, height), layout="constrained")
 
 
+def panels(
+    count: int,
+    width: float,
+    height: float,
+    *,
+    left: float,
+    above: float,
+    narrowest: float = 0.0,
+) -> tuple[Plot, list[Axes]]:
+    """A figure with `count` panels, at most three in a row; sizes in inches.
+
+    Args:
+        count: Number of panels.
+        width: Width of a panel.
+        height: Height of a panel.
+        left: What the labels at the left need.
+        above: What the legend above needs.
+        narrowest: Least width of the figure, which the legend needs.
+    """
+    columns = max(min(3, count), 1)
+    rows = max(-(-count // columns), 1)
+    width = max(width, (narrowest - left) / columns)
+    figure = new_plot(left + width * columns, above + height * rows)
+    grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
+    shown = [apply_style(axes) for axes in grid.flat]
+    for axes in shown[count:]:
+        axes.set_visible(False)
+    return figure, shown
+
+
 def apply_style(axes: Axes) -> Axes:
     """Applies the common style to axes, and returns them."""
     axes.spines[["top", "right"]].set_visible(False)
@@ -60,17 +90,36 @@ def apply_style(axes: Axes) -> Axes:
     return axes
 
 
-def title(axes: Axes, text: str, provenance: str = "") -> None:
-    """Sets a title at the left, with the source of the data below it."""
-    axes.set_title(text, loc="left", fontsize=11, color=TEXT, pad=20)
+def title(
+    axes: Axes,
+    text: str,
+    provenance: str = "",
+    *,
+    size: float = 11.0,
+    pad: float = 20.0,
+    rise: float = 6.0,
+    small: float = 8.5,
+) -> None:
+    """Sets a title at the left, with the source of the data below it.
+
+    Args:
+        axes: The axes.
+        text: The title.
+        provenance: The line below it.
+        size: Font size of the title, pt.
+        pad: Distance of the title from the axes.
+        rise: Distance of the line from the axes, pt.
+        small: Font size of the line, pt.
+    """
+    axes.set_title(text, loc="left", fontsize=size, color=TEXT, pad=pad)
     if provenance:
         axes.annotate(
             provenance,
             (0, 1),
-            (0, 6),
+            (0, rise),
             xycoords="axes fraction",
             textcoords="offset points",
-            fontsize=8.5,
+            fontsize=small,
             color="#666666",
         )
 

@@ -73,10 +73,10 @@ def plot_timeline(run: Run) -> Figure:
     if entries:
         end = row - entries[-1].rows
         axes.plot([7, 7], [0, end], color="#CCCCCC", linewidth=1.5, zorder=0)
-    about = f"{run.task}; {learner_named(run.learner)}"
+    subtitle = f"{run.task}; {learner_named(run.learner)}"
     if run.optimizer != run.learner:
-        about += f"; repairs by {learner_named(run.optimizer)}"
-    title(axes, f"Timeline of {run.folder.name}", about)
+        subtitle += f"; repairs by {learner_named(run.optimizer)}"
+    title(axes, f"Timeline of {run.folder.name}", subtitle)
     return figure
 
 

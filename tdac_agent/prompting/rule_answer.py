@@ -73,9 +73,8 @@ class Drop(StrictModel, strict=True):
 
 
 Operation = Annotated[Add | Edit | Drop, Field(discriminator="op")]
-_Operations: TypeAdapter[list[Operation]] = TypeAdapter(
-    Annotated[list[Operation], Field(max_length=MAX_OPERATIONS)]
-)
+_FORM = Annotated[list[Operation], Field(max_length=MAX_OPERATIONS)]
+_Operations: TypeAdapter[list[Operation]] = TypeAdapter(_FORM)
 
 
 class RuleAnswerError(ValueError):
@@ -105,7 +104,7 @@ def parse_operations(reply: str) -> list[Add | Edit | Drop]:
     try:
         return _Operations.validate_python(json.loads(blocks[0]))
     except ValidationError as error:
-        raise RuleAnswerError(first_problem(error)) from error
+        raise RuleAnswerError(first_problem(error, _FORM)) from error
     except (ValueError, RecursionError) as error:
         reason = str(error).partition("\n")[0]
         raise RuleAnswerError(f"the block is not JSON: {reason}") from error

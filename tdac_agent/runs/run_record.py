@@ -26,9 +26,8 @@ Status = Literal[
     "fault",
     "budget",
 ]
-Setting = Literal[
-    "dual tier", "edit only", "prompt only", "best of N", "one shot", "agent"
-]
+LoopSetting = Literal["dual tier", "edit only", "prompt only", "best of N", "one shot"]
+Setting = LoopSetting | Literal["agent"]
 Agent = Literal["", "unconfined", "over HTTP"]
 AGENT = "mcp"
 """The learner of a run whose candidates an agent submits to `tdac mcp`."""
@@ -278,5 +277,5 @@ def load_rules(folder: Path) -> RuleBook:
         return RuleBook()
     except (OSError, ValueError) as error:
         raise RunError(
-            f"{path} is not a rules file: {one_line_reason(error)}"
+            f"{path} is not a rules file: {one_line_reason(error, RuleBook)}"
         ) from error

@@ -10,24 +10,16 @@ import time
 from collections.abc import Callable
 
 from tdac_agent.sandbox.inner.wire import HEADER
-from tdac_agent.sandbox.waiting import RunQueue, standing
 
 CHUNK = 1 << 16
 # Most answers are short, and a large buffer costs more than the whole round trip.
 SHORT = 1 << 12
 KEPT_OUTPUT = 4000
-# Most answers come sooner; run-queue wait time is measured only for later ones.
-SOON_SECONDS = 0.25
 # A pipe holds 64 kB, which is read in so many pieces.
 MOST_LATE_READS = 1 + (1 << 16) // SHORT
-# A child is busy if it was on a CPU for this share of its time outside the run queue.
-# Below it the machine may be to blame, e.g. the host of a virtual machine.
-BUSY_SHARE = 0.9
 
-
-Deadline = float | Callable[[], float]
-"""A value of `time.monotonic`, or a function that returns the seconds left and may
-raise `DeadlineError`."""
+Deadline = Callable[[], float]
+"""Returns the seconds left; may raise `DeadlineError` or `StarvedError`."""
 
 
 class ChannelClosedError(Exception):
@@ -38,7 +30,7 @@ class DeadlineError(Exception):
     """The deadline passed before a whole frame was sent or received.
 
     Args:
-        busy: Whether the child was on a CPU for nearly all of its time.
+        busy: Whether the child used up its time by computing.
     """
 
     def __init__(self, *, busy: bool) -> None:
@@ -67,7 +59,6 @@ class Channel:
         output: Descriptor to read printed output from.
         frame_bytes: Largest payload of an answer.
         output_bytes: Limit of the printed output.
-        line: Run-queue statistics of the child; its wait time extends deadlines.
     """
 
     def __init__(
@@ -77,14 +68,8 @@ class Channel:
         output: int,
         frame_bytes: int,
         output_bytes: int,
-        line: RunQueue,
     ) -> None:
-        # The judge, too, waits for a CPU after an answer.
-        self._line, self._own = line, RunQueue("thread-self")
-        # Last reading of the run-queue statistics: when, values, for which deadline.
-        self._seen_at, self._seen_times, self._seen_deadline = 0.0, (0.0, 0.0), 0.0
-        self._seen_own = 0.0
-        self._late_deadline: Deadline = 0.0
+        self._late_deadline: Deadline | None = None
         self._late_reads = 0
         self._requests, self._answers, self._output = requests, answers, output
         self._frame_bytes, self._output_bytes = frame_bytes, output_bytes
@@ -157,32 +142,16 @@ class Channel:
         return part
 
     def _events(self, deadline: Deadline) -> list[tuple[int, int]]:
-        if callable(deadline):
-            try:
-                while (left := deadline()) > 0:
-                    if events := self._poll.poll(math.ceil(left * 1000)):
-                        return events
-            except DeadlineError:
-                if events := self._late_answer(deadline):
+        late = DeadlineError(busy=False)
+        try:
+            while (left := deadline()) > 0:
+                if events := self._poll.poll(math.ceil(left * 1000)):
                     return events
-                raise
-            if events := self._late_answer(deadline):
-                return events
-            raise DeadlineError(busy=False)
-        left = deadline - time.monotonic()
-        if left > SOON_SECONDS and self._seen_deadline != deadline:
-            events = self._poll.poll(math.ceil(SOON_SECONDS * 1000))
-            if events:
-                return events
-            self._seen_at, self._seen_times = time.monotonic(), self._line.times()
-            self._seen_deadline, self._seen_own = deadline, self._own.waited()
-        while (left := self._seconds_left(deadline)) > 0:
-            events = self._poll.poll(math.ceil(left * 1000))
-            if events:
-                return events
+        except DeadlineError as error:
+            late = error
         if events := self._late_answer(deadline):
             return events
-        raise DeadlineError(busy=self._was_busy(deadline))
+        raise late
 
     def _late_answer(self, deadline: Deadline) -> list[tuple[int, int]]:
         """Return the event of an answer that the judge had no CPU to read; or none.
@@ -195,35 +164,6 @@ class Channel:
         self._late_reads += 1
         events = [event for event in self._poll.poll(0) if event[0] == self._answers]
         return events if self._late_reads <= MOST_LATE_READS else []
-
-    def _was_busy(self, deadline: float) -> bool:
-        if self._seen_deadline != deadline:
-            return False
-        ran, waited = (
-            now - then
-            for now, then in zip(self._line.times(), self._seen_times, strict=True)
-        )
-        return ran >= BUSY_SHARE * (time.monotonic() - self._seen_at - waited) > 0
-
-    def _seconds_left(self, deadline: float) -> float:
-        """Return the seconds until a deadline, extended by the run-queue wait time.
-
-        Raises:
-            StarvedError: It has been extended for too long.
-        """
-        left = deadline - time.monotonic()
-        if left > 0 or self._seen_deadline != deadline:
-            return left
-        ready = self._line.stands()
-        waited = self._line.waited() - self._seen_times[1]
-        waited += self._own.waited() - self._seen_own
-        # What is still in the queue adds its wait time only when it gets a CPU.
-        limit = deadline - self._seen_at
-        elapsed = limit - left
-        waited = max(waited, elapsed - limit + SOON_SECONDS) if ready else waited
-        if standing(limit, elapsed, waited) == "starved":
-            raise StarvedError
-        return left + waited
 
     def _drain(self) -> bool:
         """Read printed output; return whether more can follow."""

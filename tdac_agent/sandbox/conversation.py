@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
@@ -31,6 +30,8 @@ from tdac_agent.sandbox.inner.encode import encode
 from tdac_agent.sandbox.inner.layout import Layout
 from tdac_agent.sandbox.inner.wire import Kind, RemoteError, WireError
 from tdac_agent.sandbox.limits import Limits
+from tdac_agent.sandbox.time_limit import limit_of_answer
+from tdac_agent.sandbox.waiting import RunQueue
 
 EXIT_SECONDS = 1.0
 _FAILURES = (
@@ -47,6 +48,7 @@ class Conversation:
 
     Args:
         channel: Transports the frames.
+        process: The controller's process, whose time is limited.
         lifeline: Descriptor that shows when the child has ended.
         limits: Resource limits of the child.
         root: Private folder, whose path is removed from messages.
@@ -56,12 +58,13 @@ class Conversation:
     def __init__(
         self,
         channel: Channel,
+        process: RunQueue,
         lifeline: int,
         limits: Limits,
         root: Path,
         end: Callable[[], ChildUsage],
     ) -> None:
-        self._channel = channel
+        self._channel, self._process = channel, process
         self._lifeline = lifeline
         self._limits = limits
         self._root = root
@@ -72,7 +75,7 @@ class Conversation:
 
     def request(self, kind: Kind, value: Any, phase: str, seconds: float) -> Any:
         """Return the child's answer to one request."""
-        deadline = time.monotonic() + seconds
+        deadline = limit_of_answer(seconds, self._process)
         self.send(kind, value, phase, deadline, seconds)
         answer, result = self.receive(phase, deadline, seconds)
         if answer != Kind.VALUE:

@@ -8,8 +8,8 @@ import select
 import signal
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
+from tdac_agent.sandbox.waiting import usage_of_tree
 from tdac_agent.sandbox.zygote import Forked
 
 GRACE_SECONDS = 5.0
@@ -100,28 +100,3 @@ def has_ended(lifeline: int, seconds: float) -> bool:
     poll = select.poll()
     poll.register(lifeline, 0)  # reports an error once no reader is left
     return bool(poll.poll(seconds * 1000))
-
-
-def usage_of_tree(pid: int) -> tuple[float, int]:
-    """Return CPU seconds and peak resident bytes of a process and its descendants."""
-    cpu, rss = 0.0, 0
-    pids = [pid]
-    while pids:
-        folder = Path(f"/proc/{pids.pop()}")
-        try:
-            # raw read: of the kernel
-            fields = (folder / "stat").read_text().rpartition(")")[2].split()
-            # raw read: of the kernel
-            peak = (folder / "status").read_text().partition("VmHWM:")[2].split()
-            children = [
-                int(child)
-                for task in (folder / "task").iterdir()
-                # raw read: of the kernel
-                for child in (task / "children").read_text().split()
-            ]
-        except (OSError, ValueError):
-            continue
-        cpu += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-        rss = max(rss, int(peak[0]) * 1024 if peak else 0)
-        pids += children
-    return cpu, rss

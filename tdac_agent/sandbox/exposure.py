@@ -42,7 +42,8 @@ def exposure() -> Exposure:
     # Only `_base_executable` names the program behind a virtual environment.
     program = os.path.realpath(getattr(sys, "_base_executable", sys.executable))
     stdlib = os.path.dirname(os.path.realpath(os.__file__))
-    folders = _outermost({stdlib, *_extension_folders(), *_library_folders()})
+    extensions = {os.path.realpath(p) for p in sys.path if p.endswith("lib-dynload")}
+    folders = _outermost({stdlib, *extensions, *_library_folders()})
     # Only the folder is resolved: programs refer to the loader by its unresolved name.
     roots = [Path(folder).resolve() for folder in ("/lib", "/lib64")]
     loaders = [str(path) for root in roots for path in root.glob("ld-*.so*")]
@@ -82,10 +83,6 @@ def _existing(*paths: str) -> tuple[str, ...]:
     return tuple(path for path in paths if os.path.exists(path))
 
 
-def _extension_folders() -> set[str]:
-    return {os.path.realpath(p) for p in sys.path if p.endswith("lib-dynload")}
-
-
 def _library_folders() -> set[str]:
     """Return the folders of the shared libraries that this process has mapped."""
     # raw read: of the kernel
@@ -109,12 +106,12 @@ def _outermost(folders: set[str]) -> list[str]:
 
 
 def _foreign(folders: list[str]) -> list[str]:
-    found: set[str] = set()
+    paths: set[str] = set()
     for folder in folders:
         for name in FOREIGN_PACKAGES:
             for pattern in (name, f"*/{name}"):
-                found.update(str(path) for path in Path(folder).glob(pattern))
-    return sorted(found)
+                paths.update(str(path) for path in Path(folder).glob(pattern))
+    return sorted(paths)
 
 
 @functools.cache

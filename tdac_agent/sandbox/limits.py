@@ -11,15 +11,16 @@ MAX_SOURCE_BYTES = 200_000
 class Limits:
     """Resource limits of one child.
 
-    On Linux each wall time of the controller excludes its run-queue wait time, so that
-    a busy machine does not decide a verdict. After five minutes of waiting the sandbox
-    has failed, and there is no verdict.
+    A controller may compute, and sleep, for each of the times in seconds. Time in which
+    it waits for a CPU counts as neither, so that a busy machine does not decide a
+    verdict. After five minutes of waiting the sandbox has failed, and there is no
+    verdict.
 
     Attributes:
-        start_seconds: Wall time until the child is ready; no controller code runs yet.
-        import_seconds: Wall time to import the controller.
-        reset_seconds: Wall time of one `reset`.
-        call_seconds: Wall time of one call, `policy` included.
+        start_seconds: Until the child is ready; no controller code runs yet.
+        import_seconds: To import the controller.
+        reset_seconds: For one `reset`.
+        call_seconds: For one call, `policy` included.
         cpu_seconds: CPU time of the child in total.
         memory_bytes: Size of the address space.
         output_bytes: Size of the printed output.

@@ -12,12 +12,12 @@ from types import TracebackType
 from typing import Any, Protocol
 
 from tdac_agent.sandbox.conversation import Conversation
-from tdac_agent.sandbox.ending import ChildUsage, ProcessEnd, usage_of_tree
+from tdac_agent.sandbox.ending import ChildUsage, ProcessEnd
 from tdac_agent.sandbox.errors import ControllerError, EnvRefusalError
 from tdac_agent.sandbox.inner.wire import Handle, Kind, is_name
 from tdac_agent.sandbox.limits import MAX_SOURCE_BYTES, Limits
-from tdac_agent.sandbox.own_time import OwnTime
-from tdac_agent.sandbox.waiting import RunQueue
+from tdac_agent.sandbox.time_limit import TimeLimit
+from tdac_agent.sandbox.waiting import RunQueue, usage_of_tree
 from tdac_agent.sandbox.zygote import Forked
 
 
@@ -50,6 +50,8 @@ class ProgramWorld(Protocol):
 
 
 Answering = EpisodeEnv | ProgramWorld
+Target = str | Handle | tuple[Handle, str]
+"""A function by its name, a callable object, or an object and its method."""
 
 
 class Child:
@@ -81,8 +83,8 @@ class Child:
         self.controller_pid = forked.pid
         self._line = forked.line
         end, root = ProcessEnd(forked), forked.folder.root
-        channel, lifeline = forked.channel, forked.lifeline
-        self._talk = Conversation(channel, lifeline, limits, root, end)
+        ends = forked.channel, forked.line, forked.lifeline
+        self._talk = Conversation(*ends, limits, root, end)
         weakref.finalize(self, end)
 
     def __enter__(self) -> Child:
@@ -150,7 +152,7 @@ class Child:
 
     def call(
         self,
-        target: str | Handle | tuple[Handle, str],
+        target: Target,
         args: tuple[Any, ...] = (),
         kwargs: dict[str, Any] | None = None,
         timeout: float | None = None,
@@ -159,11 +161,7 @@ class Child:
 
         Arguments may contain handles; a result without an encoding becomes a handle.
         """
-        owner, name = _split(target)
-        phase = name if name is not None else "call"
-        request = (owner, name, args, kwargs or {})
-        seconds = timeout or self.limits.call_seconds
-        return self._talk.request(Kind.CALL, request, phase, seconds)
+        return self._use(Kind.CALL, target, (args, kwargs or {}), timeout)
 
     def call_each(
         self,
@@ -172,10 +170,14 @@ class Child:
         timeout: float | None = None,
     ) -> Any:
         """Call a function or method many times; return all results in one answer."""
+        return self._use(Kind.CALL_EACH, target, (calls,), timeout)
+
+    def _use(
+        self, kind: Kind, target: Target, rest: tuple[Any, ...], timeout: float | None
+    ) -> Any:
         owner, name = _split(target)
         seconds = timeout or self.limits.call_seconds
-        phase = name if name is not None else "call"
-        return self._talk.request(Kind.CALL_EACH, (owner, name, calls), phase, seconds)
+        return self._talk.request(kind, (owner, name, *rest), name or "call", seconds)
 
     def reset(self, observation: Any, timeout: float | None = None) -> Any:
         """Call `reset(obs)`, if the controller has it."""
@@ -259,14 +261,14 @@ class Child:
             timeout: Seconds that the controller may compute, and sleep, in total.
             max_left: Returns the current upper bound on the seconds left.
         """
-        own = OwnTime(timeout, self._look, RunQueue("thread-self").waited)
+        limit = TimeLimit(timeout, self._line.measure, RunQueue("thread-self").waited)
         left = max_left()
         reply: tuple[Kind, Any] = (kind, value)
         while True:
-            own.begin_turn(left)
-            self._talk.send(*reply, phase, own.left, timeout)
-            asked, value = self._talk.receive(phase, own.left, timeout)
-            left -= own.end_turn()
+            limit.start(left)
+            self._talk.send(*reply, phase, limit.left, timeout)
+            asked, value = self._talk.receive(phase, limit.left, timeout)
+            left -= limit.stop()
             if asked == Kind.VALUE:
                 return value
             if asked not in {Kind.ENV_RESET, Kind.ENV_STEP}:
@@ -281,14 +283,8 @@ class Child:
                 raise
             left = min(left, max_left())
 
-    def _look(self) -> tuple[float, float, bool]:
-        """Return CPU time, run-queue wait time, and whether it is ready."""
-        return self.cpu_seconds(), self._line.waited(), self._line.is_ready()
 
-
-def _split(
-    target: str | Handle | tuple[Handle, str],
-) -> tuple[Handle | None, str | None]:
+def _split(target: Target) -> tuple[Handle | None, str | None]:
     if isinstance(target, str):
         return None, target
     return (target, None) if isinstance(target, Handle) else target

@@ -1,43 +1,20 @@
 """Run-queue statistics: how long a process was ready to run but had no CPU.
 
-Source: Linux, `Documentation/scheduler/sched-stats.rst`: time on a CPU and run-queue
-wait time, both of the first thread and in ns. If they cannot be read, both are 0.
+Source: Linux, `Documentation/scheduler/sched-stats.rst`: run-queue wait time of the
+first thread, in ns. If it cannot be read, it is 0.
 """
 
 from __future__ import annotations
 
-import time
+import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import NamedTuple
 
-# The kernel updates the time on a CPU at each tick, at least every 10 ms.
-TICKS_SECONDS = 0.025
 MOST_WAITED_SECONDS = 300.0
 # Part of its length that a verification's processes must have waited for a CPU that
 # others used, if the machine is to blame.
 STARVED_SHARE = 0.1
-
-Standing = Literal["in time", "too late", "starved"]
-
-
-def standing(limit: float, elapsed: float, waited: float) -> Standing:
-    """Returns how a controller stands that has not answered yet.
-
-    Time on a CPU and time asleep count against its limit, time in a run queue does not.
-
-    Args:
-        limit: Time that it may take, s.
-        elapsed: Time since it was asked, s.
-        waited: Time that it, or the judge, was ready to run but had no CPU, s.
-
-    Returns:
-        `starved` if the machine is to blame: it is still in time, but has waited longer
-        than anybody should wait for it.
-    """
-    if elapsed - waited >= limit:
-        return "too late"
-    return "starved" if waited > MOST_WAITED_SECONDS else "in time"
 
 
 def machine_is_to_blame(elapsed: float, waited: float, siblings: float) -> bool:
@@ -52,6 +29,20 @@ def machine_is_to_blame(elapsed: float, waited: float, siblings: float) -> bool:
     return waited - siblings >= STARVED_SHARE * elapsed
 
 
+class ProcessTimes(NamedTuple):
+    """A process at some time.
+
+    Attributes:
+        ran: CPU time of it and its descendants, s; in steps of 10 ms.
+        waited: Run-queue wait time, s.
+        ready: Whether it runs or waits for a CPU.
+    """
+
+    ran: float
+    waited: float
+    ready: bool
+
+
 @dataclass(slots=True)
 class RunQueue:
     """Run-queue statistics of a process; time asleep does not count.
@@ -64,28 +55,13 @@ class RunQueue:
 
     def waited(self) -> float:
         """Returns the total run-queue wait time, s, until it last got a CPU."""
-        return self.times()[1]
-
-    def times(self) -> tuple[float, float]:
-        """Returns the total time on a CPU and the total run-queue wait time, s."""
-        ran, waited = self._statistics()
-        return ran / 1e9, waited / 1e9
-
-    def stands(self) -> bool:
-        """Whether it is ready to run but gets no CPU; takes about 25 ms."""
-        before = self._statistics()
-        if before == (0, 0) or not self.is_ready():
-            return False
-        time.sleep(TICKS_SECONDS)
-        return self.is_ready() and self._statistics() == before
-
-    def _statistics(self) -> tuple[int, int]:
         try:
             # raw read: of the kernel
+            # raw read: of the kernel
             fields = Path(f"/proc/{self.pid}/schedstat").read_text().split()
-            return int(fields[0]), int(fields[1])
+            return int(fields[1]) / 1e9
         except (OSError, ValueError, IndexError):
-            return 0, 0
+            return 0.0
 
     def is_ready(self) -> bool:
         """Whether it runs or waits for a CPU."""
@@ -94,3 +70,33 @@ class RunQueue:
         except OSError:
             return False
         return stat.rpartition(")")[2].split()[:1] == ["R"]
+
+    def measure(self) -> ProcessTimes:
+        """Returns all of it at once."""
+        ran, _ = usage_of_tree(self.pid)
+        return ProcessTimes(ran, self.waited(), self.is_ready())
+
+
+def usage_of_tree(pid: int | str) -> tuple[float, int]:
+    """Return CPU seconds and peak resident bytes of a process and its descendants."""
+    cpu, rss = 0.0, 0
+    pids = [pid]
+    while pids:
+        folder = Path(f"/proc/{pids.pop()}")
+        try:
+            # raw read: of the kernel
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+            # raw read: of the kernel
+            peak = (folder / "status").read_text().partition("VmHWM:")[2].split()
+            children = [
+                int(child)
+                for task in (folder / "task").iterdir()
+                # raw read: of the kernel
+                for child in (task / "children").read_text().split()
+            ]
+        except (OSError, ValueError):
+            continue
+        cpu += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        rss = max(rss, int(peak[0]) * 1024 if peak else 0)
+        pids += children
+    return cpu, rss

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import functools
 import multiprocessing
 import os
 import shutil
@@ -114,7 +115,10 @@ class Zygote:
         # Children must not be able to read this file.
         self.witness = self.parent / "witness"
         try:
-            self._furnish()
+            self.site.mkdir()
+            for target in numpy_folders():
+                (self.site / os.path.basename(target)).symlink_to(target)
+            self.witness.write_text("not for children\n")
             self._folders = [PrivateFolder(self.parent) for _ in range(slots)]
             self._process, self._link, self._output, lifeline = self._start()
         except BaseException:
@@ -155,9 +159,10 @@ class Zygote:
             self._counts[GIVEN] += 1
             self._counts[ALIVE] += 1
         write, read, printed, lifeline = outer
-        frame, output, line = limits.frame_bytes, limits.output_bytes, RunQueue(pid)
-        channel = Channel(write, read, printed, frame, output, line)
-        return Forked(pid, folder, channel, line, lifeline, lambda: self._reap(number))
+        sizes = limits.frame_bytes, limits.output_bytes
+        channel = Channel(write, read, printed, *sizes)
+        reap = functools.partial(self._reap, number)
+        return Forked(pid, folder, channel, RunQueue(pid), lifeline, reap)
 
     @property
     def ended(self) -> bool:
@@ -211,12 +216,6 @@ class Zygote:
             if printed.strip():
                 return printed.strip()
         return str(error)
-
-    def _furnish(self) -> None:
-        self.site.mkdir()
-        for target in numpy_folders():
-            (self.site / os.path.basename(target)).symlink_to(target)
-        self.witness.write_text("not for children\n")
 
     def _start(self) -> tuple[subprocess.Popen[bytes], socket.socket, int, int]:
         """Return the process, our end of its socket, its output, and its lifeline."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -63,6 +63,21 @@ def own_folder(
         if not held:
             raise RunError(f"another {who} is at work on {out}; wait until it ends")
         yield
+
+
+def first_free(files: Iterable[Path]) -> tuple[int, int] | None:
+    """Locks the first file that no process holds; they are created if missing.
+
+    Returns:
+        Number of the file and a descriptor, which releases the lock when it is closed.
+        None if all are held.
+    """
+    for number, file in enumerate(files):
+        handle = open_lock(file)
+        if _take(handle, 0):
+            return number, handle
+        os.close(handle)
+    return None
 
 
 def _take(handle: int, attempt: int) -> bool:

@@ -25,9 +25,7 @@ def read_yaml(file: Path, form: type[M], what: str, refusal: type[TdacError]) ->
     try:
         return form.model_validate(parse_yaml(read_file(file, TEXT_BYTES)))
     except ValidationError as error:
-        # The name of a key in the file (its alias) may differ from that in Python.
-        known = [field.alias or name for name, field in form.model_fields.items()]
-        raise refusal(f"{file}: {first_problem(error, known)}") from error
+        raise refusal(f"{file}: {first_problem(error, form)}") from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise refusal(f"cannot read {what} {file}: {reason}") from error

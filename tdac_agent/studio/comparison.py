@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,35 +14,16 @@ from tdac_agent.storage.plain import printable
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_yaml, read_file
 
+Line = tuple[str, str, str]
 NONE = "–"
 MOST_VALUE = 300
 """Characters of a value that are shown."""
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
-    """A figure or setting of two runs.
-
-    Attributes:
-        name: What it is.
-        one: Its value in the first run.
-        other: Its value in the second.
-    """
-
-    name: str
-    one: str
-    other: str
-
-    @property
-    def differs(self) -> bool:
-        """Whether the runs differ in it."""
-        return self.one != self.other
-
-
 def lines_of(one: Mapping[str, str], other: Mapping[str, str]) -> list[Line]:
-    """The values of two runs; what one of them lacks is a dash."""
+    """Name and values of each figure of two runs; what one lacks is a dash."""
     names = dict.fromkeys([*one, *other])
-    return [Line(name, one.get(name, NONE), other.get(name, NONE)) for name in names]
+    return [(name, one.get(name, NONE), other.get(name, NONE)) for name in names]
 
 
 def figures_of(folder: Path) -> dict[str, str]:
@@ -73,15 +53,15 @@ def settings_of(folder: Path) -> dict[str, str]:
         RunError: It cannot be read.
     """
     run = load_run(folder)
-    found = {"task": run.task, **_of_loop(run)}
+    settings = {"task": run.task, **_of_loop(run)}
     for name in ("task.yaml", "set.yaml"):
         try:
             content = parse_yaml(read_file(folder / name, TEXT_BYTES))
         except (OSError, ValueError):
             continue
-        found |= dict(_flat(content, name.partition(".")[0]))
-    found.pop("task: profile", None)  # it is the form of the controller
-    return found
+        settings |= dict(_flat(content, name.partition(".")[0]))
+    settings.pop("task: profile", None)  # it is the form of the controller
+    return settings
 
 
 def difference(one: Path, other: Path) -> str | None:

@@ -10,19 +10,25 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.runs.ownership import load_task
-from tdac_agent.studio.board import Board, Kind, Place
-from tdac_agent.studio.passage import Passage, passage_on
+from tdac_agent.studio.bottleneck import Bottleneck, bottleneck_on
+from tdac_agent.studio.source_view import Kind, Place, SourceView
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.core.errors import TdacError
+from tdac_envs.grid.plan import path_length
 from tdac_envs.map2d.task import Map2DTask
 
 DIGITS = {"px": 1, "m": 3}
 """Decimals of clicked places."""
+LEAST_RADIUS, RADIUS_STEP = 1.0, 0.5
+"""Of the slider for the robot's radius, px."""
+ELSEWHERE = 0.5
+"""By how much half of a passage must be less than the widest radius, px, if that gets
+through elsewhere: it is measured between walls, the radius from pixel to pixel."""
 
 
 @dataclass(frozen=True, slots=True)
-class Draft:
+class TaskDraft:
     """What has been chosen so far.
 
     Attributes:
@@ -44,12 +50,14 @@ class Draft:
     polarity: str | None = None
 
     @classmethod
-    def of(cls, board: Board, source: str, polarity: str | None = None) -> Draft:
+    def of(
+        cls, view: SourceView, source: str, polarity: str | None = None
+    ) -> TaskDraft:
         """The task of the file itself, as far as it has one."""
-        start = None if board.start is None else (board.start[0], board.start[1])
-        heading = None if board.start is None else board.start[2]
-        radius = board.radius or (15.0 if board.kind == "map" else None)
-        return cls(board.kind, source, start, board.goal, heading, radius, polarity)
+        start = None if view.start is None else (view.start[0], view.start[1])
+        heading = None if view.start is None else view.start[2]
+        radius = view.radius or (15.0 if view.kind == "map" else None)
+        return cls(view.kind, source, start, view.goal, heading, radius, polarity)
 
     def words(self) -> list[str]:
         """The flags of the command line that name this task."""
@@ -65,15 +73,15 @@ class Draft:
             words += ["--polarity", self.polarity]
         return words
 
-    def with_start(self, place: Place, unit: str) -> Draft:
+    def with_start(self, place: Place, unit: str) -> TaskDraft:
         """The draft with a clicked start."""
         return replace(self, start=_rounded(place, unit))
 
-    def with_goal(self, place: Place, unit: str) -> Draft:
+    def with_goal(self, place: Place, unit: str) -> TaskDraft:
         """The draft with a clicked goal."""
         return replace(self, goal=_rounded(place, unit))
 
-    def facing(self, place: Place) -> Draft:
+    def facing(self, place: Place) -> TaskDraft:
         """The draft with a robot that faces a place; without a start, unchanged."""
         if self.start is None or place == self.start:
             return self
@@ -85,12 +93,12 @@ class Draft:
         start: tuple[float, ...] | None = self.start
         if start is not None and self.heading is not None:
             start = (*start, self.heading)
-        given: dict[str, Any] = {"start": start, "goal": self.goal}
+        values: dict[str, Any] = {"start": start, "goal": self.goal}
         if self.kind == "world":
-            given |= {"env": "TDAC-EPuck-v0", "world": self.source}
-            return TaskFile(**given)
-        given |= {"map": self.source, "robot": {"radius": self.radius}}
-        return TaskFile(**given, polarity=self.polarity)
+            values |= {"env": "TDAC-EPuck-v0", "world": self.source}
+            return TaskFile(**values)
+        values |= {"map": self.source, "robot": {"radius": self.radius}}
+        return TaskFile(**values, polarity=self.polarity)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,36 +118,36 @@ class Checked:
     task: Task | None
     problem: str = ""
     path: np.ndarray = field(default_factory=lambda: np.zeros((0, 2)))
-    narrowest: Passage | None = None
+    narrowest: Bottleneck | None = None
     widest: float | None = None
     picture: bytes | None = None
 
 
-def check(draft: Draft, board: Board, place: Path) -> Checked:
+def check(draft: TaskDraft, view: SourceView, place: Path) -> Checked:
     """Loads the task of a draft, as the command would.
 
     Args:
         draft: The draft; it must have a goal, and a start unless the world has one.
-        board: Its board.
+        view: Its view.
         place: Folder of the studio.
     """
     widest = None
-    if board.widest is not None and draft.start and draft.goal:
-        widest = board.widest(draft.start, draft.goal)
+    if view.widest is not None and draft.start and draft.goal:
+        widest = view.widest(draft.start, draft.goal)
     try:
         task = load_task(draft.task_file(), base=place)
     except (TdacError, ValueError) as error:
         return Checked(None, " ".join(str(error).split()), widest=widest)
     nominal = task.nominal
     path = np.asarray(nominal.shortest_path(nominal.start), np.float64)
-    narrowest = passage_on(nominal, path)
+    narrowest = bottleneck_on(nominal, path)
     picture = None
-    if board.laid_over is not None and isinstance(nominal, Map2DTask):
-        picture = board.laid_over(nominal.terrain.grid.cells)
+    if view.laid_over is not None and isinstance(nominal, Map2DTask):
+        picture = view.laid_over(nominal.terrain.grid.cells)
     return Checked(task, "", path, narrowest, widest, picture)
 
 
-def snapped(draft: Draft, place: Path) -> Draft:
+def snapped(draft: TaskDraft, place: Path) -> TaskDraft:
     """The draft with start and goal at the nearest free places.
 
     Raises:
@@ -153,6 +161,43 @@ def snapped(draft: Draft, place: Path) -> Draft:
         start=(float(start[0]), float(start[1])),
         goal=(float(goal[0]), float(goal[1])),
     )
+
+
+def fitting_radius(draft: TaskDraft, checked: Checked | None) -> float | None:
+    """The largest radius of the slider that gets through; None if that is no help."""
+    if checked is None or checked.widest is None or draft.radius is None:
+        return None
+    fitting = math.floor(checked.widest / RADIUS_STEP) * RADIUS_STEP
+    return fitting if LEAST_RADIUS <= fitting < draft.radius else None
+
+
+def sentence_of(checked: Checked, view: SourceView) -> tuple[str, bool]:
+    """What was found, and whether it is good."""
+    if checked.task is None:
+        return checked.problem, False
+    reach = checked.task.nominal.goal_tolerance
+    text = (
+        f"A path of {path_length(checked.path):.4g} {view.unit}; the goal is reached "
+        f"within {reach:.3g} {view.unit} (green disc)"
+    )
+    return f"{text}.{_about_passage(checked, view.unit)}", True
+
+
+def _about_passage(checked: Checked, unit: str) -> str:
+    """How wide the narrowest passage of the path is, and for which robots."""
+    narrowest, widest = checked.narrowest, checked.widest
+    if narrowest is None:
+        return ""
+    if narrowest.at != "path":
+        away = narrowest.width / 2.0
+        text = f"It is narrowest at the {narrowest.at}, {away:.3g} {unit} from a wall"
+    else:
+        text = f"Its narrowest passage (bar) is {narrowest.width:.3g} {unit} wide"
+    if widest is None:
+        return f" {text}."
+    if narrowest.width / 2.0 > widest - ELSEWHERE:
+        return f" {text}: room for a radius of {widest:g} {unit}."
+    return f" {text}; another path has room for a radius of {widest:g} {unit}."
 
 
 def _rounded(place: Place, unit: str) -> Place:

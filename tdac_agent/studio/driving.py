@@ -15,7 +15,7 @@ TURN = 0.45
 """Change of a wheel's speed while a turn key is pressed, as a part of full speed."""
 
 
-class Drive:
+class KeyboardDrive:
     """A drive on a world.
 
     Args:
@@ -30,7 +30,7 @@ class Drive:
         self.begin()
 
     @classmethod
-    def of(cls, name: str, split: str, index: int) -> Drive:
+    def of(cls, name: str, split: str, index: int) -> KeyboardDrive:
         """A drive on a world of a set."""
         return cls(make(name, split=split, render_mode="rgb_array"), index)
 

@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 import errno
+import io
+import zipfile
 from pathlib import Path
 
 from tdac_agent.storage.files import write_atomic
-from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.core.intake import IMAGE_BYTES, RECORD_BYTES, read_file
 
 STATE = ".studio"
 """Folder of the studio in the folder where it was started."""
 FILES = f"{STATE}/files"
 """Folder of what was uploaded or made for a run."""
+
+CONTROLLER_FILES = (
+    "controller.py",
+    "sensors.py",
+    "params.json",
+    "occupancy.npy",
+    "occupancy.png",
+    "robot.png",
+    "world.wbt",
+)
+"""What a controller finds in its working folder, as far as the run has it."""
 
 
 def within(place: Path, at: str) -> Path | None:
@@ -22,11 +35,11 @@ def within(place: Path, at: str) -> Path | None:
         at: The path, relative to it.
     """
     try:
-        found = (place / at).resolve()
-        inside = found.is_relative_to(place.resolve())
+        path = (place / at).resolve()
+        inside = path.is_relative_to(place.resolve())
     except (OSError, ValueError, RuntimeError):  # a null byte, or links in a circle
         return None
-    return found if inside else None
+    return path if inside else None
 
 
 def made_within(place: Path, at: str) -> Path:
@@ -62,3 +75,25 @@ def lines_in(file: Path) -> int:
 def as_word(at: str) -> str:
     """A path as a word of a command line that is not taken for a flag."""
     return f"./{at}" if at.startswith("-") else at
+
+
+def folders_with(place: Path, file: str) -> list[str]:
+    """Folders with a file, such as that of a bench, in or below a folder.
+
+    Args:
+        place: Folder of the studio.
+        file: Name of the file.
+    """
+    folders = {path.parent for at in ("*/", "*/*/") for path in place.glob(at + file)}
+    return sorted(str(folder.relative_to(place)) for folder in folders)
+
+
+def deployable(folder: Path) -> bytes:
+    """The controller of a run with the files that it may read, as a ZIP file."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in CONTROLLER_FILES:
+            file = within(folder, name)
+            if file is not None and file.is_file():
+                archive.writestr(name, read_file(file, IMAGE_BYTES))
+    return packed.getvalue()

@@ -8,32 +8,37 @@ that this installation did not write is shown, and is never started or stopped.
 from __future__ import annotations
 
 import errno
+import functools
+import hmac
+import itertools
 import os
 import shlex
 import signal
 import subprocess
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Annotated, Self
 
-from pydantic import ValidationError
+from pydantic import AwareDatetime, BaseModel, Field, ValidationError
 
 from tdac_agent.interpreter import python, safe_environment
 from tdac_agent.library.listing import next_folder
-from tdac_agent.storage.files import open_regular
+from tdac_agent.storage.files import open_regular, write_atomic
+from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.studio.folder import STATE, made_within
-from tdac_agent.studio.job_file import JobFile, read_job, write_job
+from tdac_agent.tasks.installation import keyed
 from tdac_envs.core.errors import one_line_reason
-from tdac_envs.core.intake import read_file
+from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 
+Word = Annotated[str, Field(max_length=4096)]
 JOBS, ABOUT, OUTPUT, ENDING = f"{STATE}/jobs", "job.json", "output.txt", "exit"
 TAIL = 4000
 """Characters of an output that are shown."""
 TAIL_BYTES = 4 * TAIL
-MOST_KNOWN = 10_000
 _STARTED: list[subprocess.Popen[bytes]] = []
-_KNOWN: dict[Path, Job] = {}
 # Writes the exit code when the command has ended, also after the studio has. An
 # interrupt is for the command, which has work to save.
 _WRAPPED = """
@@ -48,32 +53,79 @@ pathlib.Path(sys.argv[1]).write_text(str(code))
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Job:
-    """A command that was started.
+class JobFile(StrictRecord):
+    """What was started.
 
     Attributes:
-        folder: Its folder.
         words: The words after `tdac`.
         started: When.
         pid: Process group.
         born: Start time of the process, which tells it from a later one with its pid.
         about: What it works on: a run folder, or a folder of results.
+        mark: MAC of all of it.
+    """
+
+    words: tuple[Word, ...] = Field(min_length=1, max_length=1000)
+    started: AwareDatetime
+    pid: int = Field(gt=1, lt=2**31)
+    born: str = Field(pattern=r"^[0-9]{0,20}$")
+    about: Word
+    mark: str = Field("", max_length=64)
+
+    def marked(self, file: Path) -> Self:
+        """The same with the mark of this installation.
+
+        Args:
+            file: Where it is kept: elsewhere the mark does not hold.
+        """
+        return self.model_copy(update={"mark": _mark(self, file)})
+
+    def is_ours(self, file: Path) -> bool:
+        """Whether this installation wrote it there, as it is."""
+        return hmac.compare_digest(self.mark.encode(), _mark(self, file).encode())
+
+
+def read_job(file: Path) -> JobFile:
+    """Reads the file of a job.
+
+    Raises:
+        OSError: It is missing, not regular, or too large.
+        ValueError: It is damaged.
+    """
+    return JobFile.model_validate(parse_json(read_file(file, TEXT_BYTES)))
+
+
+def write_job(file: Path, job: JobFile) -> JobFile:
+    """Marks and writes the file of a job; returns what was written."""
+    marked = job.marked(file)
+    write_atomic(file, marked.model_dump_json() + "\n")
+    return marked
+
+
+def _mark(job: BaseModel, file: Path) -> str:
+    facts = job.model_dump_json(exclude={"mark"})
+    about = f"job|{file.absolute()}|{facts}"
+    return keyed(about.encode("utf-8", "surrogatepass")).hex()
+
+
+@dataclass(frozen=True, slots=True)
+class StudioJob:
+    """A command that was started.
+
+    Attributes:
+        folder: Its folder.
+        file: What was started.
         ours: Whether this installation started it, and its file is unchanged.
     """
 
     folder: Path
-    words: tuple[str, ...]
-    started: datetime
-    pid: int
-    born: str
-    about: str
+    file: JobFile
     ours: bool
 
     @property
     def command(self) -> str:
         """The command as a user would type it."""
-        return shlex.join(["tdac", *self.words])
+        return shlex.join(["tdac", *self.file.words])
 
     @property
     def running(self) -> bool:
@@ -81,7 +133,8 @@ class Job:
         for process in list(_STARTED):
             if process.poll() is not None:
                 _STARTED.remove(process)
-        return self.ours and bool(self.born) and _born(self.pid) == self.born
+        born = self.file.born
+        return self.ours and bool(born) and _born(self.file.pid) == born
 
     @property
     def code(self) -> int | None:
@@ -94,7 +147,7 @@ class Job:
     @property
     def seconds(self) -> float:
         """Time since it was started, s."""
-        return (datetime.now(UTC) - self.started).total_seconds()
+        return (datetime.now(UTC) - self.file.started).total_seconds()
 
     def output(self) -> str:
         """The end of what it has printed."""
@@ -112,11 +165,11 @@ class Job:
 
     def stop(self) -> None:
         """Interrupts it, as Ctrl-C does."""
-        if self.running and _leads_group(self.pid):
-            os.killpg(self.pid, signal.SIGINT)
+        if self.running and _leads_group(self.file.pid):
+            os.killpg(self.file.pid, signal.SIGINT)
 
 
-def start(place: Path, words: Sequence[str], about: str) -> Job:
+def start(place: Path, words: Sequence[str], about: str) -> StudioJob:
     """Starts `tdac` with some words, unless the same command is at work already.
 
     Args:
@@ -134,7 +187,7 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
     except ValidationError as error:
         raise OSError(errno.EINVAL, one_line_reason(error)) from error
     before = job_of(place, about)
-    if before is not None and before.running and before.words == tuple(words):
+    if before is not None and before.running and before.file.words == facts.words:
         return before
     folder = _new_folder(made_within(place, JOBS))
     command = python("-m", "tdac_agent", *words)
@@ -151,64 +204,55 @@ def start(place: Path, words: Sequence[str], about: str) -> Job:
         )
     _STARTED.append(process)
     own = {"pid": process.pid, "born": _born(process.pid)}
-    facts = facts.model_copy(update=own)
-    write_job(folder / ABOUT, facts)
-    return _job(folder, facts, ours=True)
+    marked = write_job(folder / ABOUT, facts.model_copy(update=own))
+    return StudioJob(folder, marked, ours=True)
 
 
-def jobs(place: Path) -> list[Job]:
+def jobs(place: Path) -> list[StudioJob]:
     """The jobs that were started in a folder: ours, then others, the newest first."""
-    files = (place / JOBS).glob(f"*/{ABOUT}")
-    found = [job for job in map(_read, files) if job is not None]
-    return sorted(found, key=_order, reverse=True)
-
-
-def _order(job: Job) -> tuple[bool, datetime, str]:
-    return job.ours, job.started, job.folder.name
-
-
-def _read(file: Path) -> Job | None:
-    """A job from its file, which never changes; None if it is damaged."""
-    if file in _KNOWN:
-        return _KNOWN[file]
-    try:
-        facts = read_job(file)
-    except (OSError, ValueError):
-        return None
-    if len(_KNOWN) >= MOST_KNOWN:
-        _KNOWN.clear()
-    _KNOWN[file] = _job(file.parent, facts, ours=facts.is_ours(file))
-    return _KNOWN[file]
-
-
-def _job(folder: Path, facts: JobFile, *, ours: bool) -> Job:
-    return Job(
-        folder, facts.words, facts.started, facts.pid, facts.born, facts.about, ours
+    known = []
+    for file in (place / JOBS).glob(f"*/{ABOUT}"):
+        with suppress(OSError, ValueError):  # a damaged one
+            known.append(_read(file))
+    return sorted(
+        known,
+        key=lambda job: (job.ours, job.file.started, job.folder.name),
+        reverse=True,
     )
 
 
-def job_of(place: Path, about: str) -> Job | None:
+@functools.lru_cache(maxsize=10_000)
+def _read(file: Path) -> StudioJob:
+    """A job from its file, which never changes."""
+    facts = read_job(file)
+    return StudioJob(file.parent, facts, ours=facts.is_ours(file))
+
+
+def job_of(place: Path, about: str) -> StudioJob | None:
     """The newest job that works on something: one of ours, if there is one."""
-    return next((job for job in jobs(place) if job.about == about), None)
+    return next((job for job in jobs(place) if job.file.about == about), None)
+
+
+def stop_job(place: Path, about: str) -> None:
+    """Interrupts the newest job that works on something, if it runs."""
+    job = job_of(place, about)
+    if job is not None:
+        job.stop()
 
 
 def free_folder(name: str, place: Path) -> str:
     """The next `runs/NAME-N` that neither exists nor was given to a command."""
-    given = {job.about for job in jobs(place)}
-    return str(next_folder(name, place, given))
+    taken = {job.file.about for job in jobs(place)}
+    return str(next_folder(name, place, taken))
 
 
 def _new_folder(parent: Path) -> Path:
-    parent.mkdir(parents=True, exist_ok=True)
-    number = 1
-    while True:
-        folder = parent / f"{number:05}"
-        try:
+    for number in itertools.count(1):
+        with suppress(FileExistsError):
+            folder = parent / f"{number:05}"
             folder.mkdir(0o700)
-        except FileExistsError:
-            number += 1
-        else:
             return folder
+    raise AssertionError("unreachable")
 
 
 def _leads_group(pid: int) -> bool:

@@ -15,17 +15,17 @@ from nicegui import ui
 
 from tdac_agent.loopback import listen
 from tdac_agent.studio.folder import STATE, keep
-from tdac_agent.studio.gate import Gate
 from tdac_agent.studio.pages import (
     bench,
     compare,
+    disconnected,
     files,
     home,
-    lost,
     run,
-    shelf,
+    run_list,
     worlds,
 )
+from tdac_agent.studio.session import SessionCheck
 from tdac_envs.core.intake import read_file
 
 PORT = "port"
@@ -51,10 +51,10 @@ def serve(
     place = place.resolve()
     with closing(opened_port(place, port)) as opened:
         port = opened.getsockname()[1]
-        gate = Gate(_application(place), port, place)
-        address = f"http://127.0.0.1:{port}/?token={gate.token}"
+        session = SessionCheck(_application(place), port, place)
+        address = f"http://127.0.0.1:{port}/?token={session.token}"
         config = uvicorn.Config(
-            gate, log_level="critical", access_log=False, ws_max_size=32 << 20
+            session, log_level="critical", access_log=False, ws_max_size=32 << 20
         )
         announce(address)
         if open_it:
@@ -96,8 +96,8 @@ def _noted(note: Path) -> int:
 def _application(place: Path) -> fastapi.FastAPI:
     application = fastapi.FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     files.add(application, place)
-    lost.add(application, place)
-    for page in (bench, compare, home, run, shelf, worlds):
+    disconnected.add(application, place)
+    for page in (bench, compare, home, run, run_list, worlds):
         page.add(place)
     ui.run_with(
         application,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from tdac_agent.studio.board import names_of
 from tdac_agent.studio.folder import FILES
+from tdac_agent.studio.source_view import names_of
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 YAML = ".yaml", ".yml"
@@ -18,12 +18,12 @@ MOST_FILES = 200
 
 def sources_in(place: Path) -> list[str]:
     """Bundled maps and worlds, and files of the studio's folder, as `KIND: NAME`."""
-    found = [f"map: {name}" for name in names_of("map")]
-    found += [f"world: {name}" for name in names_of("world")]
+    sources = [f"map: {name}" for name in names_of("map")]
+    sources += [f"world: {name}" for name in names_of("world")]
     folders = place, place / "maps", place / FILES
     files = sorted(path for folder in folders for path in folder.glob("*"))
     named = (source_of(place, path) for path in files[:MOST_FILES] if path.is_file())
-    return found + [source for source in named if source is not None]
+    return sources + [source for source in named if source is not None]
 
 
 def is_source(path: Path) -> bool:
@@ -38,17 +38,6 @@ def source_of(place: Path, path: Path) -> str | None:
         return None
     kind = "world" if suffix == ".wbt" else "map"
     return f"{kind}: {path.relative_to(place)}"
-
-
-def folders_with(place: Path, file: str) -> list[str]:
-    """Folders with a file, such as that of a bench, in or below a folder.
-
-    Args:
-        place: Folder of the studio.
-        file: Name of the file.
-    """
-    found = {path.parent for at in ("*/", "*/*/") for path in place.glob(at + file)}
-    return sorted(str(folder.relative_to(place)) for folder in found)
 
 
 def _image_of(path: Path) -> bool:

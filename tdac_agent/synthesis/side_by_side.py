@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import TypeVar
 
-from tdac_agent.models.timeout import LOOK_SECONDS
+from tdac_agent.models.timeout import in_thread, wait_for_all
 
 T = TypeVar("T")
-_Outcome = tuple[int, T | None, BaseException | None]
 
 
 def side_by_side(functions: Sequence[Callable[[], T]]) -> list[T]:
@@ -23,27 +19,6 @@ def side_by_side(functions: Sequence[Callable[[], T]]) -> list[T]:
     Raises:
         BaseException: The first function in order that failed, with its error.
     """
-    outcomes: queue.SimpleQueue[_Outcome[T]] = queue.SimpleQueue()
-
-    def call(number: int, function: Callable[[], T]) -> None:
-        try:
-            outcomes.put((number, function(), None))
-        except BaseException as error:  # raised again below
-            outcomes.put((number, None, error))
-
-    for number, function in enumerate(functions):
-        threading.Thread(target=call, args=(number, function), daemon=True).start()
-    found = sorted((_next(outcomes) for _ in functions), key=lambda each: each[0])
-    results: list[T] = []
-    for _, result, error in found:
-        if error is not None:
-            raise error
-        results.append(result)  # type: ignore[arg-type]
-    return results
-
-
-def _next(outcomes: queue.SimpleQueue[_Outcome[T]]) -> _Outcome[T]:
-    """The next outcome; a signal that comes just before a wait does not end it."""
-    while True:
-        with suppress(queue.Empty):
-            return outcomes.get(timeout=LOOK_SECONDS)
+    futures = [in_thread(function) for function in functions]
+    wait_for_all(futures)
+    return [future.result() for future in futures]

@@ -207,7 +207,7 @@ def checked(data: dict[str, Any], source: str) -> TaskFile:
     try:
         spec = TaskFile.model_validate(data)
     except ValidationError as error:
-        raise TaskError(f"{source}: {first_problem(error)}") from error
+        raise TaskError(f"{source}: {first_problem(error, TaskFile)}") from error
     try:
         own = environment(spec.env).keys
     except TaskError as error:

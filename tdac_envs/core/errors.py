@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
+    from pydantic.fields import FieldInfo
 
 MAX_QUOTED = 200
 """Largest number of characters that an error quotes from a file."""
+LEAST_LIKENESS = 0.6
+"""Of a known key that is suggested for an unknown one."""
 
 
 class TdacError(Exception):
@@ -59,23 +62,80 @@ class WorldFileError(WorldError):
     """A `.wbt` file is broken; the message begins with file, line and column."""
 
 
-def first_problem(error: ValidationError, known: Iterable[str] = ()) -> str:
+def first_problem(error: ValidationError, form: Any = None) -> str:
     """The first problem of a validation error, as `path.to.key: problem`.
 
     Unknown keys are reported before missing ones: a misspelt key causes both.
 
     Args:
         error: Error of a pydantic model.
-        known: The model's keys, to suggest one for an unknown key.
+        form: The model, or another type that was validated. With it, the known keys
+            follow an unknown one, and the description of a key follows a wrong value.
     """
     problems = error.errors(include_url=False)
     unknown = (p for p in problems if p["type"] == "extra_forbidden")
     first = next(unknown, problems[0])
     place = ".".join(map(str, first["loc"]))[:MAX_QUOTED]
-    reason = _reason(first)
-    if first["type"] == "extra_forbidden":
-        reason += hint(place, known)
+    reason = _reason(first) + ("" if form is None else _advice(first, form))
     return f"{place}: {reason}" if place else reason
+
+
+def _advice(problem: Any, form: Any) -> str:
+    """The known keys, the nearest first, or the description of a key."""
+    *above, key = problem["loc"] or ("",)
+    fields = fields_at(form, above)
+    if problem["type"] == "extra_forbidden":
+        likeness = {name: _likeness(str(key), name, fields[name]) for name in fields}
+        known = sorted(fields, key=lambda name: -likeness[name])
+        near = [name for name in known[:1] if likeness[name] >= LEAST_LIKENESS]
+        return _meant(near) + f"; known: {', '.join(known)}"
+    about = fields[key].description if key in fields else None
+    told = problem["type"] in ("missing", "value_error") or not about
+    return "" if told else f" ({str(about).rstrip('.')})"
+
+
+def fields_at(form: Any, place: Sequence[int | str]) -> dict[str, FieldInfo]:
+    """The fields of the models at a place of a validated type, by their keys.
+
+    Args:
+        form: The type.
+        place: Keys, indices and tags of unions that lead to it, as in an error.
+    """
+    models = _models_in(form)
+    for part in place:
+        tagged = [one for one in models if part in _literals_of(one)]
+        if len(models) > 1 and tagged:
+            models = tagged
+        elif part in (fields := _fields_of(models)):
+            models = _models_in(fields[str(part)].annotation)
+    return _fields_of(models)
+
+
+def _models_in(annotation: Any) -> list[Any]:
+    if hasattr(annotation, "model_fields"):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]
+
+
+def _fields_of(models: Iterable[Any]) -> dict[str, FieldInfo]:
+    """Fields by their keys in a file: the alias of a field, or else its name."""
+    pairs = (pair for model in models for pair in model.model_fields.items())
+    return {field.alias or name: field for name, field in pairs}
+
+
+def _literals_of(model: Any) -> set[Any]:
+    fields = model.model_fields.values()
+    return {value for field in fields for value in get_args(field.annotation)}
+
+
+def _likeness(typed: str, name: str, field: FieldInfo) -> float:
+    """From 0 to 1; 1 also for the symbol with which the description begins."""
+    import difflib
+
+    symbol = (field.description or "").partition(" ")[0].rstrip(":,;")
+    return (
+        1.0 if symbol == typed else difflib.SequenceMatcher(None, typed, name).ratio()
+    )
 
 
 def _reason(problem: Any) -> str:
@@ -98,12 +158,17 @@ def _reason(problem: Any) -> str:
     return str(problem["msg"]).removeprefix("Value error, ")
 
 
-def one_line_reason(error: Exception) -> str:
-    """One-line reason for not using a file: the OS error or the first problem."""
+def one_line_reason(error: Exception, form: Any = None) -> str:
+    """One-line reason for not using a file: the OS error or the first problem.
+
+    Args:
+        error: The error.
+        form: As for `first_problem`.
+    """
     from pydantic import ValidationError
 
     if isinstance(error, ValidationError):
-        return first_problem(error)
+        return first_problem(error, form)
     reason = error.strerror if isinstance(error, OSError) else error
     return " ".join(str(reason).split())[:MAX_QUOTED]
 
@@ -111,7 +176,11 @@ def one_line_reason(error: Exception) -> str:
 def hint(typed: str, known: Iterable[str]) -> str:
     """The suffix " (did you mean 'NAME'?)"; empty if no known name is similar."""
     meant = nearest(typed, known)
-    return f" (did you mean {meant!r}?)" if meant else ""
+    return _meant([meant] if meant else [])
+
+
+def _meant(names: Sequence[str]) -> str:
+    return f" (did you mean {names[0]!r}?)" if names else ""
 
 
 def nearest(typed: str, known: Iterable[str]) -> str | None:

@@ -127,7 +127,7 @@ def _robot_of(given: Any) -> Any:
         return model.model_validate(given)
     except ValidationError as error:
         # The validation error names the key `robot`.
-        raise ValueError(first_problem(error, model.model_fields)) from None
+        raise ValueError(first_problem(error, model)) from None
 
 
 class SetFile(StrictModel):
@@ -320,11 +320,7 @@ def read_set_file(path: Path) -> SetFile:
         name = path.absolute().parent.name if path.stem == "set" else path.stem
         return SetFile.model_validate({"name": name, **_placed(values, path)})
     except ValidationError as error:
-        known = [field.alias or name for name, field in SetFile.model_fields.items()]
-        known += [f"files.{name}" for name in FilesSpec.model_fields]
-        for key, model in _PARTS.items():
-            known += [f"{key}.{name}" for name in model.model_fields]
-        problem = first_problem(error, known).replace("files.", "worlds.")
+        problem = first_problem(error, SetFile).replace("files.", "worlds.")
         raise TaskError(f"{path}: {problem}") from None
     except (OSError, ValueError) as error:
         raise TaskError(f"{path}: {one_line_reason(error)}") from None
@@ -346,12 +342,6 @@ def _placed(values: dict[Any, Any], path: Path) -> dict[Any, Any]:
     return {**values, key: placed}
 
 
-_PARTS: dict[str, type[BaseModel]] = {
-    "disturbances": DisturbanceSpec,
-    "horizon": HorizonSpec,
-    "admission": AdmissionSpec,
-    "cpu": CpuSpec,
-}
 BUILT_IN = Path(__file__).parent / "sets"
 """Folder of the sets that come with the package."""
 

@@ -82,7 +82,7 @@ def _parse_ros(text: bytes, path: Path) -> RosMap:
     try:
         return RosMap.model_validate(fields)
     except ValidationError as error:
-        raise MapError(f"{path}: {first_problem(error)}") from None
+        raise MapError(f"{path}: {first_problem(error, RosMap)}") from None
 
 
 def read_grid(path: Path) -> MapImage:

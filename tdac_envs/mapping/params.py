@@ -177,7 +177,7 @@ class MapParams(StrictModel):
         except OSError as error:
             raise MapError(f"cannot read {path}: {error.strerror}") from error
         except ValidationError as error:
-            raise MapError(f"{path}: {first_problem(error)}") from error
+            raise MapError(f"{path}: {first_problem(error, cls)}") from error
         except ValueError as error:
             raise MapError(f"{path}: {error}") from error
 

@@ -198,5 +198,5 @@ def _checked(entry: Any, name: str) -> AnySpec:
     try:
         return KINDS[kind].model_validate(dict(entry))
     except ValidationError as error:
-        problem = first_problem(error, KINDS[kind].model_fields)
+        problem = first_problem(error, KINDS[kind])
         raise TaskError(f"{name}: {problem}") from None

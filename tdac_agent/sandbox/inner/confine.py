@@ -23,12 +23,12 @@ def confine(setup: dict[str, Any]) -> dict[str, int]:
     Raises:
         OSError: A step is not possible on this machine.
     """
-    found: dict[str, int] = {}
+    facts: dict[str, int] = {}
     for step in setup["steps"]:
-        found |= _STEPS[step](setup) or {}
+        facts |= _STEPS[step](setup) or {}
     os.chdir(setup["work"])
     return {
-        **found,
+        **facts,
         "hides_files": _files_hidden([*setup["witnesses"], *setup["foreign"]]),
         "hides_names": not any(map(os.path.lexists, setup["witnesses"])),
         "denies_network": not kernel.can_open_socket(),

@@ -38,7 +38,7 @@ SHAPES = [struct.Struct(f"<{count}I") for count in range(MAX_DIMENSIONS + 1)]
 Resolver = Callable[[Handle], object]
 
 
-class _Reader:
+class _Cursor:
     __slots__ = ("data", "depth", "dict_room", "pos", "resolve", "room")
 
     def __init__(self, data: bytes, pos: int, resolve: Resolver | None) -> None:
@@ -68,7 +68,7 @@ def decode(data: bytes, pos: int = 0, resolve: Resolver | None = None) -> Any:
                 return left, right
             if outer == b"l":
                 return [left, right]
-    reader = _Reader(data, pos, resolve)
+    reader = _Cursor(data, pos, resolve)
     try:
         value = _take(reader)
     except (struct.error, KeyError, IndexError, ValueError, TypeError) as error:
@@ -78,13 +78,13 @@ def decode(data: bytes, pos: int = 0, resolve: Resolver | None = None) -> Any:
     return value
 
 
-def _take(r: _Reader) -> Any:
+def _take(r: _Cursor) -> Any:
     tag = r.data[r.pos]
     r.pos += 1
     return _TAKE[tag](r)
 
 
-def _cut(r: _Reader, size: int) -> bytes:
+def _cut(r: _Cursor, size: int) -> bytes:
     end = r.pos + size
     if end > len(r.data):
         raise WireError(f"expected {size} bytes, got {len(r.data) - r.pos}")
@@ -93,44 +93,44 @@ def _cut(r: _Reader, size: int) -> bytes:
     return part
 
 
-def _take_u32(r: _Reader) -> int:
+def _take_u32(r: _Cursor) -> int:
     (number,) = U32.unpack_from(r.data, r.pos)
     r.pos += 4
     return int(number)
 
 
-def _take_constant(r: _Reader) -> bool | None:
+def _take_constant(r: _Cursor) -> bool | None:
     return _CONSTANTS[r.data[r.pos - 1]]
 
 
-def _take_int(r: _Reader) -> int:
+def _take_int(r: _Cursor) -> int:
     (number,) = I64.unpack_from(r.data, r.pos)
     r.pos += 8
     return int(number)
 
 
-def _take_big_int(r: _Reader) -> int:
+def _take_big_int(r: _Cursor) -> int:
     size = _take_u32(r)
     if size > MAX_INT_BYTES:
         raise WireError(f"an int of {size} bytes")
     return int.from_bytes(_cut(r, size), "little", signed=True)
 
 
-def _take_float(r: _Reader) -> float:
+def _take_float(r: _Cursor) -> float:
     (number,) = F64.unpack_from(r.data, r.pos)
     r.pos += 8
     return float(number)
 
 
-def _take_str(r: _Reader) -> str:
+def _take_str(r: _Cursor) -> str:
     return _cut(r, _take_u32(r)).decode("utf-8", "surrogatepass")
 
 
-def _take_bytes(r: _Reader) -> bytes:
+def _take_bytes(r: _Cursor) -> bytes:
     return _cut(r, _take_u32(r))
 
 
-def _take_list(r: _Reader) -> list[Any]:
+def _take_list(r: _Cursor) -> list[Any]:
     count = _take_u32(r)
     r.room -= count
     r.depth -= 1
@@ -141,11 +141,11 @@ def _take_list(r: _Reader) -> list[Any]:
     return value
 
 
-def _take_tuple(r: _Reader) -> tuple[Any, ...]:
+def _take_tuple(r: _Cursor) -> tuple[Any, ...]:
     return tuple(_take_list(r))
 
 
-def _take_dict(r: _Reader) -> dict[Any, Any]:
+def _take_dict(r: _Cursor) -> dict[Any, Any]:
     count = _take_u32(r)
     r.dict_room -= count
     r.depth -= 1
@@ -158,7 +158,7 @@ def _take_dict(r: _Reader) -> dict[Any, Any]:
     return value
 
 
-def _take_key(r: _Reader) -> Any:
+def _take_key(r: _Cursor) -> Any:
     room = r.room
     key = _take(r)
     if type(key) is not str:
@@ -168,7 +168,7 @@ def _take_key(r: _Reader) -> Any:
     return key
 
 
-def _take_array(r: _Reader) -> Any:
+def _take_array(r: _Cursor) -> Any:
     data, pos = r.data, r.pos
     r.room -= ARRAY_ITEMS
     if r.room < 0:
@@ -188,7 +188,7 @@ def _take_array(r: _Reader) -> Any:
     return array if dimensions == 1 else array.reshape(shape)
 
 
-def _take_scalar(r: _Reader) -> Any:
+def _take_scalar(r: _Cursor) -> Any:
     code = r.data[r.pos]
     r.pos += 1
     return _numbers(_cut(r, SIZES[code]), code, 1, 0)[0]
@@ -200,25 +200,25 @@ def _numbers(data: bytes, code: int, count: int, start: int) -> Any:
     return np.frombuffer(data, DTYPES[code], count, start)
 
 
-def _take_handle(r: _Reader) -> object:
+def _take_handle(r: _Cursor) -> object:
     number = _take_u32(r)
     handle = Handle(number, _take_name(r))
     return handle if r.resolve is None else r.resolve(handle)
 
 
-def _take_error(r: _Reader) -> RemoteError:
+def _take_error(r: _Cursor) -> RemoteError:
     line = _take_u32(r)
     return RemoteError(_take_name(r), _take_text(r), _take_text(r), line)
 
 
-def _take_name(r: _Reader) -> str:
+def _take_name(r: _Cursor) -> str:
     name = _take_text(r)
     if not is_name(name):
         raise WireError("a string that is too long or cannot be printed")
     return name
 
 
-def _take_text(r: _Reader) -> str:
+def _take_text(r: _Cursor) -> str:
     if r.data[r.pos] != ord("s"):
         raise WireError("expected a string")
     r.pos += 1
@@ -229,7 +229,7 @@ def _take_text(r: _Reader) -> str:
 
 
 _CONSTANTS = {ord("N"): None, ord("T"): True, ord("F"): False}
-_TAKE: dict[int, Callable[[_Reader], Any]] = {
+_TAKE: dict[int, Callable[[_Cursor], Any]] = {
     **dict.fromkeys(_CONSTANTS, _take_constant),
     ord("i"): _take_int,
     ord("I"): _take_big_int,

@@ -112,13 +112,10 @@ def _hide_parents(setup: dict[str, Any], root: str) -> None:
     """
     shown = (*setup["system"], *setup["packages"], setup["root"], setup["site"])
     device = os.stat(root).st_dev
-    for parent in {parent for path in shown for parent in _parents(path)}:
+    parents = {path[:n] for path in shown for n, c in enumerate(path) if c == os.sep}
+    for parent in parents:
         if os.stat(root + parent).st_dev == device:
             os.chmod(root + parent, 0o111)
-
-
-def _parents(path: str) -> list[str]:
-    return [path[:end] for end, letter in enumerate(path) if letter == os.sep]
 
 
 def _make_read_only(root: str) -> None:

@@ -13,20 +13,18 @@ from tdac_agent.bench.bench import RESULTS, SPLITS
 from tdac_agent.bench.page import PAGE
 from tdac_agent.evaluation.policies import BUILTIN, PRIVILEGED
 from tdac_agent.planners.planner import planner_names
-from tdac_agent.studio.folder import as_word, lines_in, within
-from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
+from tdac_agent.studio.folder import as_word, folders_with, lines_in, within
+from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (
-    JobButtons,
+    JobPage,
     ShownCommand,
     address_of,
     file_frame,
     framed,
-    job_heading,
     shown_first,
     status_badge,
 )
 from tdac_agent.studio.pages.worlds import policies_in
-from tdac_agent.studio.sources import folders_with
 from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.salt import SEALED
 from tdac_agent.verification.store import REPORT_FILE, ROWS_FILE, UNFINISHED
@@ -55,20 +53,21 @@ def add(place: Path) -> None:
     @ui.page("/benches")
     async def benches() -> None:
         with framed("Benches"):
-            Starting(place).show()
+            BenchForm(place).show()
             show_benches(place, "Benches of this folder")
 
     @ui.page("/bench")
     async def bench(at: str = "") -> None:
         with framed(at or "Bench"):
             folder = within(place, at)
-            if folder is None or not at or not _is_bench(place, at, folder):
+            made = folder is not None and (folder / PAGE).is_file()
+            if folder is None or not at or not (made or bench_job(place, at)):
                 ui.label(f"There is no bench {at!r} in this folder.").classes("problem")
                 return
-            await Watching(place, at, folder).show()
+            await BenchPage(place, at, folder).show()
 
 
-class Starting:
+class BenchForm:
     """The form that starts a bench.
 
     Args:
@@ -127,26 +126,17 @@ class Starting:
         ui.navigate.to(address_of("/bench", folder))
 
 
-class Watching:
-    """The page of one bench.
-
-    Args:
-        place: Folder of the studio.
-        at: The bench, relative to it.
-        folder: Its folder.
-    """
-
-    def __init__(self, place: Path, at: str, folder: Path) -> None:
-        self._place, self._at, self._folder = place, at, folder
-        self._shown = ""
+class BenchPage(JobPage):
+    """The page of one bench."""
 
     async def show(self) -> None:
         """Builds the page, and keeps it up to date."""
-        self._badge, self._now = job_heading(self._at)
+        self._shown = ""
+        self._build_heading()
         self._bar = ui.linear_progress(0.0, show_value=False).props("rounded")
         self._command = ShownCommand()
         with ui.row().classes("gap-2"):
-            self._buttons = JobButtons(self._interrupt, self._go_on)
+            self._build_buttons(self._go_on)
         self._foreign = ui.label(FOREIGN).classes("note text-sm")
         self._results = ui.column().classes("w-full")
         with ui.element("pre").classes("output") as self._printed:
@@ -161,14 +151,12 @@ class Watching:
         running = job is not None and job.running
         page = self._folder / PAGE
         done = page.is_file() and not running
-        self._badge.clear()
-        with self._badge:
-            status_badge(status_of(self._folder, job))
+        continues = job is not None and job.ours and not done
+        status = status_of(self._folder, job)
+        self._show_status(status, running=running, continues=continues)
         show = shlex.join(["tdac", "bench", "show", as_word(self._at)])
         self._command.show(show if job is None else job.command)
         self._foreign.visible = job is not None and not job.ours
-        continues = job is not None and job.ours and not done
-        self._buttons.show(running=running, continues=continues)
         self._printed.visible = not done
         self._bar.visible = job is not None and not done
         self._output.text = job.output() if job is not None else ""
@@ -185,20 +173,15 @@ class Watching:
                 with self._results:
                     file_frame(f"{self._at}/{PAGE}", version, f"Bench {self._at}")
 
-    def _interrupt(self) -> None:
-        job = bench_job(self._place, self._at)
-        if job is not None:
-            job.stop()
-
     def _go_on(self) -> None:
         """Starts the same command again: it goes on with the next episode."""
         job = bench_job(self._place, self._at)
         if job is not None and job.ours:
-            start(self._place, job.words, self._at)
+            start(self._place, job.file.words, self._at)
             self._look()
 
 
-def bench_job(place: Path, at: str) -> Job | None:
+def bench_job(place: Path, at: str) -> StudioJob | None:
     """The newest command of the form that works on a bench."""
     job = job_of(place, at)
     return job if job is not None and bench_words(job) else None
@@ -219,7 +202,7 @@ def named_entrants(chosen: Sequence[str]) -> list[str]:
     return words
 
 
-def progress_of(job: Job, folder: Path) -> tuple[float, str]:
+def progress_of(job: StudioJob, folder: Path) -> tuple[float, str]:
     """The share of a bench that has been driven, from 0 to 1, and a line about it.
 
     Args:
@@ -245,13 +228,9 @@ def _choice(options: list[str], value: list[str], label: str) -> ui.select:
     return chosen.props("use-chips").classes("w-full sm:w-80")
 
 
-def _is_bench(place: Path, at: str, folder: Path) -> bool:
-    return (folder / PAGE).is_file() or bench_job(place, at) is not None
-
-
 def show_benches(place: Path, title: str) -> None:
     """Links to the benches of the folder, if there are any."""
-    begun = {job.about: job for job in reversed(jobs(place)) if bench_words(job)}
+    begun = {job.file.about: job for job in reversed(jobs(place)) if bench_words(job)}
     names = {*folders_with(place, RESULTS), *begun}
     if not names:
         return
@@ -264,25 +243,25 @@ def show_benches(place: Path, title: str) -> None:
             ui.label(bench_words(job) if job else "").classes("note text-sm")
 
 
-def bench_words(job: Job) -> str:
+def bench_words(job: StudioJob) -> str:
     """What drives where in a bench of the form; empty for another command."""
     entrants, sets, worlds = _form_of(job)
     return f"{', '.join(entrants)} on {','.join(sets)}" if worlds else ""
 
 
-def _form_of(job: Job) -> tuple[Sequence[str], Sequence[str], int]:
+def _form_of(job: StudioJob) -> tuple[Sequence[str], Sequence[str], int]:
     """Entrants, task sets and worlds of each set; no worlds for another command."""
-    match job.words:
-        case ["bench", *_] if {"--set", "-n"} <= {*job.words[:-1]}:
-            at, number = job.words.index("--set"), job.words.index("-n")
-            worlds = job.words[number + 1]
+    words = job.file.words
+    match words:
+        case ["bench", *_] if {"--set", "-n"} <= {*words[:-1]}:
+            at, worlds = words.index("--set"), words[words.index("-n") + 1]
             known = worlds.isascii() and worlds.isdecimal() and len(worlds) < 8
-            entrants, sets = job.words[1:at], job.words[at + 1].split(",")
+            entrants, sets = words[1:at], words[at + 1].split(",")
             return entrants, sets, int(worlds) if known and entrants else 0
     return (), (), 0
 
 
-def status_of(folder: Path, job: Job | None) -> str:
+def status_of(folder: Path, job: StudioJob | None) -> str:
     """Status of a bench.
 
     Args:

@@ -59,8 +59,8 @@ async def _show(names: Sequence[str], folders: Sequence[Path]) -> None:
         ui.label(str(error)).classes("problem")
         return
     _show_table(names, figures)
-    different = [line for line in settings if line.differs]
-    same = [line for line in settings if not line.differs]
+    different = [line for line in settings if line[1] != line[2]]
+    same = [line for line in settings if line[1] == line[2]]
     ui.label("Settings").classes("text-lg font-bold")
     if different:
         _show_table(names, different)
@@ -83,10 +83,9 @@ def _show_table(names: Sequence[str], lines: Sequence[Line]) -> None:
             for name in ("", "", *names):
                 with ui.element("th"):
                     ui.label(name)
-        for line in lines:
-            with ui.element("tr").classes("differs" if line.differs else ""):
-                mark = "≠" if line.differs else ""
-                for text in (mark, line.name, line.one, line.other):
+        for name, one, other in lines:
+            with ui.element("tr").classes("differs" if one != other else ""):
+                for text in ("≠" if one != other else "", name, one, other):
                     with ui.element("td"):
                         ui.label(text)
 

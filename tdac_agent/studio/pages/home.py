@@ -14,21 +14,33 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from tdac_agent.studio.board import Board, Kind, Place, as_it_is, board_of, names_of
-from tdac_agent.studio.draft import Checked, Draft, check, snapped
-from tdac_agent.studio.findings import fitting_radius, sentence_of
+from tdac_agent.studio.draft import (
+    Checked,
+    TaskDraft,
+    check,
+    fitting_radius,
+    sentence_of,
+    snapped,
+)
 from tdac_agent.studio.jobs import free_folder, start
+from tdac_agent.studio.pages.clickable_map import ClickableMap, Mode
 from tdac_agent.studio.pages.layout import (
     ShownCommand,
     address_of,
     framed,
     shown_first,
 )
-from tdac_agent.studio.pages.map_view import MapView, Mode
 from tdac_agent.studio.pages.overlay import overlay
-from tdac_agent.studio.pages.places import Places
 from tdac_agent.studio.pages.source_choice import SourceChoice
+from tdac_agent.studio.pages.task_form import TaskForm
 from tdac_agent.studio.pages.writers import Writers
+from tdac_agent.studio.source_view import (
+    Kind,
+    SourceView,
+    as_it_is,
+    names_of,
+    view_of,
+)
 from tdac_envs.core.compiled import compiling
 from tdac_envs.core.errors import PolarityError, TdacError
 
@@ -48,10 +60,10 @@ def add(place: Path) -> None:
     @ui.page("/")
     async def page(source: str = FIRST, task: str = "", obstacles: str = "") -> None:
         with framed("New controller"):
-            await Choosing(place).show(source, task, obstacles)
+            await StartPage(place).show(source, task, obstacles)
 
 
-class Choosing:
+class StartPage:
     """The state of one opened page.
 
     Args:
@@ -60,8 +72,8 @@ class Choosing:
 
     def __init__(self, place: Path) -> None:
         self._place = place
-        self._board: Board | None = None
-        self._draft: Draft | None = None
+        self._view: SourceView | None = None
+        self._draft: TaskDraft | None = None
         self._checked: Checked | None = None
         self._turn = 0  # number of the newest choice: the work on older ones is dropped
 
@@ -71,12 +83,12 @@ class Choosing:
             with ui.column().classes("min-w-0 gap-3"):
                 self._source = SourceChoice(self._place, source, obstacles, self._open)
                 ui.label("2. Start and goal").classes("text-lg font-bold")
-                self._places = Places(
+                self._form = TaskForm(
                     self._typed, self._resized, self._move, self._shrink
                 )
                 self._build_start()
             with ui.column().classes("beside min-w-0 gap-2"):
-                self._view = MapView(self._clicked)
+                self._map = ClickableMap(self._clicked)
         await shown_first()
         if self._turn == 0:  # nobody was faster than the page
             await self._open(source)
@@ -98,8 +110,8 @@ class Choosing:
         asked = self._source.polarity
         try:
             path = name if name in names_of(_kind(kind)) else str(self._place / name)
-            read = partial(board_of, _kind(kind), path, asked)
-            board = await self._waiting(f"Reading {name} …", read)
+            read = partial(view_of, _kind(kind), path, asked)
+            view = await self._waiting(f"Reading {name} …", read)
         except PolarityError:
             picture = await asyncio.to_thread(as_it_is, path)
             if turn == self._turn:
@@ -112,11 +124,11 @@ class Choosing:
         if turn != self._turn:  # something else has been chosen meanwhile
             return
         kept = asked if kind == "map" else None
-        self._board, self._draft = board, Draft.of(board, name, kept)
-        self._view.show(board.png)
-        self._view.begin(f"{kind} {name}", board.reading, board.notes)
-        self._source.show_polarity(board.kind == "map")
-        self._places.show(self._draft)
+        self._view, self._draft = view, TaskDraft.of(view, name, kept)
+        self._map.show(view.png)
+        self._map.begin(f"{kind} {name}", view.reading, view.notes)
+        self._source.show_polarity(view.kind == "map")
+        self._form.show(self._draft)
         await self._check()
 
     async def _waiting(self, text: str, work: Callable[[], T]) -> T:
@@ -127,40 +139,46 @@ class Choosing:
         while not (await asyncio.wait({task}, timeout=PATIENCE))[0]:
             if turn == self._turn:
                 now = compiling()
-                self._places.tell(f"{text} ({now})" if now else text, good=True)
+                self._form.tell(f"{text} ({now})" if now else text, good=True)
         return task.result()
 
     def _refuse(self, text: str, picture: bytes = b"") -> None:
         """Says why there is no draft; with a picture, how to read it must be chosen."""
         self._checked, self._draft = None, None
-        self._places.clear()
-        self._view.show(picture)
+        self._form.clear()
+        self._map.show(picture)
         if picture:
             self._source.show_polarity(True)
-        self._view.mark("")
-        self._view.begin("", "", ())
-        self._places.tell(text, good=False)
+        self._map.mark("")
+        self._map.begin("", "", ())
+        self._form.tell(text, good=False)
         self._refresh_command()
 
     async def _clicked(self, mode: Mode, x: float, y: float) -> None:
         """Takes a click on the picture."""
-        if self._board is None or self._draft is None:
+        if self._view is None or self._draft is None:
             return
-        unit = self._board.unit
-        place = self._board.place(x, y)
-        nearest = _on_pixel(place, unit)
+        unit = self._view.unit
+        place = self._view.place(x, y)
+        # On a map, the middle of a pixel.
+        nearest = (round(place[0]), round(place[1])) if unit == "px" else place
         if mode == "start":
-            self._draft = self._draft.with_start(nearest, unit)
+            await self._change(self._draft.with_start(nearest, unit))
         elif mode == "heading":
-            self._draft = self._draft.facing(place)
+            await self._change(self._draft.facing(place))
         else:
-            self._draft = self._draft.with_goal(nearest, unit)
-        self._places.show(self._draft)
+            await self._change(self._draft.with_goal(nearest, unit))
+
+    async def _change(self, draft: TaskDraft) -> None:
+        """Shows another draft, and checks it."""
+        self._draft = draft
+        self._form.show(draft)
         await self._check()
 
     async def _typed(self) -> None:
         if self._draft is not None:
-            self._draft = self._places.written(self._draft)
+            # Not shown: half of a place may have been typed.
+            self._draft = self._form.written(self._draft)
             await self._check()
 
     async def _take(self, task: str) -> None:
@@ -169,64 +187,54 @@ class Choosing:
         if self._draft is None or len(values) != 6:
             return
         x, y, heading, goal_x, goal_y, radius = values
-        self._draft = replace(
-            self._draft,
-            start=(x, y),
-            heading=heading,
-            goal=(goal_x, goal_y),
-            radius=radius,
-        )
-        self._places.show(self._draft)
-        await self._check()
+        start, goal = (x, y), (goal_x, goal_y)
+        placed = replace(self._draft, start=start, goal=goal, heading=heading)
+        await self._change(replace(placed, radius=radius))
 
     async def _move(self) -> None:
         """Moves start and goal to the nearest free places."""
-        draft, board = self._draft, self._board
-        if draft is None or board is None:
+        draft, view = self._draft, self._view
+        if draft is None or view is None:
             return
         try:
             moved = await asyncio.to_thread(snapped, draft, self._place)
         except (TdacError, ValueError) as error:
-            self._places.tell(str(error), good=False)
+            self._form.tell(str(error), good=False)
             return
-        self._draft = moved
-        self._places.show(moved)
-        await self._check()
+        await self._change(moved)
 
     async def _shrink(self) -> None:
         """Takes the largest radius of the slider that gets through."""
         draft = self._draft
         fitting = None if draft is None else fitting_radius(draft, self._checked)
         if draft is not None and fitting is not None:
-            self._draft = replace(draft, radius=fitting)
-            self._places.show(self._draft)
-            await self._check()
+            await self._change(replace(draft, radius=fitting))
 
     async def _resized(self) -> None:
         if self._draft is not None:
-            self._draft = replace(self._draft, radius=self._places.radius)
+            self._draft = replace(self._draft, radius=self._form.radius)
             await self._check()
 
     async def _check(self) -> None:
         """Finds the path of the draft, or why there is none."""
-        draft, board = self._draft, self._board
+        draft, view = self._draft, self._view
         assert draft is not None
-        assert board is not None
+        assert view is not None
         self._turn += 1
         turn, self._checked = self._turn, None
-        if draft.goal is None or (draft.start is None and board.start is None):
+        if draft.goal is None or (draft.start is None and view.start is None):
             text = "Click the start, a point ahead of it, and the goal."
-            self._places.tell(text, good=True)
+            self._form.tell(text, good=True)
         else:
-            work = partial(check, draft, board, self._place)
+            work = partial(check, draft, view, self._place)
             checked = await self._waiting("Looking for the shortest path …", work)
             if turn != self._turn:
                 return
             self._checked = checked
-            self._places.tell(*sentence_of(checked, board))
-            self._view.show(checked.picture or board.png)
-        self._view.mark(overlay(board, draft, self._checked))
-        self._places.show_checked(draft, self._checked, board)
+            self._form.tell(*sentence_of(checked, view))
+            self._map.show(checked.picture or view.png)
+        self._map.mark(overlay(view, draft, self._checked))
+        self._form.show_checked(draft, self._checked, view)
         ui.navigate.history.replace(address_with(draft))
         self._refresh_command()
 
@@ -258,7 +266,7 @@ class Choosing:
         ui.navigate.to(address_of("/run", folder))
 
 
-def address_with(draft: Draft) -> str:
+def address_with(draft: TaskDraft) -> str:
     """Address of the page with a draft, which loads the page with it again."""
     address = f"/?source={quote(f'{draft.kind}: {draft.source}')}"
     if draft.polarity is not None:
@@ -280,8 +288,3 @@ def numbers_in(task: str) -> list[float]:
 
 def _kind(kind: str) -> Kind:
     return "world" if kind == "world" else "map"
-
-
-def _on_pixel(place: Place, unit: str) -> Place:
-    """A clicked place; on a map, the middle of a pixel."""
-    return (round(place[0]), round(place[1])) if unit == "px" else place

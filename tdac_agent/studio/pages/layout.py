@@ -12,6 +12,7 @@ from urllib.parse import quote
 from nicegui import events, ui
 
 from tdac_agent.studio.folder import FILES, keep
+from tdac_agent.studio.jobs import stop_job
 
 STYLE = """
 body { font-family: system-ui, sans-serif; background: #f6f6f3; color: #23262e; }
@@ -152,41 +153,54 @@ async def keep_upload(event: events.UploadEventArguments, place: Path) -> str:
 
 def status_badge(status: str) -> None:
     """A status in its colour."""
-    ui.label(status).classes(f"status {status.replace(' ', '-')}")
+    ui.label(status).classes(_badge_classes(status))
 
 
-def job_heading(at: str) -> tuple[ui.row, ui.label]:
-    """The heading of a run or bench: places for its status and for what it does now."""
-    with ui.row().classes("w-full items-center gap-3"):
-        ui.label(at).classes("text-xl font-bold")
-        return ui.row(), ui.label().classes("note").props("role=status")
+def _badge_classes(status: str) -> str:
+    return f"status {status.replace(' ', '-')}"
 
 
-class JobButtons:
-    """Buttons that stop a command and start it again.
+class JobPage:
+    """A page about a run or bench: what it is, its status, what it does now, buttons.
 
     Args:
-        stop: Interrupts the command, which may take seconds to end.
-        go_on: Starts it again.
+        place: Folder of the studio.
+        at: The run or bench, relative to it.
+        folder: Its folder, without links.
     """
 
-    def __init__(self, stop: Callable[[], object], go_on: Callable[[], object]) -> None:
-        self._do = stop
-        self._stop = ui.button("Stop", icon="stop", on_click=self._begin_to_stop)
+    def __init__(self, place: Path, at: str, folder: Path) -> None:
+        self._place, self._at, self._folder = place, at, folder
+
+    def _build_heading(self) -> None:
+        with ui.row().classes("w-full items-center gap-3"):
+            ui.label(self._at).classes("text-xl font-bold")
+            self._badge = ui.label()
+            self._now = ui.label().classes("note").props("role=status")
+
+    def _build_buttons(self, go_on: Callable[[], object]) -> None:
+        """Builds the buttons that stop the command, which takes a while, or start it.
+
+        Args:
+            go_on: Starts it again.
+        """
+        self._stop = ui.button("Stop", icon="stop", on_click=self._interrupt)
         self._resume = ui.button("Continue", icon="play_arrow", on_click=go_on)
 
-    def show(self, *, running: bool, continues: bool) -> None:
-        """Shows the one that is of use now."""
+    def _show_status(self, status: str, *, running: bool, continues: bool) -> None:
+        """Shows the status, and the button that is of use now."""
+        self._badge.text = status
+        self._badge.classes(replace=_badge_classes(status))
         if not running:
             self._stop.text = "Stop"
             self._stop.enable()
         self._stop.visible = running
         self._resume.visible = continues and not running
 
-    def _begin_to_stop(self) -> None:
+    def _interrupt(self) -> None:
         self._stop.text = "Stopping …"
         self._stop.disable()
-        self._do()
+        stop_job(self._place, self._at)
 
 
 def report_frame(at: str, version: str) -> None:

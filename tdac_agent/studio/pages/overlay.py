@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from tdac_agent.studio.board import Board
-from tdac_agent.studio.draft import Checked, Draft
-from tdac_agent.studio.passage import Passage
+from tdac_agent.studio.bottleneck import Bottleneck
+from tdac_agent.studio.draft import Checked, TaskDraft
+from tdac_agent.studio.source_view import SourceView
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 PATH, ROBOT, GOAL, NARROW = "#5848c6", "#5848c6", "#12694a", "#d55e00"
@@ -17,38 +17,38 @@ BAR = 4.0
 """Half length of the bars at the ends of a passage, in widths of a thin line."""
 
 
-def overlay(board: Board, draft: Draft, checked: Checked | None) -> str:
+def overlay(view: SourceView, draft: TaskDraft, checked: Checked | None) -> str:
     """The marks of a draft."""
-    thick = max(board.width, board.height) / 400
+    thick = max(view.width, view.height) / 400
     parts = []
     if checked is not None and len(checked.path) > 1:
-        parts.append(_polyline(board, checked.path, thick))
+        parts.append(_polyline(view, checked.path, thick))
     if checked is not None and checked.narrowest is not None:
-        parts.append(_gap(board, checked.narrowest, thick))
+        parts.append(_gap(view, checked.narrowest, thick))
     if draft.goal is not None:
-        ((x, y),) = board.at([draft.goal]).tolist()
+        ((x, y),) = view.at([draft.goal]).tolist()
         size = 5 * thick
         if checked is not None and checked.task is not None:
-            reach = checked.task.nominal.goal_tolerance * board.scale
+            reach = checked.task.nominal.goal_tolerance * view.scale[0]
             parts.append(_circle(x, y, reach, f"{GOAL}30", GOAL, 0.6 * thick))
         parts.append(_circle(x, y, size, "none", GOAL, 1.6 * thick))
         parts.append(_circle(x, y, 0.4 * size, GOAL, "none", 0))
-    start = draft.start or (board.start[:2] if board.start else None)
+    start = draft.start or (view.start[:2] if view.start else None)
     if start is not None:
-        parts += _robot(board, start, draft, thick)
+        parts += _robot(view, start, draft, thick)
     return "".join(parts)
 
 
 def _robot(
-    board: Board, start: tuple[float, float], draft: Draft, thick: float
+    view: SourceView, start: tuple[float, float], draft: TaskDraft, thick: float
 ) -> list[str]:
     """The body at the start, with a line towards its heading."""
-    ((x, y),) = board.at([start]).tolist()
+    ((x, y),) = view.at([start]).tolist()
     body = draft.radius if draft.radius is not None else BODY_RADIUS
-    radius = max(body * board.scale, 3 * thick)
+    radius = max(body * view.scale[0], 3 * thick)
     heading = draft.heading or 0.0
     ahead = np.add(start, [math.cos(heading), math.sin(heading)])
-    ((to_x, to_y),) = board.at([ahead]).tolist()
+    ((to_x, to_y),) = view.at([ahead]).tolist()
     far = math.hypot(to_x - x, to_y - y) or 1.0
     reach = 1.6 * radius / far
     end = x + reach * (to_x - x), y + reach * (to_y - y)
@@ -59,9 +59,9 @@ def _robot(
     ]
 
 
-def _gap(board: Board, narrowest: Passage, thick: float) -> str:
+def _gap(view: SourceView, narrowest: Bottleneck, thick: float) -> str:
     """A passage: a line between its ends, with a bar across each end."""
-    (x, y), (to_x, to_y) = board.at(narrowest.ends).tolist()
+    (x, y), (to_x, to_y) = view.at(narrowest.ends).tolist()
     far = math.hypot(to_x - x, to_y - y) or 1.0
     over, down = ((to_y - y) / far, (x - to_x) / far)
     lines = [(x, y, to_x, to_y)]
@@ -77,8 +77,8 @@ def _gap(board: Board, narrowest: Passage, thick: float) -> str:
     )
 
 
-def _polyline(board: Board, path: Any, thick: float) -> str:
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in board.at(path).tolist())
+def _polyline(view: SourceView, path: Any, thick: float) -> str:
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in view.at(path).tolist())
     return (
         f'<polyline points="{points}" fill="none" stroke="{PATH}" '
         f'stroke-width="{1.4 * thick:.2f}" stroke-dasharray="{5 * thick:.1f}"/>'

@@ -7,12 +7,11 @@ from pathlib import Path
 
 from nicegui import ui
 
-from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.studio.folder import STATE, as_word, made_within
-from tdac_agent.studio.jobs import job_of, start
+from tdac_agent.studio.jobs import job_of, start, stop_job
 from tdac_agent.studio.pages.films import show_film
+from tdac_agent.studio.run_status import readable_run
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 EPISODES = 200
@@ -35,7 +34,9 @@ class Robustness:
             with ui.row().classes("items-center"):
                 self._count = ui.number("disturbed episodes", value=EPISODES, min=1)
                 self._go = ui.button("Measure", on_click=self._begin)
-                self._stop = ui.button("Stop", on_click=self._interrupt).props("flat")
+                self._stop = ui.button(
+                    "Stop", on_click=partial(stop_job, place, self._out)
+                ).props("flat")
                 self._now = ui.label().classes("note")
             self._found = ui.column().classes("w-full gap-1")
             self._film = ui.column().classes("w-full")
@@ -44,9 +45,10 @@ class Robustness:
     def look(self, folder: Path) -> None:
         """Shows what has been measured, and which video is finished."""
         if not self._card.visible:
-            self._card.visible = _is_verified(folder)
-            if not self._card.visible:
+            run = readable_run(folder)
+            if run is None or not run.verified or run.on_set:
                 return
+            self._card.visible = True
         job = job_of(self._place, self._out)
         running = job is not None and job.running
         self._go.set_enabled(not running)
@@ -85,11 +87,6 @@ class Robustness:
         words = ["verify", as_word(self._at), "--robust", count, "--out", self._out]
         start(self._place, words, self._out)
 
-    def _interrupt(self) -> None:
-        job = job_of(self._place, self._out)
-        if job is not None:
-            job.stop()
-
     def _watch(self, seed: int, name: str) -> None:
         """Draws a video of an episode, and shows it."""
         film = f"{self._out}/seed-{seed}.mp4"
@@ -100,11 +97,3 @@ class Robustness:
         self._film.clear()
         with self._film:
             show_film(self._place, film, name)
-
-
-def _is_verified(folder: Path) -> bool:
-    try:
-        run: Run = load_run(folder)
-    except (TdacError, OSError):
-        return False
-    return run.verified and not run.on_set

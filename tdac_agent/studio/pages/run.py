@@ -4,36 +4,34 @@ from __future__ import annotations
 
 import asyncio
 import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
 from tdac_agent.library.listing import row_of
-from tdac_agent.runs.run_record import RUN_FILE, load_run
-from tdac_agent.studio.deployable import deployable
-from tdac_agent.studio.folder import as_word, within
-from tdac_agent.studio.jobs import Job, job_of, start
+from tdac_agent.runs.run_record import RUN_FILE, Run, load_run
+from tdac_agent.studio.folder import as_word, deployable, within
+from tdac_agent.studio.jobs import StudioJob, job_of, start
 from tdac_agent.studio.pages.layout import (
-    JobButtons,
+    JobPage,
     ShownCommand,
     framed,
-    job_heading,
     report_frame,
     shown_first,
-    status_badge,
 )
 from tdac_agent.studio.pages.questions import Questions
 from tdac_agent.studio.pages.robustness import Robustness
-from tdac_agent.studio.standing import (
+from tdac_agent.studio.run_status import (
     SELECTED,
-    about_given,
     asked_by,
-    candidates_of,
     episodes_driven,
-    from_elsewhere,
+    initial_controller_text,
     last_step,
     progress_of,
+    readable_run,
 )
 from tdac_envs.core.errors import TdacError
 
@@ -56,42 +54,31 @@ def add(place: Path) -> None:
             if folder is None or not at or not known:
                 ui.label(f"There is no run {at!r} in this folder.").classes("problem")
                 return
-            await Watching(place, at, folder).show()
+            await RunPage(place, at, folder).show()
 
 
-class Watching:
-    """The state of one opened page.
-
-    Args:
-        place: Folder of the studio.
-        at: The run, relative to it.
-        folder: Its folder.
-    """
-
-    def __init__(self, place: Path, at: str, folder: Path) -> None:
-        self._place, self._at, self._folder = place, at, folder
-        self._seen: Any = None
-        self._reported = ""
+class RunPage(JobPage):
+    """The page of one run."""
 
     async def show(self) -> None:
         """Builds the page, and keeps it up to date."""
-        self._badge, self._now = job_heading(self._at)
+        self._seen: RunState | None = None
+        self._reported = ""
+        self._build_heading()
         self._command = ShownCommand()
         with ui.row().classes("gap-2 items-center"):
-            self._buttons = JobButtons(self._interrupt, self._go_on)
+            self._build_buttons(self._go_on)
             self._download = ui.button("Download the controller", on_click=self._save)
             self._judge = ui.button("Verify on hidden worlds", on_click=self._hidden)
             self._follow = ui.switch("show each new candidate", value=True)
-        self._verdict = ui.element("pre").classes("output")
-        with self._verdict:
+        with ui.element("pre").classes("output") as self._verdict:
             self._verdict_text = ui.label()
-        self._wishes = ui.column().classes("w-full gap-1")
+        self._remarks = ui.column().classes("w-full gap-1")
         self._questions = Questions(self._place / f"{self._at}-questions", self._folder)
         self._awaited = ui.label().classes("note text-sm whitespace-pre-line")
         self._report = ui.column().classes("w-full")
         self._robust = Robustness(self._place, self._at)
-        printed = ui.expansion("What the command printed").classes("w-full")
-        with printed:
+        with ui.expansion("What the command printed").classes("w-full"):
             ui.label(LETTERS).classes("note text-sm")
             with ui.element("pre").classes("output"):
                 self._output = ui.label()
@@ -102,68 +89,48 @@ class Watching:
     async def _look(self) -> None:
         """Shows what has changed."""
         job = job_of(self._place, self._at)
-        state = await asyncio.to_thread(_state, self._folder, job)
-        self._questions.look(running=state[1])
+        state = await asyncio.to_thread(state_of, self._folder, job)
+        self._questions.look(running=state.running)
         self._robust.look(self._folder)
         self._show_clock(state, job)
         if state == self._seen:
             return
         self._seen = state
-        row, running, _, version, output = state
-        self._show_row(row, running, job)
-        self._output.text = output
-        if (
-            version
-            and version != self._reported
-            and (self._follow.value or not self._reported or not running)
-        ):
-            self._reported = version
+        self._show_row(state, job)
+        self._output.text = state.output
+        new = state.version not in ("", self._reported)
+        if new and (self._follow.value or not self._reported or not state.running):
+            self._reported = state.version
             self._report.clear()
             with self._report:
-                report_frame(self._at, version)
+                report_frame(self._at, state.version)
 
-    def _show_row(self, row: dict[str, Any], running: bool, job: Job | None) -> None:
-        status = row["status"] if row else "running" if running else "not begun"
-        self._badge.clear()
-        with self._badge:
-            status_badge(status)
-        go_on = row.get("go_on", "") if row else ""
+    def _show_row(self, state: RunState, job: StudioJob | None) -> None:
+        go_on = state.row.get("go_on", "")
         report = shlex.join(["tdac", "report", as_word(self._at)])
         begun = job.command if job is not None and job.ours else ""
         self._command.show(begun or go_on or report)
         # An agent starts its server itself.
-        continues = bool(go_on) and not row.get("agent") and status != "running"
-        self._buttons.show(running=running, continues=continues)
-        self._follow.visible = running
-        done = bool(row) and status in ("verified", "selected")
-        self._download.visible = done
-        self._judge.visible = done and status == "selected"
-        self._wishes.clear()
-        given = about_given(self._folder) if row else ""
-        if given:
-            with self._wishes:
-                ui.label(given).classes("problem")
-        if status == "selected":
-            with self._wishes:
-                ui.label(SELECTED).classes("note text-sm")
-        foreign = from_elsewhere(self._folder) if row else ""
-        if foreign:
-            with self._wishes:
-                ui.label(ELSEWHERE.format(foreign)).classes("note text-sm")
-        if not running and not row and job is not None:
-            with self._wishes:
-                last = job.output().strip().splitlines()[-1:] or ["nothing was printed"]
-                ui.label(f"The run did not start: {last[0]}").classes("problem")
+        own = bool(go_on) and not state.row.get("agent")
+        continues = own and state.status != "running"
+        self._show_status(state.status, running=state.running, continues=continues)
+        self._follow.visible = state.running
+        self._download.visible = state.status in ("verified", "selected")
+        self._judge.visible = state.status == "selected"
+        self._remarks.clear()
+        with self._remarks:
+            for text, problem in _remarks(state, job):
+                ui.label(text).classes("problem" if problem else "note text-sm")
 
-    def _show_clock(self, state: _State, job: Job | None) -> None:
-        """Where the run stands, and for how long its command has run."""
-        row, running, driven, version, output = state
-        text = progress_of(row, running)
-        if running and job is not None:
-            text = "; ".join(filter(None, (text, driven))) + f" ({job.seconds:.0f} s)"
-            said = last_step(output), "" if version else FIRST
-            self._awaited.text = "\n".join(filter(None, said))
-        self._awaited.visible = running
+    def _show_clock(self, state: RunState, job: StudioJob | None) -> None:
+        """Shows how far the run is, and for how long its command has run."""
+        text = progress_of(state.row, state.running)
+        if state.running and job is not None:
+            parts = filter(None, (text, state.driven))
+            text = f"{'; '.join(parts)} ({job.seconds:.0f} s)"
+            lines = last_step(state.output), "" if state.version else FIRST
+            self._awaited.text = "\n".join(filter(None, lines))
+        self._awaited.visible = state.running
         self._now.text = text
         judged = job_of(self._place, self._verdict_about)
         self._verdict.visible = judged is not None
@@ -185,11 +152,6 @@ class Watching:
             deployable(self._folder), f"{self._folder.name}.zip", "application/zip"
         )
 
-    def _interrupt(self) -> None:
-        job = job_of(self._place, self._at)
-        if job is not None:
-            job.stop()
-
     def _go_on(self, *, trusted: bool = False) -> None:
         """Continues the run; one from elsewhere first lists what it asks for."""
         try:
@@ -204,11 +166,11 @@ class Watching:
         more = () if run.enough is None else run.enough.words
         words = ["synth", "--resume", self._at, *more]
         start(self._place, [*words, *(["--trust"] if asked else [])], self._at)
-        self._wishes.clear()
+        self._remarks.clear()
 
     def _ask(self, asked: list[str]) -> None:
-        self._wishes.clear()
-        with self._wishes, ui.card().classes("w-full"):
+        self._remarks.clear()
+        with self._remarks, ui.card().classes("w-full"):
             ui.label("This run was not begun here. To continue, it asks to:")
             for what in asked or [NOTHING]:
                 ui.label(f"• {what}").classes("problem")
@@ -217,18 +179,61 @@ class Watching:
             ).props("color=negative")
 
 
-_State = tuple[dict[str, Any], bool, str, str, str]
+@dataclass(frozen=True, slots=True)
+class RunState:
+    """What the page shows of a run.
+
+    Attributes:
+        row: Its row of the list of runs; empty before it has a record.
+        run: Its record, if it can be read.
+        running: Whether its command runs.
+        driven: How many episodes it has driven, if it runs on a task set.
+        version: Tells its report from earlier ones; empty if there is none yet.
+        output: The end of what its command printed.
+    """
+
+    row: dict[str, Any]
+    run: Run | None
+    running: bool
+    driven: str
+    version: str
+    output: str
+
+    @property
+    def status(self) -> str:
+        """Status of the run, also before it has a record."""
+        unknown = "running" if self.running else "not begun"
+        return str(self.row.get("status", unknown))
 
 
-def _state(folder: Path, job: Job | None) -> _State:
-    """Row of the list, whether it runs, how far, version of its report, and output."""
+def state_of(folder: Path, job: StudioJob | None) -> RunState:
+    """The state of a run.
+
+    Args:
+        folder: Its folder.
+        job: The newest command that works on it, if the studio has started it.
+    """
     running = job is not None and job.running
     output = job.output() if job is not None else ""
     if not (folder / RUN_FILE).is_file():
-        return {}, running, "", "", output
-    row = row_of(folder)
+        return RunState({}, None, running, "", "", output)
+    row, run = row_of(folder), readable_run(folder)
     running = running or row["status"] == "running"
-    judged = candidates_of(folder)
-    version = f"{judged}-{row['status']}" if judged or not running else ""
-    driven = episodes_driven(folder) if running else ""
-    return row, running, driven, version, output
+    candidates = len(run.attempts) if run else 0
+    version = f"{candidates}-{row['status']}" if candidates or not running else ""
+    driven = episodes_driven(run) if run and running else ""
+    return RunState(row, run, running, driven, version, output)
+
+
+def _remarks(state: RunState, job: StudioJob | None) -> Iterator[tuple[str, bool]]:
+    """Yields what is to be said about a run, and whether it is a problem."""
+    failed = initial_controller_text(state.run) if state.run else ""
+    if failed:
+        yield failed, True
+    if state.status == "selected":
+        yield SELECTED, False
+    if state.run and (remark := from_elsewhere(state.run)):
+        yield ELSEWHERE.format(remark), False
+    if not state.running and not state.row and job is not None:
+        last = job.output().strip().splitlines()[-1:] or ["nothing was printed"]
+        yield f"The run did not start: {last[0]}", True

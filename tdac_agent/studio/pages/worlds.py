@@ -16,7 +16,7 @@ from tdac_agent.html_report.scene import data_address
 from tdac_agent.planners.planner import planner_names
 from tdac_agent.set_synthesis.synthesize import EPISODES
 from tdac_agent.set_synthesis.trials import MOST_EPISODES
-from tdac_agent.studio.driving import Drive
+from tdac_agent.studio.driving import KeyboardDrive
 from tdac_agent.studio.folder import FILES, STATE, as_word, keep, made_within
 from tdac_agent.studio.jobs import free_folder, start
 from tdac_agent.studio.pages.films import show_film
@@ -47,10 +47,10 @@ def add(place: Path) -> None:
     @ui.page("/worlds")
     async def page(level: str = "unknown") -> None:
         with framed("Worlds"):
-            await Looking(place).show(level)
+            await WorldsPage(place).show(level)
 
 
-class Looking:
+class WorldsPage:
     """The state of one opened page.
 
     Args:
@@ -60,7 +60,7 @@ class Looking:
     def __init__(self, place: Path) -> None:
         self._place = place
         self._tasks: TaskSet | None = None
-        self._drive: Drive | None = None
+        self._drive: KeyboardDrive | None = None
         self._chosen: tuple[str, str, int] | None = None
 
     async def show(self, level: str) -> None:
@@ -95,7 +95,7 @@ class Looking:
         ui.label("Drive it yourself").classes("font-bold")
         self._keys = ui.label(KEYS).classes("note text-sm")
         ui.button("Drive", on_click=self._begin_drive).props("outline")
-        self._told = ui.label().props("role=status")
+        self._status = ui.label().props("role=status")
 
     def _build_use(self) -> None:
         ui.label("Use it").classes("font-bold")
@@ -122,16 +122,20 @@ class Looking:
             "w-full grid grid-cols-1 sm:grid-cols-2 gap-3"
         )
 
+    @property
+    def _world(self) -> tuple[str, str, int]:
+        """Set, split and number of the chosen world."""
+        return self._name.value, self._split.value, int(self._index.value or 0)
+
     async def _open(self) -> None:
         """Shows the chosen world, unless it is shown already."""
-        name, split = self._name.value, self._split.value
-        chosen = name, split, int(self._index.value or 0)
+        chosen = self._world
         if chosen == self._chosen:
             return
         self._chosen = chosen
         self._timer.deactivate()
         self._drive = None
-        self._about.text = f"Drawing world {chosen[2]} of {name} …"
+        self._about.text = f"Drawing world {chosen[2]} of {chosen[0]} …"
         self._facts.clear()
         try:
             tasks, picture, facts = await asyncio.to_thread(look_at, *chosen)
@@ -145,27 +149,22 @@ class Looking:
         self._about.text = tasks.file.description
         without = " (without movers)" if tasks.file.movers else ""
         self._one_map.text = f"Write a controller for this map{without}"
-        self._show(picture)
+        self._image.set_source(as_address(picture))
         self._facts.clear()
         with self._facts:
             for key, value in facts.items():
                 ui.label(f"{key}: {value}").classes("text-sm")
-        self._told.text = ""
-
-    def _show(self, picture: Image) -> None:
-        self._image.set_source(as_address(picture))
+        self._status.text = ""
 
     def _next(self) -> None:
         self._index.value = int(self._index.value or 0) + 1
 
     async def _begin_drive(self) -> None:
         """Puts the robot at the start, and listens to the keys."""
-        self._drive = await asyncio.to_thread(
-            Drive.of, self._name.value, self._split.value, int(self._index.value or 0)
-        )
+        self._drive = await asyncio.to_thread(KeyboardDrive.of, *self._world)
         self._timer.interval = max(SECONDS, self._drive.dt)
         self._timer.activate()
-        self._told.text = "Go."
+        self._status.text = "Go."
 
     def _key(self, event: object) -> None:
         drive = self._drive
@@ -182,16 +181,16 @@ class Looking:
         if drive is None:
             return
         picture = await asyncio.to_thread(drive.step)
-        self._show(picture)
-        self._told.text = drive.status
+        self._image.set_source(as_address(picture))
+        self._status.text = drive.status
         if drive.over:
-            self._told.text += " – press R to begin again"
+            self._status.text += " – press R to begin again"
             self._timer.deactivate()
 
     def _as_map(self) -> None:
         """Keeps the world's map as a file, and opens it on the first page."""
         assert self._tasks is not None
-        index, split = int(self._index.value or 0), self._split.value
+        _, split, index = self._world
         world = self._tasks.world(split, index)
         if not isinstance(world, LadderWorld):
             ui.notify("this world is not a map; choose another set", type="info")
@@ -248,14 +247,13 @@ class Looking:
 
     def _watch(self) -> None:
         """Lets two policies drive this world, and shows their videos."""
-        name, split = self._name.value, self._split.value
-        index = str(int(self._index.value or 0))
+        name, split, index = self._world
         self._films.clear()
         for who in (self._one.value, self._other.value):
             kept = "".join(c if c.isalnum() else "-" for c in who)
             film = f"{STATE}/films/{name}-{split}-{index}-{kept}.mp4"
             made_within(self._place, f"{STATE}/films")
-            world = ["--set", name, "--split", split, "--index", index]
+            world = ["--set", name, "--split", split, "--index", str(index)]
             words = ["play", who, *world, "--video", film]
             job = start(self._place, words, film)
             self._command.show(job.command)
@@ -280,11 +278,11 @@ def look_at(name: str, split: str, index: int) -> tuple[TaskSet, Image, dict[str
 
 def policies_in(place: Path) -> list[str]:
     """Controllers and learned policies of the folder."""
-    found = [*place.glob("*.py"), *place.glob("*/*.zip"), *place.glob("*.zip")]
-    found += [file.with_name("controller.py") for file in place.glob("runs/*/set.yaml")]
-    found += place.glob("runs/*/policy.zip")
-    found += [*place.glob(f"{FILES}/*.py")]
-    names = (str(path.relative_to(place)) for path in found if path.exists())
+    paths = [*place.glob("*.py"), *place.glob("*/*.zip"), *place.glob("*.zip")]
+    paths += [file.with_name("controller.py") for file in place.glob("runs/*/set.yaml")]
+    paths += place.glob("runs/*/policy.zip")
+    paths += [*place.glob(f"{FILES}/*.py")]
+    names = (str(path.relative_to(place)) for path in paths if path.exists())
     return sorted(map(as_word, names))[:300]
 
 

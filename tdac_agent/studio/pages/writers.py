@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
 from nicegui import events, ui
 
+from tdac_agent.errors import ProviderError
+from tdac_agent.models.choice import Options, check_names, missing_for_name
 from tdac_agent.models.prices import load_prices
+from tdac_agent.models.ready import needs_limit
 from tdac_agent.models.tariff import MAX_COST
 from tdac_agent.studio.folder import STATE
 from tdac_agent.studio.pages.layout import keep_upload
@@ -20,7 +22,7 @@ WHO = {
     "manual": "a person, or a chat window: copy the prompt, paste the answer",
     "file": "a controller of my own; if it fails, the template takes over",
 }
-KEYS = {"anthropic": "ANTHROPIC_API_KEY", "openai": "OPENAI_API_KEY"}
+VENDORS = ("anthropic", "openai")
 QUESTIONS = "questions"
 """Folder in `.studio` with the questions of a `manual` run."""
 
@@ -73,10 +75,20 @@ class Writers:
         profile = ["--profile", "policy"] if short else []
         if who == "manual":
             return ["--learner", f"manual:{STATE}/{QUESTIONS}", *profile]
-        words = ["--learner", f"{who}:{(self._model.value or '').strip()}", *profile]
-        if self._server.value:
-            words += ["--base-url", self._server.value.strip()]
-        return [*words, "--max-cost", f"{self._most.value or 0:g}"]
+        words = ["--learner", self._learner, *profile]
+        if self._base_url:
+            words += ["--base-url", self._base_url]
+        if self._most.visible:
+            words += ["--max-cost", f"{self._most.value or 0:g}"]
+        return words
+
+    @property
+    def _learner(self) -> str:
+        return f"{self._who.value}:{(self._model.value or '').strip()}"
+
+    @property
+    def _base_url(self) -> str | None:
+        return (self._server.value or "").strip() or None
 
     def with_folder(self, words: list[str], folder: str) -> list[str]:
         """The words, with a folder of questions that no other run has."""
@@ -88,21 +100,26 @@ class Writers:
         who = self._who.value
         if who == "file" and not self._file:
             return "Add your controller first."
-        if who in KEYS:
-            if not (self._model.value or "").strip():
-                return "Enter the name of the model."
-            if not self._server.value and not os.environ.get(KEYS[who]):
-                return (
-                    f"The key is missing: set {KEYS[who]} where you start the studio. "
-                    "Keys are read from environment variables only."
-                )
-        return None
+        if who not in VENDORS:
+            return None
+        if self._learner == f"{who}:":
+            return "Enter the name of the model."
+        try:
+            check_names([self._learner], self._base_url)
+            missing = missing_for_name(self._learner, Options(None, self._base_url))
+        except ProviderError as error:
+            return str(error)
+        text = "; ".join(missing)
+        return f"{text} (where you start the studio)" if missing else None
 
     def _update(self) -> None:
         who = self._who.value
-        self._paid.visible, self._own.visible = who in KEYS, who == "file"
-        self._short.visible = self._on_task and who in {*KEYS, "manual"}
-        self._note.text = self.problem() or self._about()
+        self._paid.visible, self._own.visible = who in VENDORS, who == "file"
+        self._short.visible = self._on_task and who in {*VENDORS, "manual"}
+        problem = self.problem()
+        known = who in VENDORS and problem is None
+        self._most.visible = not known or needs_limit(self._learner, self._base_url)
+        self._note.text = problem or self._about()
         self._changed_if_ready()
 
     def _changed_if_ready(self) -> None:
@@ -116,10 +133,12 @@ class Writers:
         who = self._who.value
         if who == "file":
             return f"The controller is {Path(self._file).name}."
-        if who not in KEYS:
+        if who not in VENDORS:
             return ""
-        name = f"{who}:{self._model.value.strip()}"
-        price = load_prices().price_of(name, self._server.value or None)
+        if not self._most.visible:
+            return "A server on this machine: its answers are not counted in money."
+        name = self._learner
+        price = load_prices().price_of(name, self._base_url)
         if price is None:
             return f"No price is known for {name}: the run may be refused."
         most = f"{self._most.value or 0:g}"

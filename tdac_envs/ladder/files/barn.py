@@ -63,7 +63,7 @@ def read_barn(path: Path, resolution: float) -> list[FoundWorld]:
         file = BarnFile.model_validate(parse_json(read_file(path, RECORD_BYTES)))
         return [_world(path, file, name, resolution) for name in file.worlds]
     except ValidationError as error:
-        raise TaskError(f"{path}: {first_problem(error)}") from None
+        raise TaskError(f"{path}: {first_problem(error, BarnFile)}") from None
     except (OSError, ValueError) as error:
         raise TaskError(f"{path}: {one_line_reason(error)}") from None
 

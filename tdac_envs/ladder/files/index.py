@@ -116,7 +116,7 @@ def _entry(path: Path, number: int, value: Any) -> MapEntry:
         entry = MapEntry.model_validate(value)
     except ValidationError as error:
         where = f"{path}, task {number}"
-        raise TaskError(f"{where}: {first_problem(error)}") from None
+        raise TaskError(f"{where}: {first_problem(error, MapEntry)}") from None
     for name in (entry.file, entry.truth or entry.file):
         if Path(name).is_absolute() or ".." in Path(name).parts:
             raise TaskError(

@@ -21,7 +21,7 @@ from tdac_agent.bench.page import MOST_WORLDS
 from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, reveal
 from tdac_agent.errors import ControllerFileError, RunError
-from tdac_agent.executors.choice import executor_of
+from tdac_agent.executors.local import executor_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set

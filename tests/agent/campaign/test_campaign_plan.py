@@ -112,11 +112,12 @@ def test_a_setting_is_a_loop_and_the_loop_tells_the_setting(setting, loop, writt
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"runs": 0}, "few.yaml: runs: .*expected at least 1, got 0"),
-        (
-            {"runz": 3},
-            r"few.yaml: runz: unknown key \(did you mean 'runs'\?\)",
-        ),
+        ({"runs": 0}, r"few.yaml: runs: expected at least 1, got 0 \(R: runs of each"),
+        ({"runz": 3}, r"few.yaml: runz: unknown key \(did you mean 'runs'\?\)"),
+        ({"R": 3}, r"few.yaml: R: unknown key \(did you mean 'runs'\?\); known: runs,"),
+        ({"refine": True}, "few.yaml: refine: unknown key; known: .*settings, "),
+        ({"patience": 0}, "expected at least 1, got 0 .*`prompt only`.*`one shot`"),
+        ({"settings": ["agent"]}, "settings.0: Input should be 'dual tier'"),
         ({"learners": ["nosuch"]}, "unknown model 'nosuch'; known: builtin"),
         ({"tasks": ["small", "small"]}, "tasks: 'small' is listed twice"),
         ({"learners": ["manual:here"]}, "for one run, not for a campaign"),
@@ -129,6 +130,27 @@ def test_a_wrong_file_is_refused_in_a_line(changes, message, written):
     with pytest.raises(CampaignError, match=message) as caught:
         read_config(written(**changes))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("learner", "base_url", "needed"),
+    [
+        ("openai:qwen3", "http://localhost:11434/v1", False),
+        ("openai:qwen3", "http://10.0.0.2:8000/v1", True),
+        ("anthropic:claude-sonnet-5-5", None, True),
+    ],
+)
+def test_only_what_may_cost_money_needs_a_limit(
+    learner, base_url, needed, written, monkeypatch
+):
+    """A model on a server of this machine is free, as `builtin` is."""
+    monkeypatch.delenv("ANTHROPIC_BASE_URL", raising=False)
+    file = written(learners=["builtin", learner], base_url=base_url)
+    if needed:
+        with pytest.raises(CampaignError, match=f"max_cost: required for {learner}"):
+            read_config(file)
+    else:
+        assert read_config(file).max_cost is None
 
 
 @pytest.mark.parametrize("text", ["0/2", "3/2", "1", "1/", "a/b", "1/2/3"])

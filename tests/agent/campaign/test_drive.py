@@ -6,9 +6,9 @@ from tdac_agent.campaign.config import CampaignError
 from tdac_agent.campaign.drive import campaign_folder, run_all
 from tdac_agent.campaign.perform import Outcome, Terms, work_of
 from tdac_agent.campaign.plan import WHOLE, Cell, Plan
-from tdac_agent.campaign.progress import Progress
+from tdac_agent.campaign.progress import CampaignProgress
 from tdac_agent.errors import RunError
-from tdac_agent.executors.executor import MOST_DEATHS, Begun, Died, Ended, RetryQueue
+from tdac_agent.executors.executor import MOST_DEATHS, Died, Ended, RetryQueue, Started
 
 TERMS = Terms("none", 1, None, None, "all")
 
@@ -32,12 +32,12 @@ def carried_out(plan, come_of):
     def run(work, next_run):
         while (planned := next_run()) is not None:
             made.append(planned.name)
-            yield Begun(planned)
+            yield Started(planned)
             status, reason = come_of(planned.name, made.count(planned.name))
             outcome = Outcome(planned.name, status, reason, tokens=10, cost=0.5)
             yield Ended(planned, outcome)
 
-    progress = Progress.of(plan, WHOLE)
+    progress = CampaignProgress.of(plan, WHOLE)
     run_all(progress, list(plan.all()), TERMS, run, lambda update: None)
     return progress, made
 

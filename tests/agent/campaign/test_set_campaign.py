@@ -120,7 +120,7 @@ def test_a_level_and_a_task_of_the_same_name(on_set):
     plan = planned(on_set.folder)
     assert [cell.task_name for cell in plan.cells] == ["epuck", "set epuck"]
     assert [cell.on_set for cell in plan.cells] == [False, True]
-    assert plan.setting(plan.cells[1]) is plan.sets["epuck"]
+    assert plan.problem(plan.cells[1]) is plan.sets["epuck"]
 
 
 def test_learners_share_the_worlds_of_a_run(on_set):

@@ -198,13 +198,14 @@ class Peer(Child):
         self.tier, self.limits = "none", LIMITS
         self.pid = os.getpid()  # a thread has no CPU time of its own
         self._line = RunQueue("thread-self")
-        ends = [os.pipe() for _ in range(4)]
-        (requests, to), (answers, back), (output, printed), (life, lifeline) = ends
+        pipes = [os.pipe() for _ in range(4)]
+        (requests, to), (answers, back), (output, printed), (life, lifeline) = pipes
         self._ours = (lifeline,)
-        channel = Channel(to, answers, output, FRAME_BYTES, 1 << 16, self._line)
+        channel = Channel(to, answers, output, FRAME_BYTES, 1 << 16)
         self._closed = False
         self._channel = channel
-        self._talk = Conversation(channel, lifeline, LIMITS, Path("/x"), self._end)
+        ends = channel, self._line, lifeline
+        self._talk = Conversation(*ends, LIMITS, Path("/x"), self._end)
         theirs = (requests, back, printed, life)
         self._thread = threading.Thread(target=_answer, args=(script, theirs))
         self._thread.start()

@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+from changed_run import change_run
 from hostile_model import CRASHES, CRASHES_LATER, EVIL, HITS, SUITE, Model
 from small import write_small_task
 
@@ -91,14 +92,12 @@ def long_run(runs, tmp_path_factory):
     )
     (first / "controller.py").write_text(code)
     (first / "controller.diff").write_text(diff)
-    run = load_run(folder)
-    attempts = []
+    (attempt, *_), attempts = load_run(folder).attempts, []
     for k in range(1, 21):
         for j in (0, 1):
-            attempts.append(run.attempts[0].model_copy(update={"k": k, "j": j}))
+            attempts.append(attempt.model_copy(update={"k": k, "j": j}))
             place = folder / "iterations" / f"k{k:02d}" / f"j{j}"
             if place != first:
                 shutil.copytree(first, place, dirs_exist_ok=True)
-    ended = {"attempts": attempts, "status": "not verified", "tau": None}
-    (folder / "run.json").write_text(run.model_copy(update=ended).model_dump_json())
+    change_run(folder, attempts=attempts, status="not verified", tau=None)
     return folder

@@ -8,6 +8,7 @@ import shutil
 from html.parser import HTMLParser
 
 import pytest
+from changed_run import change_run
 from hostile_model import EVIL
 
 from tdac_agent.errors import RunError
@@ -187,11 +188,15 @@ def test_a_torn_file(copied, name, told):
     assert "iteration 1" in shown
 
 
+def cut_short(folder):
+    """Has a run end, or be at work, after its first candidate."""
+    attempts = load_run(folder).attempts[:1]
+    change_run(folder, status="running", tau=None, attempts=attempts)
+
+
 def test_a_run_that_was_killed(copied):
     """What was judged is there; the candidate it died in is named."""
-    run = load_run(copied)
-    left = {"status": "running", "tau": None, "attempts": run.attempts[:1]}
-    (copied / "run.json").write_text(run.model_copy(update=left).model_dump_json())
+    cut_short(copied)
     (copied / "iterations" / "k01" / "j1" / "report.json").unlink()
     shown = " ".join("".join(Outline(make_page(copied).html.decode()).shown).split())
     assert "killed" in shown[:200]
@@ -205,9 +210,7 @@ def test_who_wrote_a_candidate(copied):
     page = make_page(copied).html.decode()
     written, edited = page.count("written by the Learner"), page.count("edited by the")
     assert (written, edited) == (1, 1)
-    given = {"given_sha256": "0" * 64}
-    run = load_run(copied)
-    (copied / "run.json").write_text(run.model_copy(update=given).model_dump_json())
+    change_run(copied, given_sha256="0" * 64)
     page = make_page(copied).html.decode()
     assert page.count("given at the start") == 1
     assert page.count("written by the Learner") == 0
@@ -215,9 +218,7 @@ def test_who_wrote_a_candidate(copied):
 
 def test_a_run_that_is_still_at_work(copied):
     """Its lock says so; it was not killed or ended early, and nobody is to go on."""
-    run = load_run(copied)
-    left = {"status": "running", "tau": None, "attempts": run.attempts[:1]}
-    (copied / "run.json").write_text(run.model_copy(update=left).model_dump_json())
+    cut_short(copied)
     with hold(copied / LOCK_FILE):
         text = make_page(copied).html.decode()
     shown = " ".join("".join(Outline(text).shown).split())
@@ -233,9 +234,7 @@ def test_only_several_runs_have_rates(copied):
     assert "Clopper-Pearson" not in alone
     assert 'id="summary"' not in alone
     other = shutil.copytree(copied, copied.parent / "other")
-    run = load_run(other)
-    left = {"status": "running", "tau": None, "attempts": run.attempts[:1]}
-    (other / "run.json").write_text(run.model_copy(update=left).model_dump_json())
+    cut_short(other)
     with hold(other / LOCK_FILE):
         text = make_page(copied.parent).html.decode()
     shown = " ".join("".join(Outline(text).shown).split())
@@ -256,9 +255,7 @@ def test_a_run_that_ends_while_its_record_is_read_was_not_killed(copied):
 
 def test_a_run_that_has_only_begun(copied):
     """No candidate yet: still a page."""
-    run = load_run(copied)
-    left = {"status": "interrupted", "tau": None, "attempts": []}
-    (copied / "run.json").write_text(run.model_copy(update=left).model_dump_json())
+    change_run(copied, status="interrupted", tau=None, attempts=[])
     shutil.rmtree(copied / "iterations")
     (copied / "journal.jsonl").unlink()
     shown = " ".join("".join(Outline(make_page(copied).html.decode()).shown).split())

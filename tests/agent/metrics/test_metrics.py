@@ -18,7 +18,7 @@ from tdac_agent.metrics import (
     ASSUMPTIONS,
     CANDIDATE_COLUMNS,
     RUN_COLUMNS,
-    Frames,
+    RunFrames,
     best_of_n,
     candidate_rate,
     compare_paired,
@@ -120,7 +120,7 @@ def test_an_iteration_passes_by_any_of_its_candidates():
     assert found["valid"].tolist() == [True, False, True]
     assert found["failed"].tolist()[::2] == [2, 0]
     assert found["candidates"].tolist() == [2, 1, 2]
-    frames = Frames(frames_from_tau([3], 3).runs.assign(run="a"), candidates)
+    frames = RunFrames(frames_from_tau([3], 3).runs.assign(run="a"), candidates)
     assert success_rate(frames).value == 1 / 2
     assert candidate_rate(frames).value == 1 / 4
     assert first_pass(frames).value == 0.0
@@ -214,7 +214,7 @@ def test_pairs_are_compared_on_the_same_seeds():
     """Exact tests of the pairs in which the two differ."""
     one, two = (frames_from_tau([1] * 6 + [None], 9), frames_from_tau([None] * 7, 9))
     sides = [
-        Frames(f.runs.assign(task="t", seed=range(len(f.runs))), f.candidates)
+        RunFrames(f.runs.assign(task="t", seed=range(len(f.runs))), f.candidates)
         for f in (one, two)
     ]
     found = compare_paired(*sides)
@@ -222,10 +222,10 @@ def test_pairs_are_compared_on_the_same_seeds():
     assert found.p_solved == pytest.approx(2 * 0.5**6)
     assert (found.sooner, found.later, found.p_tau) == (6, 0, found.p_solved)
     assert compare_paired(sides[0], sides[0]).p_solved == 1.0
-    twice = Frames(sides[0].runs.assign(seed=0), sides[0].candidates)
+    twice = RunFrames(sides[0].runs.assign(seed=0), sides[0].candidates)
     with pytest.raises(RunError, match="several runs"):
         compare_paired(twice, sides[1])
-    other = Frames(sides[1].runs.assign(seed=99 + np.arange(7)), sides[1].candidates)
+    other = RunFrames(sides[1].runs.assign(seed=99 + np.arange(7)), sides[1].candidates)
     with pytest.raises(RunError, match="no two runs share"):
         compare_paired(sides[0], other)
 

@@ -13,7 +13,7 @@ from fault_server import FaultServer, fails
 
 import tdac_envs
 from tdac_agent.errors import Fault, ProviderError
-from tdac_agent.models.ready import check_ready, check_servers
+from tdac_agent.models.ready import check_ready, check_servers, connect, needs_limit
 
 ROOT = Path(tdac_envs.__file__).parents[1]
 CAMPAIGN = """schema: 1
@@ -29,6 +29,7 @@ TRUSTED = f"{CAMPAIGN}base_url: http://127.0.0.1:1/v1\n"
 @pytest.fixture
 def free_port():
     """A port of this machine at which nobody listens."""
+    connect.cache_clear()  # another server may have had the port
     with socket.socket() as held:
         held.bind(("127.0.0.1", 0))
         yield held.getsockname()[1]
@@ -45,6 +46,37 @@ def test_a_server_that_answers_is_asked_nothing(server):
     """There is a connection, and no request."""
     check_servers([Served(server.url("openai"))] * 2)
     assert server.seen == []
+
+
+def test_a_server_is_tried_once():
+    """By a command, however often its steps check their models."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        url = f"http://127.0.0.1:{listening.getsockname()[1]}/v1"
+        check_servers([Served(url)])
+        check_servers([Served(url)])
+        listening.accept()[0].close()
+        listening.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            listening.accept()
+
+
+@pytest.mark.parametrize(
+    ("name", "base_url", "needed"),
+    [
+        ("builtin", None, False),
+        ("command:llm", None, False),
+        ("openai:gpt-6-sol", None, True),
+        ("openai:qwen3", "http://localhost:11434/v1", False),
+        ("anthropic:x", "http://[::1]:8000", False),
+        ("openai:qwen3", "http://10.0.0.2:8000/v1", True),
+    ],
+)
+def test_what_a_limit_must_bound(monkeypatch, name, base_url, needed):
+    """A model that may cost money: none on a server of this machine."""
+    monkeypatch.delenv("OPENAI_BASE_URL", raising=False)
+    assert needs_limit(name, base_url) == needed
+    monkeypatch.setenv("OPENAI_BASE_URL", "http://127.0.0.1:1/v1")
+    assert needs_limit(name, base_url) == (needed and base_url is not None)
 
 
 @pytest.mark.parametrize("url", ["http://127.0.0.1:{}/v1", "https://localhost:{}"])

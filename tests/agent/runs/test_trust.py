@@ -30,7 +30,7 @@ from tdac_agent.runs.ownership import (
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.studio.standing import from_elsewhere
+from tdac_agent.studio.run_status import from_elsewhere
 from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.setup import hold_folder
 from tdac_agent.tasks.installation import keyed, lasting_secret
@@ -450,7 +450,7 @@ def test_a_run_that_begins_with_tests_and_a_template_is_known(tmp_path):
     def write(_):
         (folder / "suite").mkdir()
         (folder / "suite" / "test_own.py").write_text("")
-        seen.append(from_elsewhere(folder))
+        seen.append(from_elsewhere(load_run(folder)))
 
     template = PromptTemplate("mine.j2", "text")
     with hold_folder(folder):
@@ -461,4 +461,4 @@ def test_a_run_that_begins_with_tests_and_a_template_is_known(tmp_path):
     assert is_own_folder(load_run(folder))
     for unfinished in ("task.yaml", "prompt.j2"):
         (folder / unfinished).unlink()
-    assert from_elsewhere(folder)
+    assert from_elsewhere(load_run(folder))

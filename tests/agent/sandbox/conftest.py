@@ -101,3 +101,15 @@ def launch(workdir, tmp_path, monkeypatch, wait_until_gone):
     for child in children:
         assert wait_until_gone(child.pid, base) == []
     assert list(base.iterdir()) == []
+
+
+@pytest.fixture
+def loaded(launch):
+    """Start children that have imported their source."""
+
+    def loaded(source, tier="auto", limits=PATIENT):
+        child = launch(source, tier, limits)
+        child.load()
+        return child
+
+    return loaded

@@ -87,10 +87,8 @@ OBS = {
 
 
 @pytest.fixture
-def child(launch):
-    child = launch(CONTROLLER)
-    child.load()
-    return child
+def child(loaded):
+    return loaded(CONTROLLER)
 
 
 def test_load_names_what_the_controller_defines(launch):
@@ -101,9 +99,8 @@ def test_load_names_what_the_controller_defines(launch):
     assert "_HIDDEN" not in names
 
 
-def test_every_tier_runs_a_controller(launch, tier):
-    child = launch(CONTROLLER, tier)
-    child.load()
+def test_every_tier_runs_a_controller(loaded, tier):
+    child = loaded(CONTROLLER, tier)
     assert child.tier == tier
     assert child.policy(OBS) == (0.25, -1)
 
@@ -152,10 +149,9 @@ def test_an_error_names_its_line_and_the_child_lives_on(child):
     assert child.call("fail", (2,)) == 0.5
 
 
-def test_reset_is_optional(launch, child):
+def test_reset_is_optional(loaded, child):
     assert child.reset(OBS) is None
-    other = launch("seen = []\ndef reset(obs):\n    seen.append(len(obs))\n")
-    other.load()
+    other = loaded("seen = []\ndef reset(obs):\n    seen.append(len(obs))\n")
     other.reset(OBS)
     assert other.get("seen") == [2]
 
@@ -221,35 +217,31 @@ class EndlessEnv:
 
 
 @pytest.mark.slow
-def test_the_time_of_run_episode_is_the_controllers_own(launch):
-    child = launch(ENDLESS_LOOP)
-    child.load()
+def test_the_time_of_run_episode_is_the_controllers_own(loaded):
+    child = loaded(ENDLESS_LOOP)
     with pytest.raises(ControllerTimeout, match=r"run_episode .* 0.3 s"):
         child.run_episode(EndlessEnv(0.0), 10, 0.3)
 
 
-def test_but_not_without_end(launch):
+def test_but_not_without_end(loaded):
     """The judge's own time is nobody's; a deadline holds whoever took it."""
-    child = launch(ENDLESS_LOOP)
-    child.load()
+    child = loaded(ENDLESS_LOOP)
     began = time.monotonic()
     with pytest.raises(ControllerTimeout, match="run_episode"):
         child.run_episode(EndlessEnv(0.05), 10, 60.0, began + 0.5)
     assert time.monotonic() - began < 30.0
 
 
-def test_what_reset_returns_is_not_sent(launch):
+def test_what_reset_returns_is_not_sent(loaded):
     """It need not be what the wire can carry."""
-    child = launch("def reset(obs):\n    return {(k,): 0 for k in range(20_000)}\n")
-    child.load()
+    child = loaded("def reset(obs):\n    return {(k,): 0 for k in range(20_000)}\n")
     assert child.reset(OBS) is None
 
 
 @pytest.mark.parametrize("code", [137, 152])
-def test_an_exit_code_is_no_signal(launch, code):
+def test_an_exit_code_is_no_signal(loaded, code):
     """Whatever shells make of it."""
-    child = launch(f"import os\ndef policy(obs):\n    os._exit({code})\n")
-    child.load()
+    child = loaded(f"import os\ndef policy(obs):\n    os._exit({code})\n")
     with pytest.raises(ControllerDied, match=f"exit code {code} at policy"):
         child.policy(OBS)
 
@@ -262,9 +254,8 @@ def test_printing_is_kept_and_counted(child):
     assert usage.max_rss_bytes > 1 << 20
 
 
-def test_a_fault_is_final(launch):
-    child = launch("import os\ndef policy(obs):\n    os._exit(3)\n")
-    child.load()
+def test_a_fault_is_final(loaded):
+    child = loaded("import os\ndef policy(obs):\n    os._exit(3)\n")
     for _ in range(2):
         with pytest.raises(ControllerDied, match="exit code 3 at policy") as caught:
             child.policy(OBS)
@@ -302,7 +293,7 @@ def test_a_large_source_is_refused(launch):
         launch("#" * 200_001)
 
 
-def test_two_children_share_nothing(launch):
+def test_two_children_share_nothing(loaded):
     source = (
         "import os\n"
         "def policy(obs):\n"
@@ -312,27 +303,24 @@ def test_two_children_share_nothing(launch):
         "    return seen\n"
     )
     for _ in range(2):
-        child = launch(source)
-        child.load()
+        child = loaded(source)
         assert child.policy(OBS) is False
         assert child.policy(OBS) is True
 
 
-def test_hashing_is_the_same_in_every_child(launch):
+def test_hashing_is_the_same_in_every_child(loaded):
     hashes = set()
     for _ in range(2):
-        child = launch("KEY = hash('goal')\n")
-        child.load()
+        child = loaded("KEY = hash('goal')\n")
         hashes.add(child.get("KEY"))
     assert len(hashes) == 1
 
 
-def test_a_result_too_large_for_the_wire_is_an_error(launch):
+def test_a_result_too_large_for_the_wire_is_an_error(loaded):
     limits = Limits(frame_bytes=10_000)
-    child = launch(
+    child = loaded(
         "import numpy as np\ndef policy(obs): return np.zeros(9999)", "auto", limits
     )
-    child.load()
     with pytest.raises(ControllerError, match="too large"):
         child.policy(OBS)
     with pytest.raises(ControllerError, match="too large"):
@@ -345,9 +333,8 @@ def test_an_argument_larger_than_a_pipe_arrives(child):
     assert child.call("width", (map2d,)) == 1500
 
 
-def test_only_numpy_and_the_standard_library_can_be_imported(launch, tier):
-    child = launch("def attempt(name):\n    return __import__(name).__name__\n", tier)
-    child.load()
+def test_only_numpy_and_the_standard_library_can_be_imported(loaded, tier):
+    child = loaded("def attempt(name):\n    return __import__(name).__name__\n", tier)
     for name in ("json", "heapq", "decimal", "ctypes", "numpy.random", "sensors"):
         assert child.call("attempt", (name,)) == name.split(".")[0]
     for name in ("pytest", "cv2", "gymnasium", "tdac_agent", "tdac_envs", "pip"):
@@ -355,14 +342,13 @@ def test_only_numpy_and_the_standard_library_can_be_imported(launch, tier):
             child.call("attempt", (name,))
 
 
-def test_messages_are_free_of_paths_and_addresses(launch):
+def test_messages_are_free_of_paths_and_addresses(loaded):
     source = (
         "import os\n"
         "def policy(obs):\n"
         "    raise ValueError(f'{os.getcwd()}/params.json {object()!r} \\x1b[31m')\n"
     )
-    child = launch(source)
-    child.load()
+    child = loaded(source)
     with pytest.raises(ControllerError) as caught:
         child.policy(OBS)
     assert caught.value.text.startswith("params.json <object object> ")
@@ -388,7 +374,7 @@ def test_a_syntax_error_names_its_line(launch):
         "2 * (struct.pack('<IBI', 1, 32, 3) + b'N')",
     ],
 )
-def test_frames_of_the_controllers_own_are_a_breach(launch, forged):
+def test_frames_of_the_controllers_own_are_a_breach(loaded, forged):
     source = (
         "import os, struct\n"
         "def policy(obs):\n"
@@ -397,8 +383,7 @@ def test_frames_of_the_controllers_own_are_a_breach(launch, forged):
         f"            os.write(fd, {forged})\n"
         "        except OSError: pass\n"
     )
-    child = launch(source)
-    child.load()
+    child = loaded(source)
     with pytest.raises(ControllerProtocolError, match="misused the judge's channel"):
         child.policy(OBS)
 
@@ -407,7 +392,7 @@ def test_frames_of_the_controllers_own_are_a_breach(launch, forged):
     "torn",
     ["b'\\x09'", "struct.pack('<IBI', 1000, 32, 3) + b's'"],
 )
-def test_a_torn_frame_is_a_timeout(launch, torn):
+def test_a_torn_frame_is_a_timeout(loaded, torn):
     source = (
         "import os, struct, time\n"
         "def policy(obs):\n"
@@ -417,13 +402,12 @@ def test_a_torn_frame_is_a_timeout(launch, torn):
         "        except OSError: pass\n"
         "    while True: time.sleep(1)\n"
     )
-    child = launch(source)
-    child.load()
+    child = loaded(source)
     with pytest.raises(ControllerTimeout, match="policy"):
         child.policy(OBS, timeout=0.3)
 
 
-def test_a_frame_that_trickles_in_is_a_timeout(launch):
+def test_a_frame_that_trickles_in_is_a_timeout(loaded):
     source = (
         "import os, struct, time\n"
         "def policy(obs):\n"
@@ -435,8 +419,7 @@ def test_a_frame_that_trickles_in_is_a_timeout(launch):
         "        data = data[1:]\n"
         "        time.sleep(0.01)\n"
     )
-    child = launch(source)
-    child.load()
+    child = loaded(source)
     with pytest.raises(ControllerTimeout, match="policy"):
         child.policy(OBS, timeout=0.4)
 

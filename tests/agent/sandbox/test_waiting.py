@@ -36,12 +36,11 @@ LIMITS = Limits(call_seconds=1.0, import_seconds=60.0, start_seconds=60.0)
 
 
 @pytest.fixture
-def crowded(launch, crowd, tier):
+def crowded(loaded, crowd, tier):
     """Starts children on the crowded CPU."""
 
     def start(source):
-        child = launch(source, tier=tier, limits=LIMITS)
-        child.load()
+        child = loaded(source, tier=tier, limits=LIMITS)
         os.sched_setaffinity(child.controller_pid, {crowd})
         return child
 

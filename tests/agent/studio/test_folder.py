@@ -7,20 +7,28 @@ import zipfile
 
 import numpy as np
 import pytest
+from changed_run import change_run
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import append_record
-from tdac_agent.studio.deployable import deployable
-from tdac_agent.studio.folder import STATE, as_word, keep, lines_in, made_within, within
+from tdac_agent.studio.folder import (
+    STATE,
+    as_word,
+    deployable,
+    keep,
+    lines_in,
+    made_within,
+    within,
+)
 from tdac_agent.studio.jobs import start
 from tdac_agent.studio.pages.questions import asked_for
 from tdac_agent.studio.pages.worlds import policies_in
+from tdac_agent.studio.run_status import episodes_driven
 from tdac_agent.studio.serve import opened_port
 from tdac_agent.studio.sources import sources_in
-from tdac_agent.studio.standing import episodes_driven
 
 
 @pytest.fixture
@@ -108,9 +116,8 @@ def test_a_journal_with_other_types(tmp_path):
     """Counts that are none are left out."""
     folder = tmp_path / "run"
     shutil.copytree(DEMO, folder)
-    run = load_run(folder).model_copy(update={"episodes": 40})
-    (folder / "run.json").write_text(run.model_dump_json())
+    change_run(folder, episodes=40)
     for driven in ("x", None, [1], True, 3):
         record = {"event": "drive.end", "what": "feedback", "driven": driven}
         append_record(folder / "journal.jsonl", record)
-    assert episodes_driven(folder) == "3 of at most 40 episodes driven"
+    assert episodes_driven(load_run(folder)) == "3 of at most 40 episodes driven"

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from datetime import UTC, datetime
 
 import pytest
 
@@ -12,8 +11,16 @@ pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
 from tdac_agent.studio import jobs as module
 from tdac_agent.studio.folder import STATE
-from tdac_agent.studio.job_file import JobFile, read_job, write_job
-from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
+from tdac_agent.studio.jobs import (
+    JobFile,
+    StudioJob,
+    free_folder,
+    job_of,
+    jobs,
+    read_job,
+    start,
+    write_job,
+)
 from tdac_agent.studio.pages.bench import bench_job, bench_words, progress_of
 
 WORDS = ["bench", "builtin", "--set", "known", "-n", "10"]
@@ -150,7 +157,7 @@ def test_a_forged_job_stops_nobody(tmp_path, victim):
     job = start(tmp_path, ["runs", "."], "x")
     mark = json.loads((job.folder / "job.json").read_text())["mark"]
     put(tmp_path, {**facts, "mark": mark}, "00009")
-    forged = [each for each in jobs(tmp_path) if each.pid == victim.pid]
+    forged = [each for each in jobs(tmp_path) if each.file.pid == victim.pid]
     assert [each.ours for each in forged] == [False, False]
     for each in forged:
         each.stop()
@@ -171,11 +178,10 @@ def test_no_group_but_that_of_a_job_is_interrupted(tmp_path, monkeypatch, pid):
     monkeypatch.setattr(os, "killpg", lambda *told: sent.append(told))
     named = {"own": os.getpgrp(), "parent's": os.getppid()}
     number = named.get(pid, pid)
-    now = datetime.now(UTC)
     if pid == "parent's" and os.getpgid(number) == number != os.getpgrp():
         pytest.skip("the parent leads a group, as a job does")
-    job = Job(tmp_path, ("x",), now, number, module._born(number), "x", ours=True)
-    job.stop()
+    facts = {**FACTS, "pid": number, "born": module._born(number)}
+    StudioJob(tmp_path, JobFile.model_construct(**facts), ours=True).stop()
     assert sent == []
 
 
@@ -215,7 +221,7 @@ def test_a_job_of_another_folder_is_not_ours(tmp_path, way):
 def test_a_job_is_ours_in_a_later_studio(tmp_path):
     """As long as it is where it was begun; the same words start it but once."""
     job = start(tmp_path, ["runs", "."], "x")
-    module._KNOWN.clear()
+    module._read.cache_clear()
     assert job_of(tmp_path, "x") == job
     assert job.ours
     wait(job)

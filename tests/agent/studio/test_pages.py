@@ -1,5 +1,6 @@
 """The pages in a real browser, as a user without the command line sees them."""
 
+import contextlib
 import json
 import re
 import shutil
@@ -90,6 +91,28 @@ def click_map(browser, x, y, size):
     ActionChains(browser).move_to_element_with_offset(image, *over).click().perform()
 
 
+def type_in(browser, name, value):
+    """Replaces the number in a field."""
+    field = number(browser, name)
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys(str(value), Keys.TAB)
+
+
+@contextlib.contextmanager
+def framed(browser):
+    """Looks into the report that the page shows."""
+    wait(browser, lambda b: b.find_elements(By.CSS_SELECTOR, "iframe.report"))
+    browser.switch_to.frame(browser.find_element(By.CSS_SELECTOR, "iframe.report"))
+    yield
+    browser.switch_to.default_content()
+
+
+def begin(browser):
+    """Starts the run, and waits for its page."""
+    press(browser, "Write and verify a controller")
+    wait(browser, lambda b: "/run?" in b.current_url)
+
+
 def number(browser, name):
     return browser.find_element(By.CSS_SELECTOR, f"input[aria-label='{name}']")
 
@@ -128,15 +151,13 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     ActionChains(page).double_click(page.find_element(By.XPATH, button)).perform()
     wait(page, lambda b: "/run?" in b.current_url)
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
-    begun = [job.about for job in jobs(studio.place)]
+    begun = [job.file.about for job in jobs(studio.place)]
     assert [about for about in begun if "plan" in about] == ["runs/plan-1"]
     assert "not begun here" not in text_of(page)
-    frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
-    page.switch_to.frame(frame)
-    says(page, "all tests passed" if "all tests" in text_of(page) else "verified")
-    clock = page.find_element(By.CSS_SELECTOR, ".player .clock")
-    wait(page, lambda b: "reached" in clock.text)
-    page.switch_to.default_content()
+    with framed(page):
+        says(page, "all tests passed" if "all tests" in text_of(page) else "verified")
+        clock = page.find_element(By.CSS_SELECTOR, ".player .clock")
+        wait(page, lambda b: "reached" in clock.text)
     run = json.loads((studio.place / "runs/plan-1/run.json").read_text())
     assert run["status"] == "verified"
 
@@ -176,11 +197,9 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     says(page, "The controller is blind.py.")
     press(page, "Write and verify a controller")
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
-    frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
-    page.switch_to.frame(frame)
-    wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "a.cell")) > 1)
-    assert page.find_elements(By.CSS_SELECTOR, "a.cell.failed")
-    page.switch_to.default_content()
+    with framed(page):
+        wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "a.cell")) > 1)
+        assert page.find_elements(By.CSS_SELECTOR, "a.cell.failed")
     says(page, "The verified controller is another one, by the built-in template.")
 
 
@@ -223,9 +242,7 @@ def test_the_keyboard_alone(page, plan):
     says(page, "Click the start")
     places = {"start x": 60, "start y": 60, "goal x": 340, "goal y": 250}
     for name, value in places.items():
-        field = number(page, name)
-        field.send_keys(Keys.CONTROL, "a")
-        field.send_keys(str(value), Keys.TAB)
+        type_in(page, name, value)
         time.sleep(0.2)
     says(page, "A path of")
     for _ in range(40):
@@ -254,18 +271,15 @@ def test_the_form_of_a_bench_shows_its_command(page, studio):
     wait(page, lambda b: b.find_element(By.LINK_TEXT, "runs/bench-made")).click()
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
     assert page.find_element(By.CSS_SELECTOR, "header a[href='/runs']").is_displayed()
-    page.switch_to.frame(page.find_element(By.CSS_SELECTOR, "iframe.report"))
-    says(page, "Who is better")
-    page.switch_to.default_content()
+    with framed(page):
+        says(page, "Who is better")
     shutil.rmtree(made)
 
 
 @pytest.mark.slow
 def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
     page.get(f"{studio.base}/benches")
-    field = number(page, "worlds of each set")
-    field.send_keys(Keys.CONTROL, "a")
-    field.send_keys("2")
+    type_in(page, "worlds of each set", 2)
     says(page, "--split test -n 2")
     press(page, "Start the bench")
     says(page, "of 4 episodes driven")
@@ -274,10 +288,8 @@ def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
     wait(page, lambda b: b.find_element(By.LINK_TEXT, "runs/bench-1"))
     page.get(address)
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.finished"))
-    frame = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "iframe.report"))
-    page.switch_to.frame(frame)
-    says(page, "2 entrants on unknown")
-    page.switch_to.default_content()
+    with framed(page):
+        says(page, "2 entrants on unknown")
     found = json.loads((studio.place / "runs/bench-1/bench.json").read_text())
     assert found["entrants"] == ["builtin", "follow-the-gap"]
 
@@ -286,9 +298,7 @@ def test_a_bench_goes_on_while_its_page_is_closed(page, studio):
 def test_a_bench_is_stopped_and_continued(page, studio):
     """It goes on with the next episode: what was driven before is kept."""
     page.get(f"{studio.base}/benches")
-    field = number(page, "worlds of each set")
-    field.send_keys(Keys.CONTROL, "a")
-    field.send_keys("6")
+    type_in(page, "worlds of each set", 6)
     says(page, "--split test -n 6")
     press(page, "Start the bench")
     wait(page, lambda b: re.search(r"\b[1-5] of 12 episodes driven", text_of(b)))
@@ -335,9 +345,7 @@ def test_a_controller_for_a_set_of_worlds(page, studio):
     assert "without movers" not in text_of(page)
     press(page, "Write a controller for the whole set …")
     says(page, "tdac synth --set unknown --episodes 128")
-    field = number(page, "episodes at most")
-    field.send_keys(Keys.CONTROL, "a")
-    field.send_keys("4")
+    type_in(page, "episodes at most", 4)
     wait(page, lambda b: "--episodes 4\n" in text_of(b))
     press(page, "Write it")
     wait(page, lambda b: "/run?" in b.current_url)
@@ -396,9 +404,9 @@ def test_a_map_and_what_was_found_are_in_sight(page, studio, tmp_path):
         says(page, "are not connected")
         height = SIZES[name][1]
         page.execute_script("scrollTo(0, 0)")
-        board = page.find_element(By.CSS_SELECTOR, ".board").rect
-        assert board["width"] > 100
-        assert board["y"] + board["height"] < height
+        view = page.find_element(By.CSS_SELECTOR, ".board").rect
+        assert view["width"] > 100
+        assert view["y"] + view["height"] < height
         found = page.find_element(By.CSS_SELECTOR, ".found").rect
         assert found["y"] + found["height"] <= height
     resize(page, "desktop")
@@ -420,8 +428,7 @@ def test_nothing_is_cut_off(page, studio, size):
 def test_a_killed_server_kills_no_run(browser, page, studio, plan):
     """Another one in the same folder finds the run again."""
     open_plan(page, plan)
-    press(page, "Write and verify a controller")
-    wait(page, lambda b: "/run?" in b.current_url)
+    begin(page)
     at = page.current_url.partition("?at=")[2]
     base = studio.base
     studio.kill()

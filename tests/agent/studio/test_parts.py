@@ -14,8 +14,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from changed_run import change_run
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
+
+from nicegui import Client
+from nicegui.page import page
 
 import tdac_agent
 from tdac_agent.cli.flags import TaskFlags
@@ -24,31 +28,53 @@ from tdac_agent.runs.ownership import sign
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import append_record
-from tdac_agent.studio.board import board_of, names_of
 from tdac_agent.studio.comparison import (
     difference,
     figures_of,
     lines_of,
     settings_of,
 )
-from tdac_agent.studio.deployable import deployable
-from tdac_agent.studio.draft import Checked, Draft, check
-from tdac_agent.studio.driving import Drive
-from tdac_agent.studio.findings import fitting_radius, sentence_of
-from tdac_agent.studio.jobs import Job, free_folder, job_of, jobs, start
+from tdac_agent.studio.draft import (
+    Checked,
+    TaskDraft,
+    check,
+    fitting_radius,
+    sentence_of,
+)
+from tdac_agent.studio.driving import KeyboardDrive
+from tdac_agent.studio.folder import deployable
+from tdac_agent.studio.jobs import JobFile, StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
 from tdac_agent.studio.pages.questions import KINDS, asked_for
-from tdac_agent.studio.pages.shelf import unpack
-from tdac_agent.studio.standing import (
-    about_given,
+from tdac_agent.studio.pages.run_list import unpack
+from tdac_agent.studio.pages.writers import Writers
+from tdac_agent.studio.run_status import (
     asked_by,
     episodes_driven,
     from_elsewhere,
+    initial_controller_text,
     last_step,
 )
+from tdac_agent.studio.source_view import names_of, view_of
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 SECONDS = 120
+
+
+def test_a_local_model_needs_neither_key_nor_limit(monkeypatch):
+    """What is missing is said as the command would; the limit is for paid models."""
+    for name in ("OPENAI_API_KEY", "OPENAI_BASE_URL"):
+        monkeypatch.delenv(name, raising=False)
+    with Client(page("/")):
+        writers = Writers(Path(), lambda: None)
+        writers._who.value, writers._model.value = "openai", "qwen3"
+        assert "set the environment variable OPENAI_API_KEY" in writers.problem()
+        assert writers.words()[2:] == ["--max-cost", "2"]
+        writers._server.value = "http://localhost:11434/v1"
+        assert writers.problem() is None
+        assert writers.words()[2:] == ["--base-url", "http://localhost:11434/v1"]
+        writers._server.value = "http://["
+        assert "is not a valid URL" in writers.problem()
 
 
 def flags_of(words):
@@ -70,42 +96,42 @@ def flags_of(words):
 @pytest.mark.parametrize(("kind", "source"), [("map", "office"), ("world", "maze")])
 def test_a_draft_is_the_task_of_its_command(kind, source, tmp_path):
     """What the page checks is what the shown command does."""
-    board = board_of(kind, source)
-    draft = Draft.of(board, source)
-    checked = check(draft, board, tmp_path)
+    view = view_of(kind, source)
+    draft = TaskDraft.of(view, source)
+    checked = check(draft, view, tmp_path)
     assert checked.problem == ""
     assert flags_of(draft.words()).load().sha256() == checked.task.sha256()
-    assert checked.narrowest.width > 2.0 * (board.radius or BODY_RADIUS)
+    assert checked.narrowest.width > 2.0 * (view.radius or BODY_RADIUS)
 
 
 @pytest.mark.parametrize("kind", ["map", "world"])
 def test_clicks_lead_back_to_places(kind):
     for name in names_of(kind):
-        board = board_of(kind, name)
-        assert board.goal is not None
-        ((x, y),) = board.at([board.goal]).tolist()
-        assert 0 <= x <= board.width
-        assert 0 <= y <= board.height
-        assert board.place(x, y) == pytest.approx(board.goal)
+        view = view_of(kind, name)
+        assert view.goal is not None
+        ((x, y),) = view.at([view.goal]).tolist()
+        assert 0 <= x <= view.width
+        assert 0 <= y <= view.height
+        assert view.place(x, y) == pytest.approx(view.goal)
 
 
 def test_what_cannot_be_driven(tmp_path):
-    board = board_of("map", "maze")
-    draft = Draft.of(board, "maze")
-    wide = check(replace(draft, radius=30.0), board, tmp_path)
+    view = view_of("map", "maze")
+    draft = TaskDraft.of(view, "maze")
+    wide = check(replace(draft, radius=30.0), view, tmp_path)
     assert wide.task is None
     assert "too near" in wide.problem
     assert wide.widest == pytest.approx(20.4, abs=0.2)
-    assert check(replace(draft, radius=wide.widest - 0.5), board, tmp_path).task
-    outside = check(replace(draft, goal=(5.0, 5.0)), board, tmp_path)
+    assert check(replace(draft, radius=wide.widest - 0.5), view, tmp_path).task
+    outside = check(replace(draft, goal=(5.0, 5.0)), view, tmp_path)
     assert "outside of the closed wall" in outside.problem
 
 
 @pytest.mark.parametrize("source", ["maze", "rooms", "street"])
 def test_the_narrowest_passage_limits_the_robot(source, tmp_path):
     """On maps with one way, it and the widest robot that gets through agree."""
-    board = board_of("map", source)
-    checked = check(Draft.of(board, source), board, tmp_path)
+    view = view_of("map", source)
+    checked = check(TaskDraft.of(view, source), view, tmp_path)
     narrowest = checked.narrowest
     assert narrowest.at == "path"
     assert math.dist(*narrowest.ends) == pytest.approx(narrowest.width, rel=1e-3)
@@ -121,28 +147,28 @@ def test_a_path_through_the_narrower_of_two_doors(tmp_path):
     plan[50:90, 190:210] = 255
     plan[170:250, 190:210] = 255
     cv2.imwrite(str(tmp_path / "plan.png"), plan)
-    board = board_of("map", str(tmp_path / "plan.png"))
-    draft = Draft("map", "plan.png", (60.0, 70.0), (340.0, 70.0), 0.0, 15.0)
-    narrow = check(draft, board, tmp_path)
+    view = view_of("map", str(tmp_path / "plan.png"))
+    draft = TaskDraft("map", "plan.png", (60.0, 70.0), (340.0, 70.0), 0.0, 15.0)
+    narrow = check(draft, view, tmp_path)
     assert narrow.narrowest.width == pytest.approx(40.0, abs=0.1)
     assert sorted(y for _, y in narrow.narrowest.ends) == [49.5, 89.5]
     assert narrow.widest == pytest.approx(39.4, abs=0.6)
-    assert "(bar) is 40 px wide; another path has room" in sentence_of(narrow, board)[0]
-    wide = check(replace(draft, radius=25.0), board, tmp_path)
+    assert "(bar) is 40 px wide; another path has room" in sentence_of(narrow, view)[0]
+    wide = check(replace(draft, radius=25.0), view, tmp_path)
     assert wide.narrowest.width == pytest.approx(80.0, abs=0.1)
-    assert "(bar) is 80 px wide: room for a radius of" in sentence_of(wide, board)[0]
+    assert "(bar) is 80 px wide: room for a radius of" in sentence_of(wide, view)[0]
     near = check(
-        replace(draft, start=(25.0, 210.0), goal=(60.0, 210.0)), board, tmp_path
+        replace(draft, start=(25.0, 210.0), goal=(60.0, 210.0)), view, tmp_path
     )
     assert near.narrowest.at == "start"
     assert near.narrowest.width == pytest.approx(2 * 17.5, abs=0.1)
-    assert "narrowest at the start, 17.5 px from a wall" in sentence_of(near, board)[0]
+    assert "narrowest at the start, 17.5 px from a wall" in sentence_of(near, view)[0]
 
 
 def test_a_passage_of_a_world(tmp_path):
     """The bundled corridor has passages of 0.2 m beside its boxes."""
-    board = board_of("world", "corridor")
-    checked = check(Draft.of(board, "corridor"), board, tmp_path)
+    view = view_of("world", "corridor")
+    checked = check(TaskDraft.of(view, "corridor"), view, tmp_path)
     assert checked.narrowest.width == pytest.approx(0.2, abs=1e-3)
 
 
@@ -163,18 +189,18 @@ def test_a_job_is_found_again(tmp_path):
     other = start(tmp_path, ["runs", "missing"], "runs/y")
     wait_for(other)
     assert other.code == 2
-    assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
+    assert [each.file.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
     assert shlex.split(other.command)[0] == "tdac"
     # A damaged record hides no other one.
     (other.folder.with_name("99999")).mkdir()
     (other.folder.with_name("99999") / "job.json").write_text("{")
-    assert [each.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
+    assert [each.file.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
 
 
 def test_a_command_at_work_is_not_started_twice(tmp_path):
     """As by a double click; and its folder is given to no other one."""
     job = start(tmp_path, ["runs", "."], free_folder("demo", tmp_path))
-    assert job.about == "runs/demo-1"
+    assert job.file.about == "runs/demo-1"
     assert start(tmp_path, ["runs", "."], "runs/demo-1") == job
     assert start(tmp_path, ["sets"], "runs/demo-1") != job
     assert free_folder("demo", tmp_path) == "runs/demo-2"
@@ -201,8 +227,8 @@ def test_files_of_one_name_are_told_apart():
 
 def test_a_bench_tells_how_far_it_is(tmp_path):
     words = ("bench", "builtin", "dwa", "--set", "known,lost", "-n", "10")
-    now = datetime.now(UTC)
-    job = Job(tmp_path, words, now, 2, "", "bench-1", ours=True)
+    facts = {"words": words, "started": datetime.now(UTC), "born": "", "about": "b"}
+    job = StudioJob(tmp_path, JobFile(**facts, pid=2), ours=True)
     assert progress_of(job, tmp_path)[0] == 0.0
     for name, file in (
         ("known/a", "episodes.json"),
@@ -251,7 +277,7 @@ def test_a_run_from_elsewhere_is_marked():
     """Such as the recorded run that `tdac demo` replays."""
     folder = Path(tdac_agent.__file__).parent / "runs" / "demo"
     assert load_run(folder).status == "verified"
-    assert "did not begin" in from_elsewhere(folder)
+    assert "did not begin" in from_elsewhere(load_run(folder))
 
 
 def test_a_run_from_elsewhere_always_asks(tmp_path):
@@ -269,7 +295,7 @@ def test_a_run_from_elsewhere_always_asks(tmp_path):
 
 def test_keys_drive(tmp_path):
     """Up drives ahead; left turns to the left, as a person sees it."""
-    drive = Drive.of("unknown", "dev", 0)
+    drive = KeyboardDrive.of("unknown", "dev", 0)
     env = drive._env
     drive.press("ArrowUp", True)
     assert drive.action() == (1.0, 1.0)
@@ -305,7 +331,7 @@ def test_a_controller_is_downloaded_with_what_it_reads(tmp_path):
 )
 def test_a_radius_that_gets_through(widest, radius, fits):
     """A step of the slider below the widest one, if a smaller radius helps."""
-    draft = Draft.of(board_of("map", "maze", None), "maze", None)
+    draft = TaskDraft.of(view_of("map", "maze", None), "maze", None)
     checked = Checked(None, widest=widest)
     assert fitting_radius(replace(draft, radius=radius), checked) == fits
 
@@ -313,12 +339,10 @@ def test_a_radius_that_gets_through(widest, radius, fits):
 def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(DEMO, folder)
-    assert about_given(folder) == ""  # it began with no file
-    run = load_run(folder)
-    given = run.model_copy(update={"given_sha256": "0" * 64, "optimizer": "builtin"})
-    (folder / "run.json").write_text(given.model_dump_json())
+    assert initial_controller_text(load_run(folder)) == ""  # it began with no file
+    run = change_run(folder, given_sha256="0" * 64, optimizer="builtin")
     failed = len(run.attempts[0].failed_tests)
-    text = about_given(folder)
+    text = initial_controller_text(load_run(folder))
     begin = (
         f"Your controller failed {failed} tests: see iteration 1 below. The verified"
     )
@@ -344,12 +368,11 @@ def test_what_differs_between_two_runs(tmp_path):
         (folder / "task.yaml").write_text(f"name: maze\nrobot: {{radius: {radius}}}\n")
         (folder / "controller.py").write_text(f"import math\n\nRADIUS = {radius}\n")
     run = load_run(other)
-    changed = run.model_copy(update={"patience": run.patience + 1, "seconds": 1e4})
-    (other / "run.json").write_text(changed.model_dump_json())
+    change_run(other, patience=run.patience + 1, seconds=1e4)
 
     def differing(values_of):
         lines = lines_of(values_of(one), values_of(other))
-        return {line.name: (line.one, line.other) for line in lines if line.differs}
+        return {name: (one, other) for name, one, other in lines if one != other}
 
     assert differing(figures_of) == {"time": (f"{run.seconds:.1f} s", "10000.0 s")}
     repairs = str(run.patience), str(run.patience + 1)
@@ -384,11 +407,10 @@ def test_the_last_step_of_a_run_is_in_words():
 
 def test_a_run_on_a_set_tells_how_far_it_is(tmp_path):
     """Episodes of the limit alone: those of a comparison at the end are others."""
-    assert episodes_driven(DEMO) == ""  # it is on one task
+    assert episodes_driven(load_run(DEMO)) == ""  # it is on one task
     folder = tmp_path / "run"
     shutil.copytree(DEMO, folder)
-    run = load_run(folder).model_copy(update={"episodes": 40, "improve": 8})
-    (folder / "run.json").write_text(run.model_dump_json())
+    change_run(folder, episodes=40, improve=8)
     for what, driven in (("feedback", 8), ("validation", 5), ("comparison", 30)):
         record = {"event": "drive.end", "what": what, "driven": driven}
         append_record(folder / "journal.jsonl", record)
@@ -396,4 +418,4 @@ def test_a_run_on_a_set_tells_how_far_it_is(tmp_path):
         rows = folder / "iterations/k01/j0" / name / "unfinished/episodes.jsonl"
         rows.parent.mkdir(parents=True)
         rows.write_text("{}\n" * 3)
-    assert episodes_driven(folder) == "16 of at most 48 episodes driven"
+    assert episodes_driven(load_run(folder)) == "16 of at most 48 episodes driven"

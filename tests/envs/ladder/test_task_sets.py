@@ -127,7 +127,7 @@ def test_worlds_that_do_not_exist(arguments, message):
         ({"robot": {"kind": "turtle"}}, r"robot: kind: "),
         (
             {"disturbances": {"wheelslip": 0.1}},
-            r"did you mean 'disturbances.wheel_slip'",
+            r"did you mean 'wheel_slip'",
         ),
         ({"worlds": [{"name": "mazez"}]}, "unknown name 'mazez'; expected one of"),
         ({"movers": "crowd:20"}, "movers: expected a list"),

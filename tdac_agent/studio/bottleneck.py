@@ -23,7 +23,7 @@ SAMPLES, LEAST_STEP = 12, 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
+class Bottleneck:
     """The narrowest passage of a path.
 
     Attributes:
@@ -38,7 +38,7 @@ class Passage:
     at: Literal["path", "start", "goal"]
 
 
-def passage_on(nominal: Any, path: Points) -> Passage | None:
+def bottleneck_on(nominal: Any, path: Points) -> Bottleneck | None:
     """The narrowest passage of a path of a task; None without a path.
 
     Args:
@@ -54,10 +54,10 @@ def passage_on(nominal: Any, path: Points) -> Passage | None:
     else:
         return None
     step = max(radius / SAMPLES, least)
-    return narrowest_passage(path, walls, step) if len(path) > 1 else None
+    return narrowest(path, walls, step) if len(path) > 1 else None
 
 
-def narrowest_passage(path: Points, walls: Points, step: float) -> Passage:
+def narrowest(path: Points, walls: Points, step: float) -> Bottleneck:
     """The narrowest passage of a path between walls.
 
     A gap that the path crosses is also crossed by each path that can be deformed into
@@ -84,7 +84,7 @@ def narrowest_passage(path: Points, walls: Points, step: float) -> Passage:
         left, right = sides
         width = float(np.hypot(*(left - points[i])) + np.hypot(*(right - points[i])))
         if width < best.width:
-            best = Passage(width, (_point(left), _point(right)), "path")
+            best = Bottleneck(width, (_point(left), _point(right)), "path")
     return best
 
 
@@ -109,7 +109,7 @@ def outlines_of(solid: Prisms, between: float) -> Points:
         solid: The parts.
         between: Largest distance between neighbours.
     """
-    found = []
+    points = []
     for part in range(len(solid.extent)):
         outline, radius = solid.outline(part), float(solid.extent[part, ROUND])
         if radius > 0.0:
@@ -118,15 +118,15 @@ def outlines_of(solid: Prisms, between: float) -> Points:
             ring = np.column_stack([np.cos(angles), np.sin(angles)])
             outline = outline[0] + radius * ring
         closed = np.vstack([outline, outline[:1]])
-        found.append(_sampled(closed, between)[0])
-        found.append(outline)
-    return np.concatenate(found)
+        points.append(_sampled(closed, between)[0])
+        points.append(outline)
+    return np.concatenate(points)
 
 
-def _at_end(tree: Any, end: Points, name: Literal["start", "goal"]) -> Passage:
+def _at_end(tree: Any, end: Points, name: Literal["start", "goal"]) -> Bottleneck:
     """The room at an end of the path."""
     near, index = tree.query(end)
-    return Passage(2.0 * float(near), (_point(end), _point(tree.data[index])), name)
+    return Bottleneck(2.0 * float(near), (_point(end), _point(tree.data[index])), name)
 
 
 def _sampled(path: Points, step: float) -> tuple[Points, NDArray[np.int64]]:
@@ -154,14 +154,14 @@ def _nearest_on_sides(
     """
     begins, ends = np.delete(path[:-1], leg, 0), np.delete(path[1:], leg, 0)
     side = _cross(path[leg + 1] - path[leg], walls - point)
-    found = []
+    points = []
     for here in (side > 0, side < 0):
         own = walls[here][np.argsort(np.hypot(*(walls[here] - point).T))]
         seen = np.flatnonzero(~_crosses(point, own, begins, ends))
         if not seen.size:
             return None
-        found.append(own[seen[0]])
-    return found[0], found[1]
+        points.append(own[seen[0]])
+    return points[0], points[1]
 
 
 def _crosses(point: Points, to: Points, begins: Points, ends: Points) -> Any:

@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
-from tdac_agent.studio.gate import LASTING, Gate
 from tdac_agent.studio.serve import opened_port
+from tdac_agent.studio.session import LASTING, SessionCheck
 
 
 @pytest.fixture
@@ -100,22 +100,22 @@ def test_files_outside_of_the_folder(studio, ask, cookie):
 
 
 def test_a_cookie_is_good_for_a_week_and_for_one_folder(tmp_path, monkeypatch):
-    """Also after a restart: the gate of another process accepts it."""
+    """Also after a restart: the check of another process accepts it."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    gate = Gate(None, 8501, tmp_path)
+    session = SessionCheck(None, 8501, tmp_path)
     now = int(time.time())
 
     def gets_in(content, port=8501, place=tmp_path):
         headers = {"cookie": f"tdac-studio-{port}={content}"}
-        return Gate(None, port, place)._has_session(headers)
+        return SessionCheck(None, port, place)._has_session(headers)
 
-    assert gets_in(gate._session(now))
-    assert gets_in(gate._session(now - LASTING + 60))
-    assert not gets_in(gate._session(now - LASTING - 60))
-    assert not gets_in(gate._session(now + 60))
-    assert not gets_in(gate._session(now), port=8502)
-    assert not gets_in(gate._session(now), place=tmp_path / "other")
-    mac = gate._session(now).partition(".")[2]
+    assert gets_in(session._session(now))
+    assert gets_in(session._session(now - LASTING + 60))
+    assert not gets_in(session._session(now - LASTING - 60))
+    assert not gets_in(session._session(now + 60))
+    assert not gets_in(session._session(now), port=8502)
+    assert not gets_in(session._session(now), place=tmp_path / "other")
+    mac = session._session(now).partition(".")[2]
     for forged in (
         "",
         ".",

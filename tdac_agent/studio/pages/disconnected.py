@@ -25,7 +25,7 @@ FOREIGN = (
 SCRIPT = """<div id="lost" role="alert" hidden></div>
 <script>
 (() => {
-  const said = %s;
+  const texts = %s;
   const box = document.getElementById("lost");
   const show = (text) => {
     if (box.textContent !== text) box.textContent = text;
@@ -34,11 +34,11 @@ SCRIPT = """<div id="lost" role="alert" hidden></div>
   const look = async () => {
     let lost = true;
     try {
-      const answer = await fetch(said.alive, { signal: AbortSignal.timeout(5000) });
-      if (!answer.ok) show(said.foreign);
-      else if ((await answer.text()) !== said.instance) return location.reload();
+      const answer = await fetch(texts.alive, { signal: AbortSignal.timeout(5000) });
+      if (!answer.ok) show(texts.foreign);
+      else if ((await answer.text()) !== texts.instance) return location.reload();
       else { show(""); lost = false; }
-    } catch { show(said.ended); }
+    } catch { show(texts.ended); }
     setTimeout(look, lost ? 1000 : 3000);
   };
   setTimeout(look, 3000);
@@ -53,13 +53,13 @@ def add(application: fastapi.FastAPI, place: Path) -> None:
         application: Gets an address by which pages know that the server is there.
         place: Folder of the studio.
     """
-    said = {
+    texts = {
         "alive": ALIVE,
         "instance": INSTANCE,
         "ended": ENDED.format(shlex.quote(str(place))),
         "foreign": FOREIGN,
     }
-    script = SCRIPT % json.dumps(said).replace("<", "\\u003c")
+    script = SCRIPT % json.dumps(texts).replace("<", "\\u003c")
     ui.add_body_html(script, shared=True)
 
     @application.get(ALIVE)

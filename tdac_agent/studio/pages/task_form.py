@@ -7,16 +7,21 @@ from dataclasses import replace
 
 from nicegui import ui
 
-from tdac_agent.studio.board import Board
-from tdac_agent.studio.draft import Checked, Draft
-from tdac_agent.studio.findings import LEAST_RADIUS, RADIUS_STEP, fitting_radius
+from tdac_agent.studio.draft import (
+    LEAST_RADIUS,
+    RADIUS_STEP,
+    Checked,
+    TaskDraft,
+    fitting_radius,
+)
+from tdac_agent.studio.source_view import SourceView
 
 NAMES = "start x", "start y", "heading, rad", "goal x", "goal y"
 RADIUS = 15.0
 """Of the robot on a map that names none, px."""
 
 
-class Places:
+class TaskForm:
     """The numbers of a draft, what was found about it, and help if it is refused.
 
     Args:
@@ -48,14 +53,14 @@ class Places:
                 min=LEAST_RADIUS, max=40, step=RADIUS_STEP, value=RADIUS
             ).props("label aria-label='robot radius, px'")
             self._radius.on("change", resized)
-        self._told = ui.label().classes("found text-sm").props("role=status")
+        self._verdict = ui.label().classes("found text-sm").props("role=status")
         self._snap = ui.button("Use the nearest free place", on_click=snap).props(
             "outline no-caps dense"
         )
         self._fit = ui.button(on_click=fit).props("outline no-caps dense")
         self._snap.visible = self._fit.visible = False
 
-    def written(self, draft: Draft) -> Draft:
+    def written(self, draft: TaskDraft) -> TaskDraft:
         """A draft with the numbers of the page."""
         x, y, heading, goal_x, goal_y = (self._numbers[name].value for name in NAMES)
         start = None if x is None or y is None else (x, y)
@@ -67,7 +72,7 @@ class Places:
         """Where the slider is, px."""
         return float(self._radius.value)
 
-    def show(self, draft: Draft) -> None:
+    def show(self, draft: TaskDraft) -> None:
         """Shows the numbers of a draft."""
         places = (*(draft.start or (None, None)), draft.heading)
         shown = (*places, *(draft.goal or (None, None)))
@@ -76,11 +81,13 @@ class Places:
         self._sized.visible = draft.kind == "map"
         self._radius.value = draft.radius or RADIUS
 
-    def show_checked(self, draft: Draft, checked: Checked | None, board: Board) -> None:
+    def show_checked(
+        self, draft: TaskDraft, checked: Checked | None, view: SourceView
+    ) -> None:
         """Shows the widest radius, and what helps if the draft is refused."""
         stuck = checked is not None and checked.task is None
         fitting = fitting_radius(draft, checked) if stuck else None
-        self._snap.visible = stuck and board.kind == "map" and fitting is None
+        self._snap.visible = stuck and view.kind == "map" and fitting is None
         self._fit.visible = fitting is not None
         if fitting is not None:
             self._fit.text = f"Use a radius of {fitting:g} px"
@@ -99,7 +106,7 @@ class Places:
 
     def tell(self, text: str, good: bool) -> None:
         """Shows a sentence in its colour."""
-        self._told.text = text
-        self._told.classes(
+        self._verdict.text = text
+        self._verdict.classes(
             add="fine" if good else "problem", remove="problem" if good else "fine"
         )

@@ -36,7 +36,7 @@ SHARE = 0.75
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Board:
+class SourceView:
     """A picture, and the conversion between its pixels and places.
 
     Attributes:
@@ -45,9 +45,8 @@ class Board:
         width: Its width, px.
         height: Its height, px.
         unit: Unit of places, `px` or `m`.
-        scale: Picture px per unit.
-        place: Place at a point of the picture.
-        at: Points of the picture for places, shape (n, 2).
+        scale: Picture px per unit, in x and in y.
+        origin: Point of the picture for the place (0, 0).
         reading: How it was read, in a sentence.
         notes: What the reader is to know.
         start: Where the robot of the file starts, with its heading, if it says so.
@@ -64,9 +63,8 @@ class Board:
     width: int
     height: int
     unit: str
-    scale: float
-    place: Callable[[float, float], Place]
-    at: Callable[[ArrayLike], NDArray[np.float64]]
+    scale: tuple[float, float]
+    origin: tuple[float, float]
     reading: str
     notes: tuple[str, ...] = ()
     start: tuple[float, float, float] | None = None
@@ -75,14 +73,23 @@ class Board:
     widest: Callable[[Place, Place], float] | None = None
     laid_over: Callable[[BoolGrid], bytes] | None = None
 
+    def at(self, places: ArrayLike) -> NDArray[np.float64]:
+        """Points of the picture for places, shape (n, 2)."""
+        return np.asarray(places, np.float64).reshape(-1, 2) * self.scale + self.origin
+
+    def place(self, x: float, y: float) -> Place:
+        """The place at a point of the picture."""
+        over, down = np.subtract((x, y), self.origin) / self.scale
+        return float(over), float(down)
+
 
 def names_of(kind: Kind) -> tuple[str, ...]:
     """Names of the bundled maps or worlds."""
     return tuple(bundled_maps() if kind == "map" else bundled_worlds())
 
 
-def board_of(kind: Kind, source: str, polarity: str | None = None) -> Board:
-    """The board of a bundled map or world, or of a file.
+def view_of(kind: Kind, source: str, polarity: str | None = None) -> SourceView:
+    """The view of a bundled map or world, or of a file.
 
     Args:
         kind: Which of them.
@@ -110,7 +117,7 @@ def as_it_is(source: str) -> bytes:
     return png(_laid_over(image, none, _zoom(none)))
 
 
-def _of_map(source: str, polarity: str | None) -> Board:
+def _of_map(source: str, polarity: str | None) -> SourceView:
     bundled = bundled_map(source) if source in bundled_maps() else None
     image = load_image(bundled.image if bundled else Path(source))
     said = ReadingOptions(None if image.occupied is not None else polarity, None)  # type: ignore[arg-type]
@@ -123,27 +130,20 @@ def _of_map(source: str, polarity: str | None) -> Board:
     def laid_over(cells: BoolGrid) -> bytes:
         return png(_laid_over(image, cells, zoom))
 
-    def place(x: float, y: float) -> Place:
-        return x / zoom - 0.5, y / zoom - 0.5
-
-    def at(points: ArrayLike) -> NDArray[np.float64]:
-        return (np.asarray(points, np.float64).reshape(-1, 2) + 0.5) * zoom
-
     def widest(start: Place, goal: Place) -> float:
         ends = [_pixel(grid.cells, each) for each in (start, goal)]
         return float(widest_radius(clearance(grid.cells), *ends))
 
     size = f"{params.width} x {params.height} px"
     text = f"{size}: {obstacles_text(params)}; {scale_text(params.resolution)}"
-    return Board(
+    return SourceView(
         "map",
         png(picture),
         picture.shape[1],
         picture.shape[0],
         "px",
-        zoom,
-        place,
-        at,
+        (zoom, zoom),
+        (0.5 * zoom, 0.5 * zoom),
         text,
         tuple(params.notes),
         (*bundled.start, bundled.heading) if bundled else None,
@@ -154,7 +154,7 @@ def _of_map(source: str, polarity: str | None) -> Board:
     )
 
 
-def _of_world(source: str) -> Board:
+def _of_world(source: str) -> SourceView:
     world = load_world(world_file(source))
     view = View(bounds_of(world), strip=0)
     draw_things(view, world, bodies(world))
@@ -167,23 +167,17 @@ def _of_world(source: str) -> Board:
             "unless they are ignored"
         )
     robot = next(iter(world.robots), None)
-
-    def place(x: float, y: float) -> Place:
-        return view.place(x - 0.5, y - 0.5)
-
-    def at(points: ArrayLike) -> NDArray[np.float64]:
-        return view.at(points) + 0.5
+    ((left, low),) = (view.at([0.0, 0.0]) + 0.5).tolist()
 
     text = f"Webots {world.version}: {len(world.obstacles)} obstacles; places in metres"
-    return Board(
+    return SourceView(
         "world",
         png(picture),
         picture.shape[1],
         picture.shape[0],
         "m",
-        view.scale,
-        place,
-        at,
+        (view.scale, -view.scale),
+        (left, low),
         text,
         tuple(notes),
         (robot.x, robot.y, robot.heading) if robot else None,

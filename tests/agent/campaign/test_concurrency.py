@@ -7,7 +7,12 @@ import threading
 
 import pytest
 
-from tdac_agent.campaign.gate import FIRST, Gate, Gated, gated
+from tdac_agent.campaign.concurrency import (
+    FIRST,
+    ConcurrencyLimit,
+    LimitedProvider,
+    limited_provider,
+)
 from tdac_agent.models.provider import RateLimited, Reply, Request
 from tdac_agent.models.retry import RetryPolicy, answer
 
@@ -46,32 +51,32 @@ def yielding(_seconds):
     os.sched_yield()
 
 
-def test_places_grow_by_one_a_round_and_are_halved_by_a_rate_limit(tmp_path):
-    """n answers at n places make n + 1 of them, about; never more than there may be."""
-    gate = Gate(tmp_path, most=12)
-    assert gate.places == FIRST
+def test_slots_grow_by_one_a_round_and_are_halved_by_a_rate_limit(tmp_path):
+    """n answers at n slots make n + 1 of them, about; never more than there may be."""
+    limit = ConcurrencyLimit(tmp_path, most=12)
+    assert limit.slots == FIRST
     for _ in range(int(FIRST)):
-        gate.answered()
-    assert FIRST + 0.9 < gate.places <= FIRST + 1.0
+        limit.answered()
+    assert FIRST + 0.9 < limit.slots <= FIRST + 1.0
     for _ in range(200):
-        gate.answered()
-    assert gate.places == 12
-    with gate.place() as asked_at:
-        gate.limited(asked_at)
-    assert gate.places == 6
+        limit.answered()
+    assert limit.slots == 12
+    with limit.slot() as asked_at:
+        limit.limited(asked_at)
+    assert limit.slots == 6
     for _ in range(9):
-        with gate.place() as asked_at:
-            gate.limited(asked_at)
-    assert gate.places == 1
+        with limit.slot() as asked_at:
+            limit.limited(asked_at)
+    assert limit.slots == 1
 
 
 def test_a_wave_of_rate_limits_counts_once(tmp_path):
-    """Questions that were asked before the places were cut say nothing about them."""
-    gate = Gate(tmp_path, most=8)
-    with gate.place() as first, gate.place() as second, gate.place() as third:
+    """Questions that were asked before the slots were cut say nothing about them."""
+    limit = ConcurrencyLimit(tmp_path, most=8)
+    with limit.slot() as first, limit.slot() as second, limit.slot() as third:
         for asked_at in (first, second, third):
-            gate.limited(asked_at)
-    assert gate.places == 4
+            limit.limited(asked_at)
+    assert limit.slots == 4
 
 
 @pytest.mark.slow
@@ -82,8 +87,10 @@ def test_workers_share_what_the_server_bears(tmp_path):
     server, done = Server(4), []
 
     def work():
-        # Each worker has a gate of its own, as processes have.
-        model = Gated(server, Gate(tmp_path, most=16, sleep=yielding))
+        # Each worker has a limit of its own, as processes have.
+        model = LimitedProvider(
+            server, ConcurrencyLimit(tmp_path, most=16, sleep=yielding)
+        )
         policy = RetryPolicy(first_wait=0.0)
         done.extend(
             answer(model.complete, ASKED, policy, lambda miss: None, yielding)
@@ -101,12 +108,16 @@ def test_workers_share_what_the_server_bears(tmp_path):
 
 
 @pytest.mark.slow
-def test_who_is_killed_has_let_go_of_its_place(tmp_path):
-    gate = Gate(tmp_path, most=1, sleep=lambda _: pytest.fail("there is no place"))
+def test_who_is_killed_has_let_go_of_its_slot(tmp_path):
+    limit = ConcurrencyLimit(
+        tmp_path, most=1, sleep=lambda _: pytest.fail("there is no slot")
+    )
     hold = (
-        "import sys; from pathlib import Path; from tdac_agent.campaign.gate import "
-        "Gate\nwith Gate(Path(sys.argv[1]), 1).place():\n print('has', flush=True)\n "
-        "sys.stdin.read()"
+        "import sys; from pathlib import Path\n"
+        "from tdac_agent.campaign.concurrency import ConcurrencyLimit\n"
+        "with ConcurrencyLimit(Path(sys.argv[1]), 1).slot():\n"
+        "    print('has', flush=True)\n"
+        "    sys.stdin.read()"
     )
     with subprocess.Popen(
         [sys.executable, "-c", hold, str(tmp_path)],
@@ -114,23 +125,23 @@ def test_who_is_killed_has_let_go_of_its_place(tmp_path):
         stdout=subprocess.PIPE,
     ) as other:
         assert other.stdout.readline() == b"has\n"
-        assert gate._free() is None
+        assert limit._free() is None
         other.kill()
         other.wait()
-        with gate.place():
+        with limit.slot():
             pass
 
 
-def test_a_free_model_has_no_gate(tmp_path):
+def test_a_free_model_has_no_limit(tmp_path):
     class Free(Server):
         paid = False
 
     model = Free(1)
-    assert gated(model, tmp_path, 4) is model
-    assert gated(Server(1), tmp_path, 4).name == "openai:some"
+    assert limited_provider(model, tmp_path, 4) is model
+    assert limited_provider(Server(1), tmp_path, 4).name == "openai:some"
 
 
 def test_a_torn_state_begins_anew(tmp_path):
-    gate = Gate(tmp_path, most=99)
+    limit = ConcurrencyLimit(tmp_path, most=99)
     (tmp_path / "state.json").write_text("{")
-    assert gate.places == FIRST
+    assert limit.slots == FIRST

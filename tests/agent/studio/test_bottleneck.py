@@ -6,9 +6,9 @@ import pytest
 
 pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
-from tdac_agent.studio.board import board_of
-from tdac_agent.studio.draft import Draft, check
-from tdac_agent.studio.passage import corners_of
+from tdac_agent.studio.bottleneck import corners_of
+from tdac_agent.studio.draft import TaskDraft, check
+from tdac_agent.studio.source_view import view_of
 
 
 def blocks(random):
@@ -55,10 +55,10 @@ def test_it_is_the_smallest_gap_that_the_path_crosses(tmp_path):
     random, places = np.random.default_rng(0), []
     while len(places) < 8:
         cv2.imwrite(str(tmp_path / "map.png"), blocks(random))
-        board = board_of("map", str(tmp_path / "map.png"), "dark")
+        view = view_of("map", str(tmp_path / "map.png"), "dark")
         start, goal = random.integers(5, 65, (2, 2)).astype(float).tolist()
-        draft = Draft("map", "map.png", tuple(start), tuple(goal), 0.0, 2.0, "dark")
-        checked = check(draft, board, tmp_path)
+        draft = TaskDraft("map", "map.png", tuple(start), tuple(goal), 0.0, 2.0, "dark")
+        checked = check(draft, view, tmp_path)
         if checked.task is None:  # start or goal is in a block
             continue
         places.append(checked.narrowest.at)

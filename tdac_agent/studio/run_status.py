@@ -1,4 +1,4 @@
-"""Where a run stands, in words."""
+"""The state of a run, in words."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SELECTED = (
 
 
 def progress_of(row: dict[str, Any], running: bool) -> str:
-    """One line about where a run stands.
+    """The state of a run on one line.
 
     Args:
         row: Its row of the list of runs; empty if it has not begun.
@@ -59,26 +59,29 @@ def last_step(output: str) -> str:
     last = output.strip().splitlines()[-1:]
     if last and last[0].startswith(NOTE):
         return last[0].removeprefix(NOTE)
-    found = re.findall(r"^ *([^\w\s])? *k=(\d+) j=(\d+) +(\S.*)$", output, re.MULTILINE)
-    if not found:
+    steps = re.findall(r"^ *([^\w\s])? *k=(\d+) j=(\d+) +(\S.*)$", output, re.MULTILINE)
+    if not steps:
         return ""
-    mark, k, j, text = found[-1]
+    mark, k, j, text = steps[-1]
     text = re.sub(r"\S+\.py::", "", text.strip())
     return f"{mark} {candidate_name(int(k), int(j))}: {text}".strip()
 
 
-def episodes_driven(folder: Path) -> str:
-    """How far a run on a task set is; empty for a run on one task.
-
-    Args:
-        folder: Its folder.
-    """
+def readable_run(folder: Path) -> Run | None:
+    """A run; None if it cannot be read."""
     try:
-        run = load_run(folder)
-        records = read_records(folder / JOURNAL)
+        return load_run(folder)
     except (TdacError, OSError):
-        return ""
+        return None
+
+
+def episodes_driven(run: Run) -> str:
+    """How far a run on a task set is; empty for a run on one task."""
     if run.episodes is None:
+        return ""
+    try:
+        records = read_records(run.folder / JOURNAL)
+    except (TdacError, OSError):
         return ""
     ended = [each for each in records if each.get("event") == "drive.end"]
     driven = sum(
@@ -86,32 +89,20 @@ def episodes_driven(folder: Path) -> str:
         for each in ended
         if each.get("what") in COUNTED and type(each.get("driven")) is int
     )
-    for rows in folder.glob(f"iterations/*/*/*/{UNFINISHED}/{ROWS_FILE}"):
+    for rows in run.folder.glob(f"iterations/*/*/*/{UNFINISHED}/{ROWS_FILE}"):
         if rows.parent.parent.name.startswith(COUNTED):
             driven += lines_in(rows)
     return f"{driven} of at most {run.episodes + run.improve} episodes driven"
 
 
-def candidates_of(folder: Path) -> int:
-    """How many candidates of a run have been tested."""
-    try:
-        return len(load_run(folder).attempts)
-    except (TdacError, OSError):
-        return 0
-
-
-def from_elsewhere(folder: Path) -> str:
+def from_elsewhere(run: Run) -> str:
     """Why a run is not believed to be from here; empty for an own one.
 
     While a run's own files are being written, its mark does not hold yet.
     """
-    at_first = not any((folder / name).is_file() for name in (TASK_FILE, SET_FILE))
-    if at_first and at_work(folder):
-        return ""
-    try:
-        return remark_on(load_run(folder))
-    except (TdacError, OSError):
-        return ""
+    names = (TASK_FILE, SET_FILE)
+    at_first = not any((run.folder / name).is_file() for name in names)
+    return "" if at_first and at_work(run.folder) else remark_on(run)
 
 
 def asked_by(run: Run) -> list[str] | None:
@@ -125,12 +116,8 @@ def asked_by(run: Run) -> list[str] | None:
     return asked
 
 
-def about_given(folder: Path) -> str:
+def initial_controller_text(run: Run) -> str:
     """What came of the controller that the run began with, if it failed."""
-    try:
-        run = load_run(folder)
-    except (TdacError, OSError):
-        return ""
     first = next((each for each in run.attempts if (each.k, each.j) == (1, 0)), None)
     if run.given_sha256 is None or first is None or first.passed:
         return ""

@@ -15,8 +15,8 @@ from tdac_agent.campaign.drive import CONFIG_FILE
 from tdac_agent.library.listing import folders_of, row_of, variations_text
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
-from tdac_agent.studio.folder import within
-from tdac_agent.studio.jobs import Job, jobs
+from tdac_agent.studio.folder import folders_with, within
+from tdac_agent.studio.jobs import StudioJob, jobs
 from tdac_agent.studio.pages.bench import show_benches
 from tdac_agent.studio.pages.layout import (
     address_of,
@@ -24,7 +24,6 @@ from tdac_agent.studio.pages.layout import (
     report_frame,
     shown_first,
 )
-from tdac_agent.studio.sources import folders_with
 from tdac_envs.core.intake import read_zip
 
 NONE = "–"
@@ -62,11 +61,11 @@ def add(place: Path) -> None:
     async def page() -> None:
         with framed("Runs"):
             ui.add_css(f"@media (max-width: 699px) {{ {CARDS} }}")
-            shelf = Shelf(place)
+            run_list = RunList(place)
             _show_upload(place)
             await shown_first()
-            await shelf.look()
-            ui.timer(SECONDS, shelf.look)
+            await run_list.look()
+            ui.timer(SECONDS, run_list.look)
 
     @ui.page("/campaign")
     async def campaign(at: str = "") -> None:
@@ -79,7 +78,7 @@ def add(place: Path) -> None:
             report_frame(at, str(time.time_ns()))
 
 
-class Shelf:
+class RunList:
     """The list of one opened page, and what is at work.
 
     Args:
@@ -90,7 +89,7 @@ class Shelf:
         self._place = place
         self._rows: list[dict[str, Any]] | None = None
         self._table: ui.table | None = None
-        self._others: list[Job] | None = None
+        self._others: list[StudioJob] | None = None
         self._list = ui.column().classes("w-full")
         with self._list:
             ui.label("reading the folder …").classes("note")
@@ -116,10 +115,10 @@ class Shelf:
 
 def rows_in(place: Path) -> list[dict[str, Any]]:
     """A row for each run and training, the newest first."""
-    found = sorted(map(_row, folders_of(place)), key=lambda row: row.get("started", ""))
+    known = sorted(map(_row, folders_of(place)), key=lambda row: row.get("started", ""))
     for folder in [each for each in _known if not each.exists()]:
         del _known[folder]
-    return [_cells(place, row) for row in reversed(found[-MOST_ROWS:])]
+    return [_cells(place, row) for row in reversed(known[-MOST_ROWS:])]
 
 
 def _row(folder: Path) -> dict[str, Any]:
@@ -208,7 +207,7 @@ def _show_table(rows: list[dict[str, Any]]) -> ui.table | None:
     return table
 
 
-def _show_others(place: Path, at_work: list[Job]) -> None:
+def _show_others(place: Path, at_work: list[StudioJob]) -> None:
     """Campaigns and benches, and commands that still run."""
     campaigns = folders_with(place, CONFIG_FILE)
     if campaigns:
@@ -220,9 +219,9 @@ def _show_others(place: Path, at_work: list[Job]) -> None:
         ui.label("Running now").classes("text-lg font-bold")
     for job in at_work:
         with ui.row().classes("items-center"):
-            page = {"synth": "/run", "bench": "/bench"}.get(job.words[0])
+            page = {"synth": "/run", "bench": "/bench"}.get(job.file.words[0])
             if page:
-                ui.link(job.about, address_of(page, job.about))
+                ui.link(job.file.about, address_of(page, job.file.about))
             ui.label(job.command).classes("font-mono text-sm")
             ui.button("Stop", on_click=job.stop).props("flat dense")
 

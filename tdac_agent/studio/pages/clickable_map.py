@@ -16,7 +16,7 @@ AFTER: dict[Mode, Mode] = {"start": "heading", "heading": "goal", "goal": "goal"
 """What the next click sets."""
 
 
-class MapView:
+class ClickableMap:
     """A picture, what a click on it sets, and how it was read.
 
     Args:

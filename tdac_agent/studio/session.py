@@ -43,7 +43,7 @@ LASTING = 7 * 24 * 3600
 """For how long a cookie is accepted, s."""
 
 
-class Gate:
+class SessionCheck:
     """An ASGI application in front of another one.
 
     Args:
@@ -57,7 +57,7 @@ class Gate:
 
     def __init__(self, app: App, port: int, place: Path) -> None:
         self.token = secrets.token_urlsafe(24)
-        self._app, self._about = app, f"studio|{port}|{place}"
+        self._app, self._signed = app, f"studio|{port}|{place}"
         # Cookies are shared by all ports of a host.
         self._cookie = f"tdac-studio-{port}"
         self._address = LocalAddress(port)
@@ -68,7 +68,7 @@ class Gate:
             await self._app(scope, receive, send)
         elif self._has_token(scope):  # first: removes it from the address
             await self._let_in(send)
-        elif self._is_allowed(scope):
+        elif self._is_local(scope) and self._has_session(headers_of(scope)):
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
             await receive()  # the handshake
@@ -76,41 +76,35 @@ class Gate:
         else:
             await answer(send, 403, _REFUSED, "text/plain")
 
-    def _is_allowed(self, scope: Scope) -> bool:
-        headers = headers_of(scope)
-        return self._is_local(scope, headers) and self._has_session(headers)
-
-    def _is_local(self, scope: Scope, headers: dict[str, str]) -> bool:
+    def _is_local(self, scope: Scope) -> bool:
         """Whether the host is this one, and the page that asks is one of ours."""
         reads = scope["type"] == "http" and scope["method"] in ("GET", "HEAD")
-        return self._address.is_local(headers, without_origin=reads)
+        return self._address.is_local(headers_of(scope), without_origin=reads)
 
     def _has_session(self, headers: dict[str, str]) -> bool:
         try:
-            found = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
+            cookie = SimpleCookie(headers.get("cookie", "")).get(self._cookie)
         except CookieError:
             return False
-        if found is None:
-            return False
-        given = found.value.partition(".")[0]
-        is_number = given.isascii() and given.isdecimal() and len(given) < 16
-        issued = int(given) if is_number else 0
+        content = "" if cookie is None else cookie.value
+        time_text = content.partition(".")[0]
+        is_number = time_text.isascii() and time_text.isdecimal()
+        issued = int(time_text) if is_number and len(time_text) < 16 else 0
         is_recent = 0 <= time.time() - issued < LASTING
-        return is_recent and equal(found.value, self._session(issued))
+        return is_recent and equal(content, self._session(issued))
 
     def _session(self, issued: int) -> str:
         """The content of a cookie that is given at a time, in seconds since 1970."""
-        about = f"{self._about}|{issued}".encode("utf-8", "surrogateescape")
-        return f"{issued}.{keyed(about).hex()}"
+        signed = f"{self._signed}|{issued}".encode("utf-8", "surrogateescape")
+        return f"{issued}.{keyed(signed).hex()}"
 
     def _has_token(self, scope: Scope) -> bool:
         query = parse_qs(scope["query_string"].decode("latin-1"))
-        given = query.get("token", [""])[0]
         return (
             scope["type"] == "http"
             and scope["method"] == "GET"
-            and self._is_local(scope, headers_of(scope))
-            and equal(given, self.token)
+            and self._is_local(scope)
+            and equal(query.get("token", [""])[0], self.token)
         )
 
     async def _let_in(self, send: Send) -> None:
