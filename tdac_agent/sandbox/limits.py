@@ -11,8 +11,8 @@ MAX_SOURCE_BYTES = 200_000
 class Limits:
     """Resource limits of one child.
 
-    A controller may compute, and sleep, for each of the times in seconds. Time in which
-    it waits for a CPU counts as neither, so that a busy machine does not decide a
+    A controller may compute and sleep, together, for each of the times in seconds. Time
+    in which it waits for a CPU does not count, so that a busy machine does not decide a
     verdict. After five minutes of waiting the sandbox has failed, and there is no
     verdict.
 

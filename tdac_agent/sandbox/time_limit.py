@@ -1,8 +1,8 @@
 """Limits the time that a program takes, without the time in which it waits for a CPU.
 
 While the judge works, the clock of a program stands. While it runs, the program
-computes, sleeps, or waits for a CPU. It may compute and sleep for a given time each.
-Waiting is the machine's doing: it counts for nothing, and ends the run as a failure of
+computes, sleeps, or waits for a CPU. It may compute and sleep for a given time: in a
+single call together, in an episode of its own for each. Waiting is the machine's doing: it counts for nothing, and ends the run as a failure of
 the machine in the end.
 """
 
@@ -45,24 +45,32 @@ class TimeUsed:
         """Time asleep, s."""
         return max(0.0, self.wall - self.ran - self.waited)
 
-    def exceeds(self, seconds: float) -> Cause | None:
+    def exceeds(self, seconds: float, together: bool = False) -> Cause | None:
         """Returns what used up `seconds`; None if there is time left.
+
+        Args:
+            seconds: The limit.
+            together: Whether computing and sleeping count together.
 
         A program that is ready is not asleep, whatever the measured times are: the
         last wait in the queue is not counted yet, and the host of a virtual machine
         may have taken its CPU away.
         """
+        slept = 0.0 if self.ready else self.slept
+        if together and self.ran + slept >= seconds:
+            return "computed" if self.ran >= slept else "slept"
         if self.ran >= seconds:
             return "computed"
-        if self.slept >= seconds and not self.ready:
+        if slept >= seconds:
             return "slept"
         if self.wall >= 2.0 * seconds + MOST_WAITED_SECONDS:
             return "machine"
         return None
 
-    def seconds_to_next_check(self, seconds: float) -> float:
+    def seconds_to_next_check(self, seconds: float, together: bool = False) -> float:
         """Returns how long no time can be used up; at least a moment."""
-        return max(seconds - max(self.ran, self.slept), SOON_SECONDS / 5)
+        used = self.ran + self.slept if together else max(self.ran, self.slept)
+        return max(seconds - used, SOON_SECONDS / 5)
 
 
 class TimeLimit:
@@ -73,6 +81,7 @@ class TimeLimit:
         measure: Measures the program. It is called only when time may be used up.
         judge_waited: Returns the run-queue wait time of the judge's thread, which must
             be the calling one. What it waits while the clock stands does not count.
+        together: Whether computing and sleeping count together.
     """
 
     def __init__(
@@ -80,8 +89,10 @@ class TimeLimit:
         seconds: float,
         measure: Callable[[], ProcessTimes],
         judge_waited: Callable[[], float],
+        *,
+        together: bool = False,
     ) -> None:
-        self._seconds = seconds
+        self._seconds, self._together = seconds, together
         self._measure, self._judge_waited = measure, judge_waited
         self._judge_before, self._between = judge_waited(), 0.0
         self._stopped, self._stopped_cpu = time.monotonic(), time.thread_time()
@@ -115,12 +126,13 @@ class TimeLimit:
         wall = self._wall + now - self._began
         if wall >= self._next_check:
             used = self._used(wall)
-            cause = used.exceeds(self._seconds)
+            cause = used.exceeds(self._seconds, self._together)
             if cause == "machine":
                 raise StarvedError
             if cause is not None:
                 raise DeadlineError(busy=cause == "computed")
-            self._next_check = wall + used.seconds_to_next_check(self._seconds)
+            wait = used.seconds_to_next_check(self._seconds, self._together)
+            self._next_check = wall + wait
         return min(self._next_check - wall, self._end - now)
 
     def _used(self, wall: float) -> TimeUsed:
@@ -142,7 +154,8 @@ def limit_of_answer(seconds: float, process: RunQueue) -> Callable[[], float]:
             return early
         if limit is None:
             judge = RunQueue("thread-self").waited
-            limit = TimeLimit(seconds - SOON_SECONDS, process.measure, judge)
+            rest = seconds - SOON_SECONDS
+            limit = TimeLimit(rest, process.measure, judge, together=True)
             limit.start()
         return limit.left()
 

@@ -28,6 +28,7 @@ from tdac_agent.studio.run_status import (
     SELECTED,
     asked_by,
     episodes_driven,
+    from_elsewhere,
     initial_controller_text,
     last_step,
     progress_of,
