@@ -18,11 +18,11 @@ import numpy as np
 from tdac_envs.core.errors import WorldError
 from tdac_envs.epuck.infrared import PLACES
 from tdac_envs.epuck.prisms import Array
+from tdac_envs.webots.mounts import in_world, lookup_table, sorted_rows
 from tdac_envs.worlds.wbt.fields import (
     children,
     flag,
     number,
-    number_list,
     numbers,
     text,
 )
@@ -184,10 +184,7 @@ class LightCell:
             base: Height of the robot's origin, m.
             lights: The lights.
         """
-        x, y, heading = pose
-        cos, sin = math.cos(heading), math.sin(heading)
-        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        at, axis = turn @ self.place + (x, y, base), turn @ self.axis
+        at, axis = in_world(pose, base, self.place, self.axis)
         total = sum(light.irradiance(at, axis, self.colours) for light in lights)
         return float(np.interp(total, self.table[:, 0], self.table[:, 1]))
 
@@ -217,15 +214,11 @@ def read_cell(node: Node, frame: Frame) -> LightCell:
     Raises:
         WorldError: A field is invalid.
     """
-    table = number_list(node, "lookupTable") or _USUAL
-    if len(table) % 3 or len(table) < 3:
-        raise node.error("expected rows of 3 numbers for lookupTable", "lookupTable")
     axis = frame.matrix[:, 0]
-    rows = np.array(table).reshape(-1, 3)
     return LightCell(
         text(node, "name", "light sensor"),
         np.asarray(frame.origin),
         axis / max(float(np.linalg.norm(axis)), 1e-9),
-        rows[np.argsort(rows[:, 0], kind="stable")],
+        sorted_rows(lookup_table(node, _USUAL)),
         np.array(numbers(node, "colorFilter", (1.0, 1.0, 1.0))),
     )

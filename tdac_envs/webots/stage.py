@@ -208,7 +208,7 @@ def open_stage(
     lights = find_lights(document.nodes, top)
     instruments = find_instruments(robot, mounted, lights, floors)
     notes += instruments.notes()
-    cameras, too_large = find_cameras(robot, own, in_file)
+    cameras, too_large = find_cameras(robot, own, mounted)
     scanners = find_scanners(mounted)
     limit = world.robot.max_wheel_speed
     devices, absent = find_devices(limit, mounted, instruments, cameras, scanners)
