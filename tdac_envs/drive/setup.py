@@ -16,7 +16,12 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.drive.disturbances import Disturbances, Random
 from tdac_envs.drive.rewards import RewardWeights
-from tdac_envs.drive.task import VARIATIONS
+from tdac_envs.drive.task import (
+    VARIATIONS,
+    default_horizon,
+    mixed_start,
+    random_task,
+)
 
 
 class TaskSource(Protocol):
@@ -98,28 +103,16 @@ class DriveSetup:
     def _varied(self, options: dict[str, Any], random: Random) -> Any:
         task = self.nominal
         if options:
-            drawn = self._with_ends(options)
+            drawn = task.with_ends(**options)
         elif self.variation == "random":
-            drawn = self._random_task(random)
+            drawn = random_task(task, random)
         elif self.variation == "mixed":
-            return task.moved(self._mixed_start(random))
+            return task.moved(mixed_start(task, random))
         elif self.variation == "jitter":
             return task.moved(task.jittered(random))
         else:
             return task
         if self.fixed_horizon or drawn.goal == task.goal:
             return drawn
-        return replace(drawn, horizon=self._default_horizon(drawn))
-
-    def _with_ends(self, options: dict[str, Any]) -> Any:
-        """The nominal task with the start and goal of the options."""
-        raise NotImplementedError
-
-    def _random_task(self, random: Random) -> Any:
-        raise NotImplementedError
-
-    def _mixed_start(self, random: Random) -> Any:
-        raise NotImplementedError
-
-    def _default_horizon(self, task: Any) -> int:
-        raise NotImplementedError
+        horizon = default_horizon(drawn.shortest, drawn.full_step)
+        return replace(drawn, horizon=horizon)

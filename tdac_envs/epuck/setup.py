@@ -9,21 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import finite_numbers
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.stepping import FRICTION, UNDISTURBED
-from tdac_envs.drive.task import Pose
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH, FLOOR, N_CONSTANTS
 from tdac_envs.epuck.nearby import NearbyParts, surroundings
 from tdac_envs.epuck.prisms import Prisms
-from tdac_envs.epuck.task import (
-    EPuckTask,
-    default_horizon,
-    make_task,
-    mixed_start,
-    random_task,
-)
+from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
@@ -111,25 +103,3 @@ class Setup(DriveSetup):
             seen.points, seen.first, seen.extent, sighted.cells, sighted.listed,
             task.field,
         )  # fmt: skip
-
-    def _with_ends(self, options: dict[str, Any]) -> EPuckTask:
-        task = self.nominal
-        start = tuple(options.get("start", task.start))
-        return make_task(
-            task.ground,
-            finite_numbers("start", (*start, task.start.heading)[:3], 3),
-            options.get("goal", task.goal),
-            max_wheel_speed=task.max_wheel_speed,
-            dt=task.dt,
-            goal_tolerance=task.goal_tolerance,
-            horizon=task.horizon,
-        )
-
-    def _random_task(self, random: np.random.Generator) -> EPuckTask:
-        return random_task(self.nominal, random)
-
-    def _mixed_start(self, random: np.random.Generator) -> Pose:
-        return mixed_start(self.nominal, random)
-
-    def _default_horizon(self, task: EPuckTask) -> int:
-        return default_horizon(task)

@@ -12,7 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from tdac_envs.drive.task import Pose
-from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.ladder.set_file import HorizonSpec
 from tdac_envs.ladder.task_sets import AnyTask
 from tdac_envs.map2d.task import Map2DTask
@@ -49,20 +48,12 @@ def nearer_task(
         places = np.flatnonzero(np.abs(field - length) < width)
         if not len(places):
             continue
-        x, y = _place(task, int(random.choice(places)))
+        x, y = task.point(int(random.choice(places)))
         moved = task.moved(Pose(x, y, random.uniform(-math.pi, math.pi)))
         if _is_apart(moved):
             steps = max(moved.shortest - least, 0.0) / step
             return replace(moved, horizon=horizon.steps(steps))
     return task
-
-
-def _place(task: AnyTask, place: int) -> tuple[float, float]:
-    """The point of a place in the task's field."""
-    row, column = divmod(place, task.field.shape[1])
-    if isinstance(task, EPuckTask):
-        return task.ground.at(column, row)
-    return float(column), float(row)
 
 
 def _is_apart(task: AnyTask) -> bool:

@@ -16,7 +16,6 @@ from tdac_agent.verification.suite import contract
 from tdac_agent.verification.suite.hygiene import HYGIENE
 from tdac_agent.verification.suite.oracle import Oracle
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.map2d.task import jittered_start
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.params import RobotParams
 
@@ -225,7 +224,7 @@ def test_drives_on_bundled_maps(name, tmp_path, monkeypatch):
     text = render_controller(TUNED, env.nominal.robot, env.nominal.dt)
     module = import_controller(text, env, tmp_path, monkeypatch)
     random = np.random.default_rng(3)
-    for start in (None, jittered_start(env.nominal, random)):
+    for start in (None, env.nominal.jittered(random)):
         rollout = drive(env, steer(module), start)
         assert rollout.reached, rollout.outcome
         assert rollout.trajectory.steps <= 0.25 * env.nominal.horizon

@@ -8,7 +8,6 @@ from driving import drive, random_env
 
 from tdac_agent.environments.map2d.reference import Reference, oracle_path
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.map2d.task import jittered_start
 from tdac_envs.mapping.bundled import bundled_maps
 
 
@@ -20,7 +19,7 @@ def solve(env, start):
 
 def assert_solves(env, random, jitters):
     task = env.nominal
-    starts = [task.start, *(jittered_start(task, random) for _ in range(jitters))]
+    starts = [task.start, *(task.jittered(random) for _ in range(jitters))]
     for start in starts:
         rollout = solve(env, start)
         radius = task.robot.radius
