@@ -13,7 +13,7 @@ import numpy as np
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import PAPER, Image, blank
 from tdac_envs.drive.env import DrivenEnv
-from tdac_envs.drive.stepping import REACHED, TOUCHED, TRUNCATED
+from tdac_envs.drive.stepping import REACHED, TOUCHED, TRUNCATED, row_of
 
 MOST_DRAWN = 64
 """Largest number of robots in a batch that can be rendered."""
@@ -39,7 +39,7 @@ class Frames:
     def bind(self, robots: Any) -> None:
         """From now on, draws the robots of these arrays."""
         for i, viewer in enumerate(self._viewers):
-            viewer.robot = robots.row(i)
+            viewer.robot = row_of(robots, i)
 
     def begin(self, which: Iterable[int], tasks: Sequence[Any]) -> None:
         """Begins new trails for robots that have been reset.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -16,6 +17,7 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.drive.disturbances import Disturbances, Random
 from tdac_envs.drive.rewards import RewardWeights
+from tdac_envs.drive.stepping import UNDISTURBED
 from tdac_envs.drive.task import (
     VARIATIONS,
     default_horizon,
@@ -83,6 +85,33 @@ class DriveSetup:
     def constants(self) -> NDArray[np.float64]:
         """`Robot.constants` of the nominal task."""
         raise NotImplementedError
+
+    def shared_constants(self, speed: float, reach: float, friction: float) -> Any:
+        """The entries of `constants` that all robots have, of the nominal task.
+
+        Args:
+            speed: Full speed of a wheel.
+            reach: Largest range of the distance sensors.
+            friction: Coefficient of friction between body and obstacles.
+        """
+        task = self.nominal
+        return [
+            task.axle_length,
+            speed,
+            task.dt,
+            task.body_radius,
+            reach,
+            math.exp(-task.dt / self.motor_lag) if self.motor_lag else 0.0,
+            self.delay,
+            self.on_collision == "terminate",
+            task.full_step,
+            *self.weights,
+            *task.goal,
+            task.goal_tolerance,
+            task.horizon,
+            friction,
+            *UNDISTURBED,
+        ]
 
     def draw(self, options: dict[str, Any], random: Random) -> tuple[Any, Random]:
         """The task of an episode, and the random numbers of its disturbances.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Words
 from tdac_envs.drive.stepping import FORWARD, TOUCHED, TURN
 from tdac_envs.epuck import kernels
-from tdac_envs.epuck.robot import Robot
+from tdac_envs.epuck.robot import EPuckRobot
 from tdac_envs.epuck.setup import Setup
 from tdac_envs.epuck.task import EPuckTask
 
@@ -50,7 +50,7 @@ class Movables:
         self.things[:, :2] = self._task.ground.centres
         self._carry()
 
-    def step(self, words: Words, robot: Robot, drive: Callable[[], None]) -> None:
+    def step(self, words: Words, robot: EPuckRobot, drive: Callable[[], None]) -> None:
         """Runs one step, with the physics engine if an object is near or moves.
 
         Args:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.drive.setup import DriveSetup
-from tdac_envs.drive.stepping import FRICTION, UNDISTURBED
+from tdac_envs.drive.stepping import FRICTION
 from tdac_envs.epuck.infrared import RANGE
-from tdac_envs.epuck.kernels import AXLE_LENGTH, FLOOR, N_CONSTANTS
+from tdac_envs.epuck.kernels import FLOOR, N_CONSTANTS
 from tdac_envs.epuck.nearby import NearbyParts, surroundings
 from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.task import EPuckTask
@@ -43,34 +42,16 @@ class Setup(DriveSetup):
         return surroundings(task.ground, self.webots, self.goal_visible, reach)
 
     def constants(self) -> NDArray[np.float64]:
-        """`Robot.constants` of the nominal task."""
+        """`EPuckRobot.constants` of the nominal task."""
         task = self.nominal
-        constants = np.array(
-            [
-                AXLE_LENGTH,
-                task.max_wheel_speed,
-                task.dt,
-                BODY_RADIUS,
-                RANGE,
-                math.exp(-task.dt / self.motor_lag) if self.motor_lag else 0.0,
-                self.delay,
-                self.on_collision == "terminate",
-                task.full_step,
-                *self.weights,
-                *task.goal,
-                task.goal_tolerance,
-                task.horizon,
-                task.ground.world.friction,
-                *UNDISTURBED,
-                *np.zeros(N_CONSTANTS - FLOOR),
-            ],
-            np.float64,
-        )
+        friction = task.ground.world.friction
+        shared = self.shared_constants(task.max_wheel_speed, RANGE, friction)
+        constants = np.array([*shared, *np.zeros(N_CONSTANTS - FLOOR)], np.float64)
         self.enter(constants, task)
         return constants
 
     def enter(self, constants: NDArray[np.float64], task: EPuckTask) -> None:
-        """Sets what `Robot.constants` tells of the world of a task."""
+        """Sets what `EPuckRobot.constants` tells of the world of a task."""
         ground = task.ground
         constants[FRICTION] = ground.world.friction
         constants[FLOOR:] = (

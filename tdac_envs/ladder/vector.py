@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
@@ -26,8 +26,8 @@ class OnSetVector(DrivenVectorEnv):
 
     view: View
 
-    def _look(self) -> None:
-        """Observes what the set says, after all else has been prepared."""
+    def _prepare(self) -> None:
+        super()._prepare()
         self.view = view = self._first.view
         self._anchors = np.array([view.anchor(task) for task in self.tasks])
 
@@ -103,24 +103,6 @@ class LadderVectorEnv(
 
     make = LadderEnv
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        threads: int | None = None,
-        render_mode: str | None = None,
-        **options: Any,
-    ) -> None:
-        super().__init__(
-            num_envs,
-            autoreset_mode=autoreset_mode,
-            threads=threads,
-            render_mode=render_mode,
-            **options,
-        )
-        self._look()
-
 
 class EPuckLadderVectorEnv(
     OnSetVector, EPuckVectorEnv, VectorEnv[Observations, Actions, Any]
@@ -128,24 +110,6 @@ class EPuckLadderVectorEnv(
     """A vector of `EPuckLadderEnv`, as `LadderVectorEnv` is one of `LadderEnv`."""
 
     make = EPuckLadderEnv
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        threads: int | None = None,
-        render_mode: str | None = None,
-        **options: Any,
-    ) -> None:
-        super().__init__(
-            num_envs,
-            autoreset_mode=autoreset_mode,
-            threads=threads,
-            render_mode=render_mode,
-            **options,
-        )
-        self._look()
 
 
 def make(

@@ -18,6 +18,7 @@ from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
+from tdac_envs.drive.stepping import place
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.among import begin_among, drive_among
@@ -26,7 +27,7 @@ from tdac_envs.map2d.metric_input import in_pixels, options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
-from tdac_envs.map2d.robot import Robot
+from tdac_envs.map2d.robot import Map2DRobot
 from tdac_envs.map2d.setup import Setup, override
 from tdac_envs.map2d.sonar import NOISE
 from tdac_envs.map2d.source import MapSource, prepare, units_of
@@ -338,7 +339,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             space = self._view.space(space)
             self.info_of = partial(_metric_info, self._view)
         self.observation_space = space  # type: ignore[assignment]
-        self.robot = Robot.blank(setup.nominal.robot.n_rays, self.delay)
+        self.robot = Map2DRobot.blank(setup.nominal.robot.n_rays, self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
         self.movers = movers_of(self.nominal)
@@ -362,7 +363,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.task.field is not before.field or self.setup.has_movers:
             self._bind()
         task, robot = self.task, self.robot
-        robot.place(task)
+        place(robot, task)
         self._hide()
         self._goal[:] = task.goal
         self._call_begin()

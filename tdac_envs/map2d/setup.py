@@ -22,7 +22,7 @@ from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.grid.map_units import MapFrame
 from tdac_envs.map2d.placing import MoversSetup
 from tdac_envs.map2d.rays import fan
-from tdac_envs.map2d.robot import constants_of
+from tdac_envs.map2d.robot import FRICTION
 from tdac_envs.map2d.sonar import Sonar
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.mapping.params import RobotParams
@@ -113,14 +113,10 @@ class Setup(DriveSetup):
                 return replace(drawn, movers=movers), noise
 
     def constants(self) -> NDArray[np.float64]:
-        """`Robot.constants` of the nominal task."""
-        return constants_of(
-            self.nominal,
-            self.weights,
-            motor_lag=self.motor_lag,
-            delay=self.delay,
-            stops=self.on_collision == "terminate",
-        )
+        """`Map2DRobot.constants` of the nominal task."""
+        robot = self.nominal.robot
+        own = robot.max_wheel_speed, robot.range_max, FRICTION
+        return np.array(self.shared_constants(*own), np.float64)
 
     def world(self, task: Map2DTask) -> tuple[NDArray[Any], ...]:
         """The arrays that `begin` and `drive` take in addition to the robot's."""
