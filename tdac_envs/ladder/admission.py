@@ -7,14 +7,17 @@ admit the same worlds.
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import read_only
+from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import (
     BoolGrid,
     FloatGrid,
@@ -34,6 +37,7 @@ from tdac_envs.map2d.straight import is_straight_path_free
 from tdac_envs.map2d.terrain import Terrain
 
 Pixel = tuple[int, int]
+Found = TypeVar("Found")
 
 _GOALS = 3
 """Goals that are tried on a draft."""
@@ -118,6 +122,32 @@ def admit(draft: Draft, words: Words, conditions: Conditions) -> Admitted | Reje
         if start is not None:
             return _tested(draft, clear, start, goal, field, conditions)
     return Rejection.NEAR
+
+
+def first_admitted(
+    tries: int, name: str, attempt: Callable[[], Found | Rejection]
+) -> tuple[Found, tuple[Rejection, ...]]:
+    """What the first successful attempt returns, and why those before it failed.
+
+    Args:
+        tries: Largest number of attempts.
+        name: Name of the generator, for the message.
+        attempt: Draws and tests a draft.
+
+    Raises:
+        TaskError: All attempts fail.
+    """
+    rejected: list[Rejection] = []
+    while len(rejected) < tries:
+        found = attempt()
+        if not isinstance(found, Rejection):
+            return found, tuple(rejected)
+        rejected.append(found)
+    reasons = ", ".join(f"{n} × {why}" for why, n in Counter(rejected).most_common())
+    raise TaskError(
+        f"no feasible world from {tries} drafts of {name!r} ({reasons}); change the "
+        "generator's sizes or the conditions"
+    )
 
 
 def _tested(

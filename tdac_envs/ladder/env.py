@@ -16,7 +16,7 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.setup import Setup as EPuckSetup
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.observed import View
-from tdac_envs.ladder.plate_pool import MOST
+from tdac_envs.ladder.pool import MOST_PLATES
 from tdac_envs.ladder.robots import EPuckParams
 from tdac_envs.ladder.set_file import find_set_file
 from tdac_envs.ladder.source import SetSource, read_salt
@@ -200,7 +200,7 @@ class EPuckLadderEnv(OnSet, EPuckEnv):
         self,
         level: str | Path = "epuck",
         split: str = "train",
-        train_pool: int = MOST,
+        train_pool: int = MOST_PLATES,
         salt_file: str | Path | None = None,
         privileged: bool = False,
         reward_weights: Mapping[str, float] | None = None,

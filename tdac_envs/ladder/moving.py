@@ -10,14 +10,13 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     model_validator,
 )
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.core.models import StrictModel
 from tdac_envs.ladder.generators.draft import ordered
 from tdac_envs.map2d.placing import MoversSetup
 from tdac_envs.map2d.task import Map2DTask
@@ -46,10 +45,8 @@ ENDS = AfterValidator(ordered), BeforeValidator(_both_ends)
 """Validators of the two ends between which a number is drawn."""
 
 
-class MoversOfSet(BaseModel):
+class MoversOfSet(StrictModel):
     """A group of movers of a set; numbers are drawn between two ends for each world."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     kind: Literal["bounce", "crowd"]
     count: Annotated[tuple[Count, Count], *ENDS]

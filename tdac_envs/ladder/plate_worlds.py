@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from tdac_envs.core.errors import TaskError
+from tdac_envs.core.models import StrictModel
 from tdac_envs.drive.task import Pose
-from tdac_envs.ladder.admission import Admitted, Conditions, Rejection, admit
+from tdac_envs.ladder.admission import (
+    Admitted,
+    Conditions,
+    Rejection,
+    admit,
+    first_admitted,
+)
 from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.generators.blocks import PIXEL, Block, centres, raster
 from tdac_envs.ladder.generators.draft import Draft
@@ -29,10 +34,8 @@ _WALL, _HEIGHT = 0.01, 0.1
 """Thickness of the arena's wall, and height of everything, m."""
 
 
-class PlatesSpec(BaseModel):
+class PlatesSpec(StrictModel):
     """What a generated world for the e-puck is like, and what its task must fulfil."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     generator: Plates = Plates()
     step: float = Field(
@@ -100,18 +103,14 @@ def make_plates(spec: PlatesSpec, key: bytes) -> PlatesWorld:
         ValueError: The key has another length.
     """
     words = Words(key)
-    rejected: list[Rejection] = []
-    while len(rejected) < spec.tries:
+
+    def attempt() -> tuple[PlatesDraft, Admitted] | Rejection:
         draft = draw(words, spec.generator)
         found = _admitted(draft, words, spec)
-        if isinstance(found, Admitted):
-            return _made(draft, found, words, tuple(rejected))
-        rejected.append(found)
-    reasons = ", ".join(f"{n} × {why}" for why, n in Counter(rejected).most_common())
-    raise TaskError(
-        f"no feasible world from {spec.tries} drafts of 'plates' ({reasons}); "
-        "change the generator's sizes or the conditions"
-    )
+        return found if isinstance(found, Rejection) else (draft, found)
+
+    made, rejected = first_admitted(spec.tries, spec.generator.name, attempt)
+    return _made(*made, words, rejected)
 
 
 def _admitted(
@@ -148,14 +147,9 @@ def _made(
     path = found.path * _PIXEL + (xs[0], ys[0])
     length = found.difficulty.length * _PIXEL
     difficulty = replace(found.difficulty, length=length)
-    return PlatesWorld(world, path, difficulty, rejected, _raster(found, heading))
-
-
-def _raster(found: Admitted, heading: float) -> LadderWorld:
-    start = Pose(float(found.start[0]), float(found.start[1]), heading)
-    goal = float(found.goal[0]), float(found.goal[1])
-    rest = (found.field, found.path, found.difficulty, ())
-    return LadderWorld(found.terrain, start, goal, *rest)
+    return PlatesWorld(
+        world, path, difficulty, rejected, LadderWorld.of(found, heading)
+    )
 
 
 def _obstacle(name: str, number: int, block: Block) -> Obstacle:

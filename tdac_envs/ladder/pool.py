@@ -9,7 +9,6 @@ one takes microseconds.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import math
 import mmap
@@ -27,11 +26,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.trusted_folders import is_usable, user_cache
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.ladder.difficulty import Difficulty
-from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import Terrain
 from tdac_envs.mapping.params import RobotParams
@@ -48,6 +48,8 @@ _FOLDER = re.compile("[0-9a-f]{16}-[0-9a-f]{16}")
 """Name of the folder of a set: hashes of the set and of the code."""
 _ALIGNED = 8
 """Alignment of the arrays, bytes."""
+MOST_PLATES = 512
+"""Tasks of an e-puck that a process keeps, of about 1.2 MB each."""
 _MOVERS = "traits", "now", "points", "people", *Places._fields
 """Arrays of movers that are kept; the others are blank at a start."""
 
@@ -96,6 +98,36 @@ class TrainingPool:
         return _keep(self._mapped, index, task, _MAPPED)
 
 
+class PlatePool:
+    """The training tasks of a set, by the numbers of their worlds.
+
+    Making one takes some 50 ms. Those that were drawn last are kept.
+
+    Args:
+        task_set: The set.
+    """
+
+    def __init__(self, task_set: TaskSet) -> None:
+        self._set = task_set
+        self._tasks: OrderedDict[int, AnyTask] = OrderedDict()
+
+    def task(self, index: int) -> AnyTask:
+        """The task of a training world.
+
+        Raises:
+            TaskError: There is no feasible world.
+        """
+        task = self._tasks.get(index)
+        if task is None:
+            world, made = self._set.world_and_task("train", index)
+            task = self._set.told(made, "train", index, world.difficulty)
+            self._tasks[index] = task
+        self._tasks.move_to_end(index)
+        if len(self._tasks) > MOST_PLATES:
+            self._tasks.popitem(last=False)
+        return task
+
+
 def _keep(
     kept: OrderedDict[int, Map2DTask], index: int, task: Map2DTask, most: int
 ) -> Map2DTask:
@@ -134,8 +166,7 @@ def _remove_others(folder: Path) -> None:
 def _sources() -> str:
     """Hash of the code that makes worlds."""
     files = sorted(Path(__file__).parent.rglob("*.py"))
-    joined = b"".join(file.read_bytes() for file in files)
-    return hashlib.sha256(joined).hexdigest()[:16]
+    return sha256_of(*(file.read_bytes() for file in files))[:16]
 
 
 def _write(path: Path, task: Map2DTask, difficulty: Difficulty) -> None:

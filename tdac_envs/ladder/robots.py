@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
+from tdac_envs.core.models import StrictModel
 from tdac_envs.drive.disturbances import MOST_HIDDEN
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
-class EPuckParams(BaseModel):
+class EPuckParams(StrictModel):
     """An e-puck: `robot: {kind: epuck}` in a `set.yaml`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     kind: Literal["epuck"]
     max_wheel_speed: float = Field(

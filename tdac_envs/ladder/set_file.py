@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from pathlib import Path
@@ -12,7 +11,6 @@ from pydantic import (
     AfterValidator,
     BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     ValidationError,
     model_validator,
@@ -20,7 +18,9 @@ from pydantic import (
 
 from tdac_envs.core.arguments import MOST_STEPS
 from tdac_envs.core.errors import TaskError, first_problem, hint, one_line_reason
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
+from tdac_envs.core.models import StrictModel
 from tdac_envs.drive.disturbances import MOST_HIDDEN, Disturbances
 from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.ladder.files.spec import FilesSpec
@@ -58,11 +58,7 @@ def _distinct(keys: tuple[str, ...]) -> tuple[str, ...]:
     return keys
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class HorizonSpec(_Strict):
+class HorizonSpec(StrictModel):
     """The horizon: `factor` times OT, within `least` and `most` steps."""
 
     factor: float = Field(16.0, gt=0, le=1000)
@@ -83,7 +79,7 @@ class HorizonSpec(_Strict):
         return min(max(math.ceil(self.factor * least_steps), self.least), self.most)
 
 
-class AdmissionSpec(_Strict):
+class AdmissionSpec(StrictModel):
     """What every world of the set must fulfil; see `docs/generated-worlds.md`."""
 
     gap: float = Field(1.1, ge=1, le=10, description="Least gap.")
@@ -94,7 +90,7 @@ class AdmissionSpec(_Strict):
     tries: int = Field(200, ge=1, le=100_000, description="Most drafts of a world.")
 
 
-class DisturbanceSpec(_Strict):
+class DisturbanceSpec(StrictModel):
     """The disturbances of the set; `docs/disturbances.md` defines them."""
 
     wheel_gains: float = Field(0.0, ge=0, le=MOST_HIDDEN, description="Bound.")
@@ -110,7 +106,7 @@ class DisturbanceSpec(_Strict):
     delay: int = Field(0, ge=0, le=100, description="Steps until an action acts.")
 
 
-class CpuSpec(_Strict):
+class CpuSpec(StrictModel):
     """CPU time (user and system) that a controller may use in an episode, s."""
 
     start: float = Field(2.0, gt=0, le=600, description="Import and reset.")
@@ -134,7 +130,7 @@ def _robot_of(given: Any) -> Any:
         raise ValueError(first_problem(error, model.model_fields)) from None
 
 
-class SetFile(_Strict):
+class SetFile(StrictModel):
     """Contents of `set.yaml`, schema 1."""
 
     schema_version: Literal[1] = Field(1, alias="schema")
@@ -305,8 +301,7 @@ class SetFile(_Strict):
             if self.files.tests or self.files.runs > 1:
                 more = {"tests": list(self.files.tests), "runs": self.files.runs}
                 values["files"] |= more
-        text = json.dumps(values, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode("ascii")).hexdigest()
+        return sha256_of(json.dumps(values, sort_keys=True, separators=(",", ":")))
 
 
 def read_set_file(path: Path) -> SetFile:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,6 +19,7 @@ from tdac_envs.core.arguments import (
     positive,
 )
 from tdac_envs.core.errors import MapError, TaskError, hint
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import printable, read_array
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
@@ -222,7 +222,7 @@ def _from_image(image: Path, given: _Given) -> Prepared:
     radius = given.robot_radius or RobotParams().radius
     ends = given.start, given.goal
     how = given.snap, given.said, given.units
-    prepared = read(image, _digest(image), *ends, radius, *how)
+    prepared = read(image, sha256_of(read_bytes(image)), *ends, radius, *how)
     # Preprocessing has already snapped the points.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
     rest = (given.heading, radius, False, DEFAULT_OPTIONS, given.units)
@@ -256,10 +256,6 @@ def _refuse(said: ReadingOptions, what: str) -> None:
             f"{what} already defines which cells are obstacles; leave out polarity and "
             "threshold"
         )
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(read_bytes(path)).hexdigest()
 
 
 def _as_cells(source: NDArray[Any] | Sequence[Sequence[Any]]) -> NDArray[Any]:

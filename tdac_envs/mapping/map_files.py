@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from tdac_envs.core.errors import MapError, first_problem
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, printable, read_array
 from tdac_envs.mapping.image import (
     MapImage,
@@ -62,7 +62,7 @@ def read_ros_yaml(path: Path) -> MapImage:
     return MapImage(
         composite(pixels) if (alpha < 255).any() else pixels[..., :3],
         printable(path.name),
-        hashlib.sha256(text + data).hexdigest(),
+        sha256_of(text, data),
         ~cells.free,
         f"ros {ros.mode}",
         ros.resolution,
@@ -122,7 +122,7 @@ def read_movingai(path: Path) -> MapImage:
     cells = np.frombuffer(b"".join(rows), np.uint8).reshape(height, width)
     occupied = ~np.isin(cells, np.frombuffer(b".GS", np.uint8))
     shade = np.where(occupied, 0, 255).astype(np.uint8)
-    digest = hashlib.sha256(data).hexdigest()
+    digest = sha256_of(data)
     colour = np.repeat(shade[..., None], 3, axis=2)
     return MapImage(colour, printable(path.name), digest, occupied, "movingai")
 

@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     ValidationError,
     model_validator,
@@ -18,6 +16,7 @@ from pydantic import (
 from tdac_envs.core.arguments import LARGEST, SMALLEST, positive
 from tdac_envs.core.errors import MapError, TaskError, first_problem
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
+from tdac_envs.core.models import StrictModel
 from tdac_envs.grid.map_units import MapUnits
 
 PIXELS_PER_METRE = 3779.52
@@ -60,11 +59,7 @@ class ReadingOptions:
 DEFAULT_OPTIONS = ReadingOptions()
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class RobotParams(_Record):
+class RobotParams(StrictModel):
     """The differential-drive robot: a disc with a fan of ultrasonic rays."""
 
     radius: Length = Field(15.0, description="Body radius, px.")
@@ -93,7 +88,7 @@ class RobotParams(_Record):
         return cls(radius=radius, axle_length=2 * radius)
 
 
-class ScoreTerms(_Record):
+class ScoreTerms(StrictModel):
     """The terms of the score of Algorithm 1."""
 
     min_clearance: float = Field(description="Smallest clearance on the path, px.")
@@ -101,7 +96,7 @@ class ScoreTerms(_Record):
     sharpness: float = Field(description="Boundary sharpness of the grid.")
 
 
-class MapParams(_Record):
+class MapParams(StrictModel):
     """Contents of `params.json`; points are (x, y) in pixels, headings in rad."""
 
     schema_version: Literal[1] = 1

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
+from tdac_envs.core.models import LenientModel
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.mapping.image import GreyImage
 from tdac_envs.mapping.params import Length, Place
@@ -21,11 +22,11 @@ def _lowered(value: Any) -> Any:
     return value.lower() if isinstance(value, str) else value
 
 
-class RosMap(BaseModel):
-    """Contents of a ROS `map.yaml` (wiki.ros.org/map_server)."""
+class RosMap(LenientModel):
+    """Contents of a ROS `map.yaml` (wiki.ros.org/map_server).
 
-    # Tools add other fields (e.g. `lethal_cost`), which do not matter for the grid.
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+    Tools add other fields (e.g. `lethal_cost`), which do not matter for the grid.
+    """
 
     image: str = Field(description="Picture, relative to the yaml file.")
     resolution: Length = Field(description="Metres per pixel.")

@@ -10,8 +10,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
-    ConfigDict,
     Field,
     ValidationError,
     model_validator,
@@ -19,6 +17,7 @@ from pydantic import (
 
 from tdac_envs.core.arguments import LARGEST, SMALLEST, in_radians
 from tdac_envs.core.errors import TaskError, first_problem, hint
+from tdac_envs.core.models import StrictModel
 
 MOST_MOVERS = 256
 """Largest number of movers of a robot."""
@@ -34,9 +33,7 @@ Length = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
 Speed = Annotated[float, Field(ge=0.0, le=LARGEST)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
+class _MoverSpec(StrictModel):
     speed: Speed | None = Field(
         None, description="px/s. Default: half of the robot's largest wheel speed."
     )
@@ -45,7 +42,7 @@ class _Strict(BaseModel):
     )
 
 
-class RouteSpec(_Strict):
+class RouteSpec(_MoverSpec):
     """A disc that drives along waypoints for ever, and passes through other movers."""
 
     kind: Literal["route"] = "route"
@@ -79,7 +76,7 @@ class RouteSpec(_Strict):
         return 1
 
 
-class BounceSpec(_Strict):
+class BounceSpec(_MoverSpec):
     """Discs that drive straight, bounce off walls, and pass through other movers."""
 
     kind: Literal["bounce"] = "bounce"
@@ -103,7 +100,7 @@ class BounceSpec(_Strict):
         return self.count
 
 
-class CrowdSpec(_Strict):
+class CrowdSpec(_MoverSpec):
     """People who walk to places of their own and avoid each other (ORCA)."""
 
     kind: Literal["crowd"] = "crowd"

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from tdac_envs.core.errors import TaskError, first_problem, one_line_reason
+from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.models import LenientModel
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.files.found import FoundWorld
 
@@ -26,19 +27,15 @@ MOST_SIDE = 8192
 """Largest width or height of a map, px."""
 
 
-class BarnWorld(BaseModel):
+class BarnWorld(LenientModel):
     """A world: the centres of its cylinders, and the length of its planned path, m."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     cylinders: list[tuple[float, float]]
     path_length: float = Field(gt=0)
 
 
-class BarnFile(BaseModel):
+class BarnFile(LenientModel):
     """A file of worlds, by name; lengths in m, y is up."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     cylinder_radius: float = Field(gt=0, le=10)
     start: tuple[float, float, float] = Field(description="x, y, heading (rad)")
@@ -62,8 +59,6 @@ def read_barn(path: Path, resolution: float) -> list[FoundWorld]:
     try:
         file = BarnFile.model_validate(parse_json(read_file(path, RECORD_BYTES)))
         return [_world(path, file, name, resolution) for name in file.worlds]
-    except ValidationError as error:
-        raise TaskError(f"{path}: {first_problem(error)}") from None
     except (OSError, ValueError) as error:
         raise TaskError(f"{path}: {one_line_reason(error)}") from None
 

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasChoices, Field, ValidationError
 
 from tdac_envs.core.errors import TaskError, TdacError, first_problem, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, printable, read_file
+from tdac_envs.core.models import LenientModel
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.files.found import FoundWorld
 from tdac_envs.map2d.source import prepare
@@ -28,10 +29,8 @@ _SHADES: dict[str, Literal["dark", "light"]] = {
 }
 
 
-class MapEntry(BaseModel):
+class MapEntry(LenientModel):
     """A task of `index.json`; other keys are not read. Lengths are px, y is down."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     file: str = Field(min_length=1, description="Map, relative to the folder.")
     start: tuple[float, float] = Field(description="Rounded to whole px.")

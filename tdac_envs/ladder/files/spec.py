@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
+
+from tdac_envs.core.models import StrictModel
 
 FileSplit = Literal["train", "dev", "test"]
 """Splits that worlds from files may have."""
@@ -20,10 +22,8 @@ def _each_once(splits: tuple[FileSplit, ...]) -> tuple[FileSplit, ...]:
     return tuple(split for split in FILE_SPLITS if split in splits)
 
 
-class FilesSpec(BaseModel):
+class FilesSpec(StrictModel):
     """Where the worlds are: either `folder` or `barn`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     folder: Path | None = Field(
         None, description="Folder of maps; its index.json lists their tasks."

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from tdac_envs.core.compiled import kernel
+from tdac_envs.core.models import StrictModel
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.words import FRACTIONS, Words
 
@@ -36,10 +37,8 @@ Band = Annotated[tuple[Size, Size], AfterValidator(ordered)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-class Parameters(BaseModel):
+class Parameters(StrictModel):
     """Parameters that all generators have."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     width: int = Field(220, ge=16, le=LARGEST_SIDE, description="Columns, px.")
     height: int = Field(220, ge=16, le=LARGEST_SIDE, description="Rows, px.")

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
+from tdac_envs.core.models import StrictModel
 from tdac_envs.ladder.generators.blocks import PIXEL, Block, Box, Cylinder
 from tdac_envs.ladder.generators.draft import Places, Share, as_places, ordered
 from tdac_envs.ladder.generators.lanes import Lane, lanes_from
@@ -18,10 +19,8 @@ MetreBand = Annotated[tuple[Metres, Metres], AfterValidator(ordered)]
 """Smallest and largest value of a length, m."""
 
 
-class Plates(BaseModel):
+class Plates(StrictModel):
     """Parameters of plates; lengths are multiples of 5 mm."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     name: Literal["plates"] = "plates"
     sides: MetreBand = Field((1.2, 2.0), description="Sides of the floor, m.")

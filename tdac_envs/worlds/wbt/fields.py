@@ -37,6 +37,26 @@ def number(node: Node, name: str, default: float) -> float:
     return numbers(node, name, (default,))[0]
 
 
+def positive(
+    node: Node, name: str, default: float, instead: float | None = None
+) -> float:
+    """A number above 0.
+
+    Args:
+        node: The node.
+        name: The field.
+        default: Value of a missing field.
+        instead: Value instead of one that is not above 0; by default the default.
+
+    Raises:
+        WorldError: As by `numbers`.
+    """
+    found = number(node, name, default)
+    if found > 0.0:
+        return found
+    return default if instead is None else instead
+
+
 def number_list(node: Node, name: str) -> tuple[float, ...]:
     """All numbers of a field; raises as `numbers` does."""
     count = len(node.fields[name].items) if name in node.fields else 0

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tdac_envs.worlds.wbt.fields import child, children, number, number_list, numbers
+from tdac_envs.worlds.wbt.fields import (
+    child,
+    children,
+    number_list,
+    numbers,
+    positive,
+)
 from tdac_envs.worlds.wbt.frames import Frame, flu_size
 from tdac_envs.worlds.wbt.meshes import mesh
 from tdac_envs.worlds.wbt.placing import placed
@@ -107,24 +113,35 @@ def _box(node: Node, frame: Frame, y_up: bool) -> _Made:
 
 
 def _sphere(node: Node, frame: Frame, _: bool) -> _Made:
-    radius = _positive(node, "radius", 1.0)
+    radius = positive(node, "radius", 1.0, 1.0)
     return sphere(frame, radius), 4.0 / 3.0 * math.pi * radius**3
 
 
 def _cylinder(node: Node, frame: Frame, _: bool) -> _Made:
-    radius, height = _positive(node, "radius", 1.0), _positive(node, "height", 2.0)
+    radius, height = (
+        positive(node, "radius", 1.0, 1.0),
+        positive(node, "height", 2.0, 1.0),
+    )
     return cylinder(frame, radius, height), math.pi * radius**2 * height
 
 
 def _capsule(node: Node, frame: Frame, _: bool) -> _Made:
-    radius, height = _positive(node, "radius", 1.0), _positive(node, "height", 2.0)
+    radius, height = (
+        positive(node, "radius", 1.0, 1.0),
+        positive(node, "height", 2.0, 1.0),
+    )
     volume = math.pi * radius**2 * (height + 4.0 / 3.0 * radius)
     return capsule(frame, radius, height), volume
 
 
+def _sizes(node: Node) -> tuple[float, float]:
+    """Radius and height; 1 if one is not above 0, as in Webots."""
+    return positive(node, "radius", 1.0, 1.0), positive(node, "height", 2.0, 1.0)
+
+
 def _cone(node: Node, frame: Frame, _: bool) -> _Made:
-    radius = _positive(node, "bottomRadius", 1.0)
-    height = _positive(node, "height", 2.0)
+    radius = positive(node, "bottomRadius", 1.0, 1.0)
+    height = positive(node, "height", 2.0, 1.0)
     return cone(frame, radius, height), math.pi * radius**2 * height / 3.0
 
 
@@ -142,9 +159,3 @@ _PRIMITIVES: dict[str, Callable[[Node, Frame, bool], _Made]] = {
     "Plane": _plane,
     "Sphere": _sphere,
 }
-
-
-def _positive(node: Node, name: str, default: float) -> float:
-    """A length; 1 if it is not above 0, as in Webots."""
-    length = number(node, name, default)
-    return length if length > 0.0 else 1.0

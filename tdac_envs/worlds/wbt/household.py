@@ -9,19 +9,36 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from tdac_envs.worlds.wbt.appearance import factor_of_red
-from tdac_envs.worlds.wbt.body import Body
-from tdac_envs.worlds.wbt.fields import number, numbers
+from tdac_envs.worlds.wbt.fields import number, numbers, positive
 from tdac_envs.worlds.wbt.frames import Frame, flu_size
 from tdac_envs.worlds.wbt.placing import Point, placed
 from tdac_envs.worlds.wbt.prisms import box, capsule, cylinder, sphere
 from tdac_envs.worlds.wbt.tree import Node
 from tdac_envs.worlds.world import Part
 
-Reader = Callable[[Node, Frame], Body]
-
 _LYING: tuple[float, float, float, float] = (0.0, 1.0, 0.0, math.pi / 2)
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A PROTO converted to prisms.
+
+    Attributes:
+        frame: Frame of the PROTO.
+        solid: Parts for collisions.
+        visible: Parts that sensors see.
+        mass: Mass, kg; None if the body is fixed.
+        reflectance: Reflectance of all parts.
+    """
+
+    frame: Frame
+    solid: tuple[Part, ...]
+    visible: tuple[Part, ...]
+    mass: float | None = None
+    reflectance: float = 1.0
 
 
 def _body(
@@ -35,11 +52,14 @@ def _body(
     return Body(own, parts, parts, mass if mass else None, reflectance)
 
 
+Reader = Callable[[Node, Frame], Body]
+
+
 def _ball(radius: float, mass: float, default: Point = (0.0, 0.0, 0.0)) -> Reader:
     def read(node: Node, frame: Frame) -> Body:
         own = placed(node, frame, default)
-        size = number(node, "radius", radius)
-        return _body(node, own, sphere(own.flu(), size if size > 0.0 else radius), mass)
+        parts = sphere(own.flu(), positive(node, "radius", radius))
+        return _body(node, own, parts, mass)
 
     return read
 
@@ -123,8 +143,7 @@ def _dog(node: Node, frame: Frame) -> Body:
 
 def scale_of(node: Node) -> float:
     """The field `scale` of a PROTO, if it is above 0; else 1."""
-    scale = number(node, "scale", 1.0)
-    return scale if scale > 0.0 else 1.0
+    return positive(node, "scale", 1.0)
 
 
 HOUSEHOLD: dict[str, Reader] = {

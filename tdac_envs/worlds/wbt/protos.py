@@ -13,10 +13,9 @@ import numpy as np
 
 from tdac_envs.worlds.footprint import THINNEST, ring
 from tdac_envs.worlds.wbt.appearance import reflectance
-from tdac_envs.worlds.wbt.body import Body
-from tdac_envs.worlds.wbt.fields import flag, number, numbers, text
+from tdac_envs.worlds.wbt.fields import flag, number, numbers, positive, text
 from tdac_envs.worlds.wbt.frames import Frame, flu_size, own_axes
-from tdac_envs.worlds.wbt.household import HOUSEHOLD, scale_of
+from tdac_envs.worlds.wbt.household import HOUSEHOLD, Body, scale_of
 from tdac_envs.worlds.wbt.physics import mass_of
 from tdac_envs.worlds.wbt.placing import Point, placed
 from tdac_envs.worlds.wbt.prisms import Vectors, box, capsule, cone, cylinder, hull
@@ -116,8 +115,8 @@ def _rock(node: Node, frame: Frame) -> Body:
 
 
 def _oil_barrel(node: Node, frame: Frame) -> Body:
-    radius = _positive(node, "radius", 0.305)
-    height = _positive(node, "height", 0.88)
+    radius = positive(node, "radius", 0.305)
+    height = positive(node, "height", 0.88)
     own = placed(node, frame, (0.0, 0.0, 0.44))
     parts = cylinder(own.flu(), radius, height)
     return Body(own, parts, parts, mass_of(node, math.pi * radius**2 * height))
@@ -139,8 +138,8 @@ def _traffic_cone(node: Node, frame: Frame) -> Body:
 
 
 def _solid_pipe(node: Node, frame: Frame) -> Body:
-    radius = max(_positive(node, "radius", 1.0), _NARROWEST)
-    height = _positive(node, "height", 2.0)
+    radius = max(positive(node, "radius", 1.0), _NARROWEST)
+    height = positive(node, "height", 2.0)
     thickness = number(node, "thickness", 0.1)
     if not 0.0 < thickness < radius:
         thickness = radius / 2  # as Webots does
@@ -215,8 +214,3 @@ def _box_mass(node: Node, size: Size, heaviest: float) -> float | None:
     """The mass of a box, kg, clamped to limits set by its size; None if it is fixed."""
     mass, least = number(node, "mass", 0.0), math.prod(size) ** (2.0 / 3.0)
     return min(max(mass, least), heaviest * least) if mass > 0.0 else None
-
-
-def _positive(node: Node, name: str, default: float) -> float:
-    length = number(node, name, default)
-    return length if length > 0.0 else default

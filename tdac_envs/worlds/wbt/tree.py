@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, replace
 
 from tdac_envs.core.errors import WorldFileError
 from tdac_envs.worlds.wbt.tokens import Kind, Source, Token, tokens
@@ -103,6 +103,34 @@ def parse(text: str, name: str) -> Document:
 
 
 Item = float | str | bool | Node | None
+
+
+def rebuilt(
+    node: Node, change: Callable[[Node], Node], without: Collection[str] = ()
+) -> Node:
+    """The node with changed inner nodes; the same if nothing changes.
+
+    Args:
+        node: The node.
+        change: Returns the node that takes the place of an inner one.
+        without: Names of fields that are left out.
+    """
+    fields: dict[str, Field] = {}
+    for name, own in node.fields.items():
+        if name not in without:
+            items = tuple(change(i) if isinstance(i, Node) else i for i in own.items)
+            same = all(new is old for new, old in zip(items, own.items, strict=True))
+            fields[name] = own if same else Field(items, own.offset)
+    if all(fields.get(name) is own for name, own in node.fields.items()):
+        return node
+    return with_fields(node, fields)
+
+
+def with_fields(node: Node, fields: dict[str, Field]) -> Node:
+    """The node with other fields."""
+    parts = (item for own in fields.values() for item in own.items)
+    size = 1 + sum(part.size for part in parts if isinstance(part, Node))
+    return replace(node, fields=fields, size=size)
 
 
 class _Parser:

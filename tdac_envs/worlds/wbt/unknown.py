@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 
 from tdac_envs.core.errors import hint
 from tdac_envs.core.intake import printable
 from tdac_envs.worlds.wbt.known_fields import GAINED_SCALE, KNOWN, LOST_SCALE
 from tdac_envs.worlds.wbt.tokens import Source
-from tdac_envs.worlds.wbt.tree import Document, Field, Node
+from tdac_envs.worlds.wbt.tree import Document, Node, rebuilt
 
 MOST_NOTES = 20
 _SCALES_CHANGED_IN = (2023, 2)
@@ -34,20 +35,8 @@ def _without_scale(document: Document) -> frozenset[str]:
 
 
 def _without(node: Node, kinds: frozenset[str]) -> Node:
-    lost = node.kind in kinds
-    fields = {
-        name: _field_without(own, kinds)
-        for name, own in node.fields.items()
-        if not (lost and name == "scale")
-    }
-    same = all(fields.get(name) is own for name, own in node.fields.items())
-    return node if same else replace(node, fields=fields)
-
-
-def _field_without(own: Field, kinds: frozenset[str]) -> Field:
-    items = tuple(_without(i, kinds) if isinstance(i, Node) else i for i in own.items)
-    same = all(new is old for new, old in zip(items, own.items, strict=True))
-    return own if same else Field(items, own.offset)
+    dropped = ("scale",) if node.kind in kinds else ()
+    return rebuilt(node, partial(_without, kinds=kinds), dropped)
 
 
 def unknown_fields(document: Document, own: Own) -> list[str]:
