@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
 
 MAX_QUOTED = 200
 """Largest number of characters that an error quotes from a file."""
+_MOST_FILES = 10_000
 
 
 class TdacError(Exception):
@@ -105,13 +107,46 @@ def one_line_reason(error: Exception) -> str:
     if isinstance(error, ValidationError):
         return first_problem(error)
     reason = error.strerror if isinstance(error, OSError) else error
-    return " ".join(str(reason).split())[:MAX_QUOTED]
+    beside = ""
+    if isinstance(error, FileNotFoundError) and error.filename is not None:
+        beside = file_hint(error.filename)
+    return " ".join(str(reason).split())[:MAX_QUOTED] + beside
 
 
 def hint(typed: str, known: Iterable[str]) -> str:
     """The suffix " (did you mean 'NAME'?)"; empty if no known name is similar."""
     meant = nearest(typed, known)
     return f" (did you mean {meant!r}?)" if meant else ""
+
+
+def offer(name: str, place: str, which: str, problem: str) -> str:
+    """What to do about a start or goal that cannot be used, then why it cannot.
+
+    Args:
+        name: `start` or `goal`.
+        place: A place that can be used.
+        which: Describes this place.
+        problem: What is wrong, with the place that was given.
+    """
+    return f"move the {name} to {place}, {which}: {problem}"
+
+
+def file_hint(path: str | Path) -> str:
+    """The suffix " (did you mean 'PATH'?)" for a file that does not exist.
+
+    It names the file in the same folder with the most similar name and the same suffix,
+    or with the same name and another suffix; empty if there is none.
+    """
+    wanted = Path(path)
+    try:
+        names = [other.name for other in islice(wanted.parent.iterdir(), _MOST_FILES)]
+    except (OSError, ValueError):
+        return ""
+    stems = {name.removesuffix(wanted.suffix): name for name in names}
+    same = [stem for stem, name in stems.items() if stem != name]
+    similar = stems.get(nearest(wanted.stem, same) or "")
+    found = similar or next((n for n in names if Path(n).stem == wanted.stem), None)
+    return f" (did you mean {str(wanted.with_name(found))!r}?)" if found else ""
 
 
 def nearest(typed: str, known: Iterable[str]) -> str | None:

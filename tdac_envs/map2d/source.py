@@ -18,7 +18,7 @@ from tdac_envs.core.arguments import (
     one_of,
     positive,
 )
-from tdac_envs.core.errors import MapError, TaskError, hint
+from tdac_envs.core.errors import MapError, TaskError, file_hint, hint
 from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import printable, read_array
 from tdac_envs.grid.grid import OccupancyGrid
@@ -326,11 +326,12 @@ def check_exists(path: Path) -> None:
     """Checks that a map exists.
 
     Raises:
-        MapError: It does not; the message suggests a bundled map with a similar name.
+        MapError: It does not; the message suggests a file beside it or a bundled map
+            with a similar name.
     """
     if path.exists():
         return
-    known = ""
+    known = file_hint(path)
     if not path.suffix:
         names = bundled_maps()
         known = f"{hint(str(path), names)}; bundled maps: {', '.join(names)}"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.errors import MapError
+from tdac_envs.core.errors import MapError, file_hint
 from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import IMAGE_BYTES, one_line, printable, read_file
 from tdac_envs.grid.grid import BoolGrid
@@ -127,7 +127,9 @@ def read_bytes(path: Path, most: int = IMAGE_BYTES) -> bytes:
     try:
         return read_file(path, most)
     except FileNotFoundError:
-        raise MapError(f"{path}: no such file; check the path") from None
+        raise MapError(
+            f"{path}: no such file{file_hint(path)}; check the path"
+        ) from None
     except IsADirectoryError:
         raise MapError(f"{path}: is a folder; give the map file in it") from None
     except OSError as error:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from tdac_envs.core.arguments import finite_point
-from tdac_envs.core.errors import WorldError, WorldFileError
+from tdac_envs.core.errors import WorldError, WorldFileError, file_hint
 from tdac_envs.core.intake import printable, read_file
 from tdac_envs.worlds.bodies import bodies, floor_under
 from tdac_envs.worlds.wbt.fields import children, number, number_list, numbers, text
@@ -122,7 +122,9 @@ def read_text(path: Path) -> str:
     try:
         data = read_file(path, LARGEST_FILE)
     except FileNotFoundError:
-        raise WorldError(f"{path}: no such file; check the path") from None
+        raise WorldError(
+            f"{path}: no such file{file_hint(path)}; check the path"
+        ) from None
     except IsADirectoryError:
         raise WorldError(f"{path}: is a folder; give the .wbt file in it") from None
     except OSError as error:

@@ -340,7 +340,7 @@ class TestArguments:
             (
                 {"start": (0.3, -0.14, 0)},
                 TaskError,
-                "start .* lies in an obstacle; the",
+                r"^move the start to \(.*: start .* lies in an obstacle$",
             ),
             (
                 {"start": (0.145, 0.3)},

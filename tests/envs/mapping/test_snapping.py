@@ -59,8 +59,9 @@ def test_a_start_in_the_wall_of_a_closet_leaves_it():
     assert moved.goal == GOAL
     free = body_free(clearance(cells), RADIUS)
     assert connected(free, moved.start, GOAL)
-    note = f"start moved from (110, 84) to {moved.start}{REACH}; across a wall"
-    assert moved.notes == (f"{note}: check the preview",)
+    note = f"start moved from (110, 84) to {moved.start}{REACH}"
+    why = "(110, 84) lies in an obstacle; across a wall: check the preview"
+    assert moved.notes == (f"{note}; {why}",)
 
 
 def test_both_ends_move_to_one_part_of_the_map():
