@@ -24,7 +24,7 @@ from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.judge.driving import FOREVER
 from tdac_agent.verification.judge.set_files import write_files
 from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of
-from tdac_envs.ladder.env import OnSet, make
+from tdac_envs.ladder.env import TaskSetEnv, make
 
 
 class Imported:
@@ -71,7 +71,7 @@ class Drives:
 
     def __init__(self, level: str) -> None:
         self._level = level
-        self._envs: dict[str, OnSet] = {}
+        self._envs: dict[str, TaskSetEnv] = {}
         self._driven: dict[tuple[str, str, int], WorldEpisode] = {}
 
     def __call__(self, source: str, split: str, index: int) -> WorldEpisode:

@@ -18,7 +18,7 @@ from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.judge.set_job import WorldEpisode, figures_of_world
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder import orca_driver, space_time
-from tdac_envs.ladder.orca_driver import Drive, drive_by_orca
+from tdac_envs.ladder.orca_driver import OrcaDrive, drive_by_orca
 from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.space_time import earliest_arrival
@@ -90,7 +90,7 @@ def _episode(
 
 def _plan(
     tasks: TaskSet, task: Map2DTask, split: str, index: int, salt: bytes | None
-) -> Drive | None:
+) -> OrcaDrive | None:
     """Steps and length of the planner's drive; None if it does not arrive."""
     if any(group.kind == "crowd" for group in tasks.file.movers):
         return drive_by_orca(task, tasks.file.errors, tasks.noise(split, index, salt))
@@ -98,4 +98,4 @@ def _plan(
     if arrival is None:
         return None
     legs = np.hypot(*np.diff(arrival.path[:, 1:], axis=0).T)
-    return Drive(arrival.steps, float(legs.sum()))
+    return OrcaDrive(arrival.steps, float(legs.sum()))

@@ -33,7 +33,7 @@ from tdac_agent.verification.judge.set_job import (
     figures_of,
     kept_worlds,
 )
-from tdac_envs.ladder.env import OnSet, make
+from tdac_envs.ladder.env import TaskSetEnv, make
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -54,7 +54,7 @@ class LearnedRuns:
     tasks: TaskSet
     split: str
     salt: bytes | None
-    env: OnSet
+    env: TaskSetEnv
 
     @classmethod
     def of(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, TABLE
 from tdac_envs.epuck.observed import ENCODER_STEP
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -63,7 +63,7 @@ def _places(file: SetFile, side: float) -> dict[str, tuple[str, str, str, str]]:
 def _readings(file: SetFile) -> dict[str, tuple[str, str, str, str]]:
     """Rows of the sensors of a robot."""
     robot = file.robot
-    if isinstance(robot, EPuckParams):
+    if isinstance(robot, EPuckRobotParams):
         return {
             "ps": (
                 f"({N_SENSORS},)",
@@ -142,11 +142,11 @@ def disturbance_lines(file: SetFile) -> Iterator[str]:
             "Noise of the odometry: distance and turn of each step are each multiplied "
             f"by a normal number with mean 1 and SD {own.odometry_noise:g}."
         )
-    if isinstance(file.robot, EPuckParams):
+    if isinstance(file.robot, EPuckRobotParams):
         yield from _epuck_errors(file.robot)
 
 
-def _epuck_errors(robot: EPuckParams) -> Iterator[str]:
+def _epuck_errors(robot: EPuckRobotParams) -> Iterator[str]:
     if robot.wheel_radius_error:
         yield (
             "Hidden wheel radii: each wheel's radius is wheel_radius times 1 + e, e "

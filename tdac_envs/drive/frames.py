@@ -21,7 +21,7 @@ SIDE = 1280
 """Side of a square into which the frames of all robots fit side by side, px."""
 
 
-class Frames:
+class BatchFrames:
     """Frames of the robots of a batch.
 
     Args:
@@ -82,7 +82,7 @@ class Frames:
 
 def frames_of(
     mode: object, envs: Sequence[DrivenEnv], robots: Any, count: int
-) -> Frames | None:
+) -> BatchFrames | None:
     """The frames of a batch with this render mode; None if the mode is None.
 
     Raises:
@@ -100,7 +100,7 @@ def frames_of(
             f"a batch of more than {MOST_DRAWN} robots cannot render; expected "
             f"render_mode None or a smaller num_envs, got {count} robots"
         )
-    return Frames(envs, robots, count)
+    return BatchFrames(envs, robots, count)
 
 
 def _fitted(frame: Image, largest: int) -> Image:

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Observed = NDArray[np.float32]
 
 
-class EPuckRobot(NamedTuple):
+class EPuckArrays(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
     `kernels._arrays_at` and the indices beside it follow the order of the fields.
@@ -59,7 +59,7 @@ class EPuckRobot(NamedTuple):
     outcome: Array
 
     @classmethod
-    def blank(cls, delay: int, *count: int) -> EPuckRobot:
+    def blank(cls, delay: int, *count: int) -> EPuckArrays:
         """One robot, or `count` of them, all zeros."""
         return cls(
             np.zeros((*count, kernels.N_CONSTANTS)),

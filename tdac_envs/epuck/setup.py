@@ -19,7 +19,7 @@ from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Setup(DriveSetup):
+class EPuckSetup(DriveSetup):
     """The part of an environment that does not change between episodes.
 
     Attributes:

@@ -60,7 +60,7 @@ class EPuckTask:
             the goal, m; see `paths.route`.
         shortest: d0, the length of the shortest grid path from the nominal start, m;
             see `path_from`.
-        about: What `info` says about the world of a task set; None elsewhere.
+        world_facts: What `info` says about the world of a task set; None elsewhere.
     """
 
     env_id: ClassVar = "TDAC-EPuck-v0"
@@ -74,11 +74,11 @@ class EPuckTask:
     horizon: int
     field: NDArray[np.float32]
     shortest: float
-    about: dict[str, Any] | None = None
+    world_facts: dict[str, Any] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         rest = (self.max_wheel_speed, self.goal_tolerance, self.dt, self.horizon)
-        return _restored, (self.ground, self.start, self.goal, *rest, self.about)
+        return _restored, (self.ground, self.start, self.goal, *rest, self.world_facts)
 
     @property
     def body_radius(self) -> float:
@@ -249,9 +249,9 @@ def _may_start(task: EPuckTask, pose: Pose) -> bool:
 
 def _restored(ground: Ground, start: Pose, goal: Point, *rest: Any) -> EPuckTask:
     """Restores a pickled task and recomputes what the pickle leaves out."""
-    limit, tolerance, dt, horizon, about = rest
+    limit, tolerance, dt, horizon, world_facts = rest
     field = route(ground, start[:2], goal)
     shortest = path_length_from(ground, field, start[:2])
     return EPuckTask(
-        ground, start, goal, limit, tolerance, dt, horizon, field, shortest, about
+        ground, start, goal, limit, tolerance, dt, horizon, field, shortest, world_facts
     )

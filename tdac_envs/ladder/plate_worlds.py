@@ -21,9 +21,9 @@ from tdac_envs.ladder.admission import (
 )
 from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.generators.blocks import PIXEL, Block, centres, raster
-from tdac_envs.ladder.generators.draft import Draft
+from tdac_envs.ladder.generators.draft import WorldDraft
 from tdac_envs.ladder.generators.plates import Plates, PlatesDraft, draw
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 from tdac_envs.ladder.worlds import LadderWorld
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.footprint import Rectangle
@@ -96,30 +96,30 @@ def make_plates(spec: PlatesSpec, key: bytes) -> PlatesWorld:
 
     Args:
         spec: What it is like.
-        key: 32 bytes, from `words.world_key`. All that is random follows from it.
+        key: 32 bytes, from `world_key`. All that is random follows from it.
 
     Raises:
         TaskError: None of the drafts fulfils the conditions.
         ValueError: The key has another length.
     """
-    words = Words(key)
+    random = RandomStream(key)
 
     def attempt() -> tuple[PlatesDraft, Admitted] | Rejection:
-        draft = draw(words, spec.generator)
-        found = _admitted(draft, words, spec)
+        draft = draw(random, spec.generator)
+        found = _admitted(draft, random, spec)
         return found if isinstance(found, Rejection) else (draft, found)
 
     made, rejected = first_admitted(spec.tries, spec.generator.name, attempt)
-    return _made(*made, words, rejected)
+    return _made(*made, random, rejected)
 
 
 def _admitted(
-    draft: PlatesDraft, words: Words, spec: PlatesSpec
+    draft: PlatesDraft, random: RandomStream, spec: PlatesSpec
 ) -> Admitted | Rejection:
     """Tests lengths on the pixels within blocks, and the gap on all that they touch."""
     blocks = (*draft.plates, *draft.things)
     inner, outer = (raster(draft.columns, draft.rows, blocks, t) for t in (False, True))
-    found = admit(Draft(inner, draft.places, outer), words, spec.conditions)
+    found = admit(WorldDraft(inner, draft.places, outer), random, spec.conditions)
     if isinstance(found, Rejection):
         return found
     if found.difficulty.steps * spec.dt > spec.max_seconds:
@@ -128,11 +128,14 @@ def _admitted(
 
 
 def _made(
-    draft: PlatesDraft, found: Admitted, words: Words, rejected: tuple[Rejection, ...]
+    draft: PlatesDraft,
+    found: Admitted,
+    random: RandomStream,
+    rejected: tuple[Rejection, ...],
 ) -> PlatesWorld:
     xs, ys = centres(draft.columns) / 1000, centres(draft.rows) / 1000
     start, goal = ((float(xs[i]), float(ys[j])) for i, j in (found.start, found.goal))
-    heading = words.uniform(-math.pi, math.pi)
+    heading = random.uniform(-math.pi, math.pi)
     sides = draft.columns * PIXEL / 1000, draft.rows * PIXEL / 1000
     floor = Rectangle(0.0, 0.0, 0.0, *sides)
     world = World(

@@ -35,7 +35,7 @@ from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import Terrain
 from tdac_envs.mapping.params import RobotParams
-from tdac_envs.movers.places import Places
+from tdac_envs.movers.destinations import Destinations
 from tdac_envs.movers.state import Movers
 
 _MAPPED = 16_384
@@ -50,7 +50,7 @@ _ALIGNED = 8
 """Alignment of the arrays, bytes."""
 MOST_PLATES = 512
 """Tasks of an e-puck that a process keeps, of about 1.2 MB each."""
-_MOVERS = "traits", "now", "points", "people", *Places._fields
+_MOVERS = "traits", "now", "points", "people", *Destinations._fields
 """Arrays of movers that are kept; the others are blank at a start."""
 
 
@@ -89,7 +89,7 @@ class TrainingPool:
         if task is None:
             world, made = self._set.world_and_task("train", index)
             assert isinstance(made, Map2DTask)
-            made = self._set.told(made, "train", index, world.difficulty)
+            made = self._set.with_facts(made, "train", index, world.difficulty)
             if path is not None:
                 _write(path, made, world.difficulty)
                 task = _mapped_task(path, self._set, index)
@@ -120,7 +120,7 @@ class PlatePool:
         task = self._tasks.get(index)
         if task is None:
             world, made = self._set.world_and_task("train", index)
-            task = self._set.told(made, "train", index, world.difficulty)
+            task = self._set.with_facts(made, "train", index, world.difficulty)
             self._tasks[index] = task
         self._tasks.move_to_end(index)
         if len(self._tasks) > MOST_PLATES:
@@ -214,7 +214,7 @@ def _mapped_task(path: Path, task_set: TaskSet, index: int) -> Map2DTask | None:
     if len(body) == 0 or zlib.crc32(body) != int.from_bytes(check, "little"):
         return None
     task, difficulty = _task(body, task_set)
-    return task_set.told(task, "train", index, difficulty)
+    return task_set.with_facts(task, "train", index, difficulty)
 
 
 def _arrays(body: memoryview) -> dict[str, NDArray[Any]]:
@@ -252,7 +252,7 @@ def _task(body: memoryview, task_set: TaskSet) -> tuple[Map2DTask, Difficulty]:
 
 def _movers(arrays: dict[str, NDArray[Any]], dt: float) -> Movers:
     """The movers of a task at its start."""
-    places = Places(*(arrays[name] for name in Places._fields))
-    crowd = places if len(arrays["people"]) else None
+    destinations = Destinations(*(arrays[name] for name in Destinations._fields))
+    crowd = destinations if len(arrays["people"]) else None
     movers = Movers.blank(len(arrays["traits"]), arrays["points"], dt, crowd)
     return movers._replace(**{name: arrays[name] for name in _MOVERS})

@@ -28,7 +28,7 @@ from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.generators.registry import AnyParameters
 from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.plate_worlds import PlatesSpec
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
 
@@ -122,7 +122,7 @@ def _robot_of(given: Any) -> Any:
     """The robot of a file: an e-puck if it has a `kind`, else that of maps."""
     if not isinstance(given, dict):
         return given
-    model = EPuckParams if "kind" in given else RobotParams
+    model = EPuckRobotParams if "kind" in given else RobotParams
     try:
         return model.model_validate(given)
     except ValidationError as error:
@@ -142,7 +142,7 @@ class SetFile(StrictModel):
     files: FilesSpec | None = Field(
         None, description="Worlds from files; `worlds: {folder: …}` is short for it."
     )
-    robot: Annotated[RobotParams | EPuckParams, BeforeValidator(_robot_of)] = (
+    robot: Annotated[RobotParams | EPuckRobotParams, BeforeValidator(_robot_of)] = (
         LEVEL_ROBOT
     )
     dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
@@ -202,7 +202,7 @@ class SetFile(StrictModel):
 
     def _check_robot(self) -> None:
         """Checks that worlds and observations are those of the robot."""
-        epuck = isinstance(self.robot, EPuckParams)
+        epuck = isinstance(self.robot, EPuckRobotParams)
         whose = "an e-puck" if epuck else "a robot on maps"
         if epuck and (self.files is not None or self.map):
             raise ValueError("an e-puck drives in generated worlds, without a map")
@@ -221,12 +221,12 @@ class SetFile(StrictModel):
     @property
     def unit(self) -> Literal["px", "m"]:
         """Unit of lengths."""
-        return "m" if isinstance(self.robot, EPuckParams) else "px"
+        return "m" if isinstance(self.robot, EPuckRobotParams) else "px"
 
     @property
     def full_step(self) -> float:
         """Distance of one step at full speed, px or m."""
-        rim = WHEEL_RADIUS if isinstance(self.robot, EPuckParams) else 1.0
+        rim = WHEEL_RADIUS if isinstance(self.robot, EPuckRobotParams) else 1.0
         return self.robot.max_wheel_speed * rim * self.dt
 
     @property
@@ -254,7 +254,7 @@ class SetFile(StrictModel):
             odometry_scale=own.odometry_scale,
             odometry_noise=own.odometry_noise,
             wheel_radius_error=(
-                robot.wheel_radius_error if isinstance(robot, EPuckParams) else 0.0
+                robot.wheel_radius_error if isinstance(robot, EPuckRobotParams) else 0.0
             ),
         )
 

@@ -21,7 +21,7 @@ from tdac_envs.movers.state import SPEED
 
 MOST_WORLDS = 2**31
 """Exclusive upper bound of the world numbers that are drawn at random."""
-TOLD = ("train", "dev")
+REVEALED = ("train", "dev")
 """Splits of which `info` says which world an episode has."""
 
 TRIES = 20
@@ -99,8 +99,8 @@ class SetSource:
     def _made(self, index: int) -> tuple[int, AnyWorld, AnyTask]:
         if self._last is None or self._last[0] != index:
             world, task = self._set.world_and_task(self._split, index, self._salt)
-            if self._split in TOLD:
-                task = self._set.told(task, self._split, index, world.difficulty)
+            if self._split in REVEALED:
+                task = self._set.with_facts(task, self._split, index, world.difficulty)
             self._last = index, world, task
         return self._last
 

@@ -22,7 +22,7 @@ from tdac_envs.ladder.admission import (
 )
 from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.generators.registry import GENERATORS, AnyParameters, draw
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 from tdac_envs.map2d.terrain import Terrain
 
 
@@ -112,17 +112,17 @@ def make_world(spec: WorldSpec, key: bytes) -> LadderWorld:
 
     Args:
         spec: What it is like.
-        key: 32 bytes, from `words.world_key`. All that is random follows from it.
+        key: 32 bytes, from `world_key`. All that is random follows from it.
 
     Raises:
         TaskError: None of the drafts fulfils the conditions.
         ValueError: The key has another length.
     """
-    words, name = Words(key), spec.generator.name
+    random, name = RandomStream(key), spec.generator.name
 
     def attempt() -> Admitted | Rejection:
-        draft = draw(words, spec.generator, 2.0 * spec.radius)
-        return admit(draft, words, spec.conditions)
+        draft = draw(random, spec.generator, 2.0 * spec.radius)
+        return admit(draft, random, spec.conditions)
 
     found, rejected = first_admitted(spec.tries, name, attempt)
-    return LadderWorld.of(found, words.uniform(-math.pi, math.pi), rejected)
+    return LadderWorld.of(found, random.uniform(-math.pi, math.pi), rejected)

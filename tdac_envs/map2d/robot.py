@@ -16,7 +16,7 @@ FRICTION = 0.4
 """Coulomb friction coefficient between a robot's body and the obstacles."""
 
 
-class Map2DRobot(NamedTuple):
+class Map2DArrays(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
     `kernels.arrays_at` and the indices beside it follow the order of the fields.
@@ -54,7 +54,7 @@ class Map2DRobot(NamedTuple):
     outcome: Array
 
     @classmethod
-    def blank(cls, n_rays: int, delay: int, *count: int) -> Map2DRobot:
+    def blank(cls, n_rays: int, delay: int, *count: int) -> Map2DArrays:
         """One robot, or `count` of them, all zeros."""
         return cls(
             np.zeros((*count, stepping.N_CONSTANTS)),

@@ -33,7 +33,7 @@ MOST_STARTS = 100
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Setup(DriveSetup):
+class Map2DSetup(DriveSetup):
     """The part of an environment that does not change between episodes.
 
     Attributes:

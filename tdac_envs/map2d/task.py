@@ -74,7 +74,7 @@ class Map2DTask:
         shortest: d0, the length of the shortest grid path from the nominal start, px;
             see `path_from`.
         movers: The movers at the start of the episode; None without movers.
-        about: What `info` says about the world of a task set; None elsewhere.
+        world_facts: What `info` says about the world of a task set; None elsewhere.
     """
 
     env_id: ClassVar = "TDAC-Map2D-v0"
@@ -89,12 +89,12 @@ class Map2DTask:
     field: NDArray[np.float32]
     shortest: float
     movers: Movers | None = None
-    about: dict[str, Any] | None = None
+    world_facts: dict[str, Any] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         rest = self.robot, self.goal_tolerance, self.dt, self.horizon
         ends = self.terrain, self.start, self.goal
-        return _restored, (*ends, *rest, self.movers, self.about)
+        return _restored, (*ends, *rest, self.movers, self.world_facts)
 
     @property
     def body_radius(self) -> float:

@@ -81,12 +81,12 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         if view is None:
             return result
         seen, rewards, terminated, truncated, infos = result
-        told = view.info(infos)
-        if "final_obs" in told:
-            for i in np.flatnonzero(told["_final_obs"]).tolist():
-                told["final_obs"][i] = view.seen(told["final_obs"][i], i)
-            told["final_info"] = view.info(told["final_info"])
-        return view.seen(seen), rewards, terminated, truncated, told
+        infos = view.info(infos)
+        if "final_obs" in infos:
+            for i in np.flatnonzero(infos["_final_obs"]).tolist():
+                infos["final_obs"][i] = view.seen(infos["final_obs"][i], i)
+            infos["final_info"] = view.info(infos["final_info"])
+        return view.seen(seen), rewards, terminated, truncated, infos
 
     @property
     def step_rows(self) -> Callable[..., None]:  # type: ignore[override]

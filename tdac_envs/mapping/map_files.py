@@ -21,7 +21,7 @@ from tdac_envs.mapping.image import (
     read_bytes,
     read_picture,
 )
-from tdac_envs.mapping.ros_rule import RosMap, ros_cells, ros_notes
+from tdac_envs.mapping.ros_rule import RosMapFile, ros_cells, ros_notes
 
 
 def load_image(path: str | Path) -> MapImage:
@@ -72,7 +72,7 @@ def read_ros_yaml(path: Path) -> MapImage:
     )
 
 
-def _parse_ros(text: bytes, path: Path) -> RosMap:
+def _parse_ros(text: bytes, path: Path) -> RosMapFile:
     try:
         fields = parse_yaml(text)
     except ValueError as error:
@@ -80,7 +80,7 @@ def _parse_ros(text: bytes, path: Path) -> RosMap:
     if not isinstance(fields, dict) or "image" not in fields:
         raise MapError(f"{path}: not a ROS map: expected a field `image`")
     try:
-        return RosMap.model_validate(fields)
+        return RosMapFile.model_validate(fields)
     except ValidationError as error:
         raise MapError(f"{path}: {first_problem(error)}") from None
 

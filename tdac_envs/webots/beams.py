@@ -18,8 +18,8 @@ from tdac_envs.webots.floors import Floors
 from tdac_envs.webots.mounts import in_world, lookup_table, sorted_rows
 from tdac_envs.webots.rays import nearest_hit
 from tdac_envs.worlds.wbt.fields import number, text
-from tdac_envs.worlds.wbt.frames import Frame
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.frames import NodeFrame
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 TYPES = {"generic": 0, "infra-red": 1, "sonar": 2, "laser": 3}
 _USUAL = (0.0, 0.0, 0.0, 0.1, 1000.0, 0.0)
@@ -87,7 +87,7 @@ def ground_sensors() -> tuple[Beam, ...]:
     )
 
 
-def read_beam(node: Node, frame: Frame) -> Beam:
+def read_beam(node: WbtNode, frame: NodeFrame) -> Beam:
     """Reads a DistanceSensor, or the PROTO E-puckDistanceSensor.
 
     Args:

@@ -13,9 +13,9 @@ from tdac_envs.webots.mounts import Mount, level_frame, unit_axes
 from tdac_envs.webots.rendering import look_through
 from tdac_envs.webots.scenery import Scenery
 from tdac_envs.worlds.wbt.fields import number, numbers, text
-from tdac_envs.worlds.wbt.frames import Frame, own_axes
+from tdac_envs.worlds.wbt.frames import NodeFrame, own_axes
 from tdac_envs.worlds.wbt.robots import ROBOTS
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 MOST_PIXELS = 1 << 21
 """Largest image; cameras with more pixels are not modelled."""
@@ -77,7 +77,7 @@ class CameraFacts:
 
 
 def find_cameras(
-    robot: Node, own: Frame, mounted: Iterable[Mount]
+    robot: WbtNode, own: NodeFrame, mounted: Iterable[Mount]
 ) -> tuple[tuple[CameraFacts, ...], tuple[str, ...]]:
     """The cameras of an e-puck, and the names of those that are not modelled.
 
@@ -105,7 +105,7 @@ def find_cameras(
     return tuple(found), tuple(absent)
 
 
-def _read(node: Node, prefix: str, frame: Frame) -> CameraFacts:
+def _read(node: WbtNode, prefix: str, frame: NodeFrame) -> CameraFacts:
     """Reads a Camera, or the camera of the PROTO, whose fields have a prefix."""
     name = "camera" if prefix else text(node, "name", "camera")
     (width, height), view = _EPUCK_SIZE if prefix else _CAMERA_SIZE
@@ -122,7 +122,7 @@ def _read(node: Node, prefix: str, frame: Frame) -> CameraFacts:
     )
 
 
-def _length(node: Node, field: str, usual: int) -> int:
+def _length(node: WbtNode, field: str, usual: int) -> int:
     """A number of pixels; the default if the given number is below 1."""
     length = int(number(node, field, usual))
     return length if length >= 1 else usual

@@ -26,10 +26,10 @@ from tdac_envs.worlds.wbt.fields import (
     numbers,
     text,
 )
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.geometry import GROUPS
 from tdac_envs.worlds.wbt.placing import placed
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 _HEIGHT = 0.0329
 _TABLE = (1.0, 4095.0, 0.01, 2.0, 0.0, 0.01)
@@ -96,7 +96,7 @@ def _spot(angle: float, width: float, cut_off: float) -> float:
     return (angle - cut_off) / (width - cut_off)
 
 
-def find_lights(nodes: Iterable[Node], frame: Frame) -> tuple[Light, ...]:
+def find_lights(nodes: Iterable[WbtNode], frame: NodeFrame) -> tuple[Light, ...]:
     """The lights of a file that are on.
 
     Args:
@@ -106,7 +106,7 @@ def find_lights(nodes: Iterable[Node], frame: Frame) -> tuple[Light, ...]:
     return tuple(_lights(nodes, frame))
 
 
-def _lights(nodes: Iterable[Node], frame: Frame) -> Iterator[Light]:
+def _lights(nodes: Iterable[WbtNode], frame: NodeFrame) -> Iterator[Light]:
     for node in nodes:
         try:
             if node.kind in _KINDS and flag(node, "on", True):
@@ -120,7 +120,7 @@ def _lights(nodes: Iterable[Node], frame: Frame) -> Iterator[Light]:
             continue
 
 
-def _light(node: Node, frame: Frame) -> Light:
+def _light(node: WbtNode, frame: NodeFrame) -> Light:
     down = (0.0, -1.0, 0.0) if frame.y_up else (0.0, 0.0, -1.0)
     if node.kind == "SpotLight":
         down = (0.0, 0.0, -1.0)
@@ -204,7 +204,7 @@ def standard_cells() -> tuple[LightCell, ...]:
     )
 
 
-def read_cell(node: Node, frame: Frame) -> LightCell:
+def read_cell(node: WbtNode, frame: NodeFrame) -> LightCell:
     """Reads a LightSensor.
 
     Args:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.errors import WorldError
 from tdac_envs.worlds.wbt.fields import children, number_list
-from tdac_envs.worlds.wbt.frames import Frame, axis_angle, own_axes, world_frame
+from tdac_envs.worlds.wbt.frames import NodeFrame, axis_angle, own_axes, world_frame
 from tdac_envs.worlds.wbt.placing import placed
 from tdac_envs.worlds.wbt.robots import ROBOTS
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import EPuck
 
 _TURRET, _UNDER = (-0.0095, 0.0, 0.0486), (0.03, 0.0, 0.0003)
@@ -35,16 +35,16 @@ class Mount(NamedTuple):
             up; its origin is on the ground between the wheels.
     """
 
-    node: Node
-    frame: Frame
+    node: WbtNode
+    frame: NodeFrame
 
 
-def level_frame(own: Frame) -> Frame:
+def level_frame(own: NodeFrame) -> NodeFrame:
     """The frame of the PROTO's node in the robot's axes (forward, left, up)."""
     return world_frame(not own.y_up, own.y_up)
 
 
-def unit_axes(node: Node, frame: Frame, what: str) -> NDArray[np.float64]:
+def unit_axes(node: WbtNode, frame: NodeFrame, what: str) -> NDArray[np.float64]:
     """The axes of a frame, forward, left and up, of length 1 as columns.
 
     Raises:
@@ -57,7 +57,7 @@ def unit_axes(node: Node, frame: Frame, what: str) -> NDArray[np.float64]:
     return np.asarray(axes / lengths)
 
 
-def lookup_table(node: Node, usual: tuple[float, ...]) -> tuple[float, ...]:
+def lookup_table(node: WbtNode, usual: tuple[float, ...]) -> tuple[float, ...]:
     """The `lookupTable` of a sensor, or the usual one if it is empty.
 
     Raises:
@@ -95,7 +95,7 @@ def in_world(
     return turn @ place + (x, y, base), turn @ axis
 
 
-def mounts(robot: Node, own: Frame, epuck: EPuck) -> Iterator[Mount]:
+def mounts(robot: WbtNode, own: NodeFrame, epuck: EPuck) -> Iterator[Mount]:
     """All nodes in the slots of an e-puck or in a Robot node.
 
     Args:
@@ -110,7 +110,9 @@ def mounts(robot: Node, own: Frame, epuck: EPuck) -> Iterator[Mount]:
         # An e-puck in a file is often saved with a slight tilt, but drives upright.
         level = axis_angle(0.0, 0.0, 1.0, -epuck.heading)
         origin = own.origin - (epuck.x, epuck.y, epuck.z)
-        yield from _within(robot, Frame(level @ own.matrix, level @ origin, own.y_up))
+        yield from _within(
+            robot, NodeFrame(level @ own.matrix, level @ origin, own.y_up)
+        )
         return
     base = level_frame(own)
     turret = base.inside(own_axes(_TURRET, own.y_up))
@@ -121,13 +123,13 @@ def mounts(robot: Node, own: Frame, epuck: EPuck) -> Iterator[Mount]:
             yield from _mounted(node, frame)
 
 
-def _within(node: Node, frame: Frame) -> Iterator[Mount]:
+def _within(node: WbtNode, frame: NodeFrame) -> Iterator[Mount]:
     for field in ("children", "endPoint", "device"):
         for part in children(node, field):
             yield from _mounted(part, frame)
 
 
-def _mounted(node: Node, frame: Frame) -> Iterator[Mount]:
+def _mounted(node: WbtNode, frame: NodeFrame) -> Iterator[Mount]:
     if node.kind not in _NO_FRAME:
         try:
             frame = placed(node, frame, _PLACES.get(node.kind, (0.0, 0.0, 0.0)))

@@ -15,8 +15,8 @@ from tdac_envs.webots.mounts import Mount, unit_axes
 from tdac_envs.webots.rays import scan
 from tdac_envs.webots.scenery import Scenery
 from tdac_envs.worlds.wbt.fields import flag, number, text
-from tdac_envs.worlds.wbt.frames import Frame
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.frames import NodeFrame
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 MOST_RANGES = 1 << 20
 """Most values of a range image; devices with more are not modelled."""
@@ -235,7 +235,7 @@ def find_scanners(mounted: Iterable[Mount]) -> tuple[ScannerFacts, ...]:
     return tuple(found.values())
 
 
-def _lidar(node: Node, frame: Frame) -> ScannerFacts:
+def _lidar(node: WbtNode, frame: NodeFrame) -> ScannerFacts:
     proto = _PROTOS.get(node.kind, _Proto("lidar", {}))
     usual = {**_LIDAR, **proto.fields}
     own = ("noise",) if node.kind in _PROTOS else tuple(_LIDAR)
@@ -268,7 +268,7 @@ def _lidar(node: Node, frame: Frame) -> ScannerFacts:
     )  # fmt: skip
 
 
-def _finder(node: Node, frame: Frame) -> ScannerFacts:
+def _finder(node: WbtNode, frame: NodeFrame) -> ScannerFacts:
     values = {name: number(node, name, value) for name, value in _FINDER.items()}
     name = text(node, "name", "range-finder")
     columns = _count(values, _FINDER, "width")

@@ -43,7 +43,7 @@ from tdac_agent.verification.judge.set_checks import (
 from tdac_agent.verification.judge.set_files import write_files
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
-from tdac_envs.ladder.env import OnSet, make
+from tdac_envs.ladder.env import TaskSetEnv, make
 from tdac_envs.ladder.scores import barn_score, path_score, time_score
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.task_sets import AnyTask, AnyWorld
@@ -168,7 +168,7 @@ class SetRun:
     child_pool: ChildPool
 
     @cached_property
-    def env(self) -> OnSet:
+    def env(self) -> TaskSetEnv:
         """The environment, with complete infos for the judge."""
         job, folder = self.job, self.job.hidden_folder
         return make(
@@ -312,7 +312,7 @@ def _loaded(child: Child) -> Driver:
 
 
 def figures_of(
-    env: OnSet,
+    env: TaskSetEnv,
     split: str,
     index: int,
     rollout: Rollout,

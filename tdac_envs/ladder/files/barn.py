@@ -17,7 +17,7 @@ from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.core.models import LenientModel
 from tdac_envs.grid.grid import BoolGrid
-from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.file_world import FileWorld
 
 BARN_SPEED = 2.0
 """Top speed that the challenge's score refers to, m/s."""
@@ -43,7 +43,7 @@ class BarnFile(LenientModel):
     worlds: dict[str, BarnWorld] = Field(min_length=1, max_length=10_000)
 
 
-def read_barn(path: Path, resolution: float) -> list[FoundWorld]:
+def read_barn(path: Path, resolution: float) -> list[FileWorld]:
     """The worlds of a file, in its order.
 
     A pixel is occupied if its centre is in a cylinder. The map ends with the cylinders,
@@ -63,7 +63,7 @@ def read_barn(path: Path, resolution: float) -> list[FoundWorld]:
         raise TaskError(f"{path}: {one_line_reason(error)}") from None
 
 
-def _world(path: Path, file: BarnFile, name: str, resolution: float) -> FoundWorld:
+def _world(path: Path, file: BarnFile, name: str, resolution: float) -> FileWorld:
     world, heading = file.worlds[name], file.start[2]
     centres = np.array(world.cylinders, np.float64).reshape(-1, 2)
     ends = np.array([file.start[:2], file.goal])
@@ -82,7 +82,7 @@ def _world(path: Path, file: BarnFile, name: str, resolution: float) -> FoundWor
     pixels = _pixels(np.vstack([ends, centres]), (left, top), resolution)
     cells = _drawn(pixels[2:], file.cylinder_radius / resolution, (height, width))
     start, goal = ((round(x), round(y)) for x, y in pixels[:2].tolist())
-    return FoundWorld(
+    return FileWorld(
         name=name,
         file=f"{path}, world {name}",
         kind="barn",

@@ -11,7 +11,7 @@ from pathlib import Path
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.hashing import sha256_of
 from tdac_envs.ladder.files.barn import read_barn
-from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.ladder.files.index import files_of, read_folder
 from tdac_envs.ladder.files.spec import AnySplit, FileSplit, FilesSpec
 
@@ -35,7 +35,7 @@ class FileWorlds:
         runs: Episodes of each world.
     """
 
-    splits: Mapping[AnySplit, tuple[FoundWorld, ...]]
+    splits: Mapping[AnySplit, tuple[FileWorld, ...]]
     skipped: tuple[str, ...]
     sha256: str
     hidden_folder: Path | None = None
@@ -47,7 +47,7 @@ class FileWorlds:
         """Number of episodes of each split."""
         return {s: len(worlds) * self.runs for s, worlds in self.splits.items()}
 
-    def of(self, split: str, index: int) -> FoundWorld:
+    def of(self, split: str, index: int) -> FileWorld:
         """The world of an episode: all have their first run, then all their second.
 
         Args:
@@ -164,10 +164,10 @@ def _opened(
 
 
 def shared_out(
-    worlds: Sequence[FoundWorld],
+    worlds: Sequence[FileWorld],
     splits: Sequence[FileSplit],
     tests: Collection[str] = (),
-) -> dict[AnySplit, tuple[FoundWorld, ...]]:
+) -> dict[AnySplit, tuple[FileWorld, ...]]:
     """The worlds of each split, in an order that follows from their hashes.
 
     Worlds with the same map or the same origin belong to a group, and so do those that
@@ -183,7 +183,7 @@ def shared_out(
     Raises:
         ValueError: There is no world of a name.
     """
-    shared: dict[AnySplit, list[FoundWorld]] = {split: [] for split in splits}
+    shared: dict[AnySplit, list[FileWorld]] = {split: [] for split in splits}
     named = groups(worlds)
     pairs = list(zip(worlds, named, strict=True))
     chosen = {group for world, group in pairs if world.name in tests}
@@ -199,7 +199,7 @@ def shared_out(
     }
 
 
-def groups(worlds: Sequence[FoundWorld]) -> list[str]:
+def groups(worlds: Sequence[FileWorld]) -> list[str]:
     """The name of each world's group: its first origin, or its first map's hash."""
     names = [links(each) for each in worlds]
     group: dict[str, set[str]] = {}
@@ -211,7 +211,7 @@ def groups(worlds: Sequence[FoundWorld]) -> list[str]:
     return [min(group[next(iter(link))]) for link in names]
 
 
-def links(world: FoundWorld) -> set[str]:
+def links(world: FileWorld) -> set[str]:
     """What makes a world one of a group: its map, and its origin if that is known."""
     origin = [f"from {world.origin}"] if world.origin else []
     return {f"map {world.content}", *origin}

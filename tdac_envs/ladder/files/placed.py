@@ -11,14 +11,14 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import body_free, clearance
 from tdac_envs.grid.plan import distance_field
 from tdac_envs.ladder.admission import Conditions, measured
-from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.ladder.passages import bottleneck
-from tdac_envs.ladder.words import rounded
+from tdac_envs.ladder.random_stream import rounded
 from tdac_envs.ladder.worlds import LadderWorld
 
 
 def placed_world(
-    found: FoundWorld, radius: float, step: float, tolerance: float, dt: float
+    found: FileWorld, radius: float, step: float, tolerance: float, dt: float
 ) -> LadderWorld:
     """A feasible world of a file with the figures of its difficulty.
 

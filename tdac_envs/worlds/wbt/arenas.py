@@ -7,9 +7,9 @@ import numpy as np
 from tdac_envs.worlds.footprint import THINNEST, Disc, Rectangle
 from tdac_envs.worlds.wbt.colours import floor_look, wall_look
 from tdac_envs.worlds.wbt.fields import number, numbers, positive
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.placing import placed
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import Arena
 
 ARENAS = {"CircleArena", "RectangleArena", "Floor"}
@@ -17,7 +17,7 @@ _LEVEL = 0.02
 """Largest tilt at which a floor counts as level, rad."""
 
 
-def arena(node: Node, frame: Frame) -> Arena | str:
+def arena(node: WbtNode, frame: NodeFrame) -> Arena | str:
     """Reads a CircleArena, RectangleArena or Floor.
 
     Returns:

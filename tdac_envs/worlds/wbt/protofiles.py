@@ -20,9 +20,9 @@ from tdac_envs.worlds.wbt.protos import PROTOS
 from tdac_envs.worlds.wbt.robots import ROBOTS, is_epuck
 from tdac_envs.worlds.wbt.tree import (
     Document,
-    Field,
     Item,
-    Node,
+    WbtField,
+    WbtNode,
     parse,
     rebuilt,
     with_fields,
@@ -53,8 +53,8 @@ class Proto:
         body: The node of which it consists, with marks where it uses a field.
     """
 
-    defaults: dict[str, Field]
-    body: Node
+    defaults: dict[str, WbtField]
+    body: WbtNode
 
 
 @dataclass(slots=True)
@@ -79,7 +79,7 @@ class ProtoFolder:
         """Names of the fields of each PROTO that was expanded."""
         return {kind: proto.defaults for kind, proto in self._known.items() if proto}
 
-    def _expand(self, node: Node, depth: int) -> Node:
+    def _expand(self, node: WbtNode, depth: int) -> WbtNode:
         if node.kind in ROBOTS or is_epuck(node):
             return node
         if node.kind not in PROTOS and node.kind not in ARENAS and depth < DEEPEST:
@@ -147,19 +147,19 @@ def _closing(text: str, start: int) -> int:
     return -1
 
 
-def _filled(node: Node, values: dict[str, Field]) -> Node:
+def _filled(node: WbtNode, values: dict[str, WbtField]) -> WbtNode:
     """The node with values instead of marks; fields without a value are left out."""
-    fields: dict[str, Field] = {}
+    fields: dict[str, WbtField] = {}
     for name, own in node.fields.items():
         items = tuple(_items(own.items, values))
         if items or not own.items:
-            fields[name] = Field(items, own.offset)
+            fields[name] = WbtField(items, own.offset)
     return with_fields(node, fields)
 
 
-def _items(items: Iterable[Item], values: dict[str, Field]) -> Iterable[Item]:
+def _items(items: Iterable[Item], values: dict[str, WbtField]) -> Iterable[Item]:
     for item in items:
-        if not isinstance(item, Node):
+        if not isinstance(item, WbtNode):
             yield item
         elif item.kind == _MARK:
             yield from values[item.define].items if item.define in values else ()

@@ -16,7 +16,7 @@ Pixel = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
-class FoundWorld:
+class FileWorld:
     """A map with a task, as read from a file.
 
     Attributes:
