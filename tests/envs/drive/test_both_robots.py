@@ -233,6 +233,14 @@ class TestActions:
 
 @each_robot
 class TestNoise:
+    def test_it_is_off_by_default(self, case):
+        seen = []
+        for seed in (1, 2):
+            env = case.walled()
+            rows = [env.reset(seed=seed)[0], *(env.step(FULL)[0] for _ in range(15))]
+            seen.append([np.concatenate(list(row.values())) for row in rows])
+        np.testing.assert_array_equal(*seen)
+
     def test_a_delay_holds_actions_back(self, case):
         env = case.open(delay=2)
         env.reset(seed=0)

@@ -2,7 +2,6 @@
 
 import json
 import math
-import pickle
 
 import brute_force
 import gymnasium as gym
@@ -15,7 +14,6 @@ from tdac_envs.map2d.env import Map2DEnv
 
 FULL = np.ones(2, np.float32)
 LEFT_TURN = np.array([-1.0, 1.0], np.float32)
-NOISY = {"range_noise": 0.3, "wheel_slip": 0.4, "motor_lag": 0.1, "delay": 3}
 
 
 def open_env(side=300, start=(50, 150, 0), goal=(250, 150), **more):
@@ -174,25 +172,6 @@ class TestInfo:
 
 
 class TestNoise:
-    def rollout(self, env, seed, steps=200):
-        env.action_space.seed(0)
-        rows = [env.reset(seed=seed)[0]]
-        for _ in range(steps):
-            observation, *_ = env.step(env.action_space.sample())
-            assert observation in env.observation_space
-            rows.append(observation)
-        return np.array([np.concatenate(list(row.values())) for row in rows])
-
-    def test_it_is_seeded(self):
-        env = walled_env(on_collision="block", **NOISY)
-        one, two = self.rollout(env, 5), self.rollout(env, 5)
-        np.testing.assert_array_equal(one, two)
-        assert (self.rollout(env, 6) != one).any()
-
-    def test_it_is_off_by_default(self):
-        one, two = (self.rollout(walled_env(), seed, 30) for seed in (1, 2))
-        np.testing.assert_array_equal(one, two)
-
     def test_range_noise_is_relative_and_keeps_to_the_space(self):
         env = walled_env(range_noise=0.1)
         noisy = np.array([env.reset(seed=s)[0]["ranges"] for s in range(200)])
@@ -201,20 +180,6 @@ class TestNoise:
         spread = (noisy[:, near] / exact[near]).std()
         assert spread == pytest.approx(0.1, abs=0.02)
         assert noisy.max() <= np.float32(220.0)
-
-
-class TestVariations:
-    def test_a_deep_pickle_in_the_middle_of_an_episode_goes_on_alike(self):
-        env = walled_env(variation="jitter", **NOISY)
-        env.reset(seed=3)
-        for _ in range(10):
-            env.step(FULL)
-        twin = pickle.loads(pickle.dumps(env))
-        for _ in range(20):
-            one, two = env.step(LEFT_TURN), twin.step(LEFT_TURN)
-            assert one[1:] == two[1:]
-            for key in one[0]:
-                np.testing.assert_array_equal(one[0][key], two[0][key])
 
 
 class TestArguments:
