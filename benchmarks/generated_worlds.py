@@ -21,7 +21,7 @@ import numpy as np
 
 from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.generators.registry import GENERATORS
-from tdac_envs.ladder.words import world_key
+from tdac_envs.ladder.random_stream import world_key
 from tdac_envs.ladder.worlds import WorldSpec, make_world
 
 FIGURES = [field.name for field in fields(Difficulty)]

@@ -23,7 +23,7 @@ from tdac_envs.core.errors import TdacError
 from tdac_envs.grid.grid import body_free, clearance
 from tdac_envs.grid.plan import distance_field
 from tdac_envs.ladder.generators.registry import GENERATORS
-from tdac_envs.ladder.words import world_key
+from tdac_envs.ladder.random_stream import world_key
 from tdac_envs.ladder.worlds import LadderWorld, WorldSpec, make_world
 from tdac_envs.map2d.env import Map2DEnv
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.ladder.generators.registry import GENERATORS
-from tdac_envs.ladder.words import world_key
+from tdac_envs.ladder.random_stream import world_key
 from tdac_envs.ladder.worlds import LadderWorld, WorldSpec, make_world
 
 FILE = Path(__file__).parent.parent / "docs" / "generated-worlds.png"

@@ -25,7 +25,7 @@ from tdac_envs.grid.plan import path_length
 from tdac_envs.map2d.source import units_of
 from tdac_envs.map2d.task import Terrain, make_task
 from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
-from tdac_envs.mapping.candidates import Candidate, Preset
+from tdac_envs.mapping.candidates import MapCandidate, Preset
 from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.map_folder import write_map
 from tdac_envs.mapping.params import (
@@ -150,7 +150,7 @@ def run(
             preset=preset,
             snap=snap,
             heading=task.heading or 0.0,
-            said=said,
+            options=said,
             units=units,
         )
     except PicturedError as error:
@@ -209,7 +209,7 @@ def _print_drive(
         )
 
 
-def _row(candidate: Candidate) -> dict[str, object]:
+def _row(candidate: MapCandidate) -> dict[str, object]:
     reading, terms = candidate.reading, candidate.terms
     return {
         "polarity": reading.polarity,
@@ -224,7 +224,7 @@ def _row(candidate: Candidate) -> dict[str, object]:
 
 
 def _print_reading(
-    console: Console, params: MapParams, chosen: Candidate, units: MapUnits
+    console: Console, params: MapParams, chosen: MapCandidate, units: MapUnits
 ) -> None:
     """Prints the map's name and size, how it was read, and the notes."""
     size = f"{params.width} x {params.height} px"
@@ -237,7 +237,7 @@ def _print_reading(
 
 
 def _print_candidates(
-    console: Console, ranked: list[Candidate], units: MapUnits
+    console: Console, ranked: list[MapCandidate], units: MapUnits
 ) -> None:
     """Prints the best candidates with a legend, and why others are infeasible."""
     feasible = [c for c in ranked if c.terms is not None]
@@ -263,7 +263,9 @@ def _print_candidates(
         console.print(f"and {more} (--json lists all)")
 
 
-def _table(candidates: list[Candidate], readings: list[str], units: MapUnits) -> Table:
+def _table(
+    candidates: list[MapCandidate], readings: list[str], units: MapUnits
+) -> Table:
     """The figures of feasible candidates, with their reading if there are several."""
     table = Table(title="Candidates, the chosen one first", title_justify="left")
     lengths = [f"{name}, {units.name}" for name in ("margin", "clearance", "grid path")]
@@ -285,7 +287,7 @@ def _table(candidates: list[Candidate], readings: list[str], units: MapUnits) ->
     return table
 
 
-def _describe(candidate: Candidate) -> str:
+def _describe(candidate: MapCandidate) -> str:
     """How a candidate reads the image."""
     reading = candidate.reading
     text = obstacles_text(reading)

@@ -22,12 +22,12 @@ from tdac_agent.verification.judge.worlds import movers_of
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.epuck.infrared import RANGE
-from tdac_envs.ladder.dead_ends import Sensor, dead_ends
+from tdac_envs.ladder.dead_ends import RangeSensor, dead_ends
 from tdac_envs.ladder.generators.blocks import PIXEL
 from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.picture import AHEAD, contact_sheet, draw_world
 from tdac_envs.ladder.plate_worlds import PlatesWorld
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import SetFile, shipped_names
 from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
@@ -158,12 +158,14 @@ def _world_record(
     }
 
 
-def _sensor(file: SetFile, pixel: float) -> Sensor:
+def _sensor(file: SetFile, pixel: float) -> RangeSensor:
     """The robot's sensor for `dead_ends`; that of an e-puck looks all around."""
     robot = file.robot
-    if isinstance(robot, EPuckParams):
-        return Sensor(8, math.radians(315.0), (BODY_RADIUS + RANGE) / pixel)
-    return Sensor(robot.n_rays, math.radians(robot.field_of_view_deg), robot.range_max)
+    if isinstance(robot, EPuckRobotParams):
+        return RangeSensor(8, math.radians(315.0), (BODY_RADIUS + RANGE) / pixel)
+    return RangeSensor(
+        robot.n_rays, math.radians(robot.field_of_view_deg), robot.range_max
+    )
 
 
 def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None:
@@ -220,7 +222,7 @@ def _horizon(file: SetFile) -> str:
 def _robot(file: SetFile) -> str:
     robot = file.robot
     speed = f"{file.full_step / file.dt:g} {file.unit}/s"
-    if isinstance(robot, EPuckParams):
+    if isinstance(robot, EPuckRobotParams):
         return f"e-puck, radius {robot.radius:g} m, {speed}"
     return (
         f"radius {robot.radius:g} px, axle {robot.axle_length:g} px, {speed}, "
@@ -231,7 +233,7 @@ def _robot(file: SetFile) -> str:
 
 def _disturbed(file: SetFile) -> str:
     values = file.disturbances.model_dump()
-    if isinstance(file.robot, EPuckParams):
+    if isinstance(file.robot, EPuckRobotParams):
         values |= file.robot.errors
     given = {name: value for name, value in values.items() if value}
     return ", ".join(f"{name} {value:g}" for name, value in given.items())

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, TABLE
 from tdac_envs.epuck.observed import ENCODER_STEP
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -63,7 +63,7 @@ def _places(file: SetFile, side: float) -> dict[str, tuple[str, str, str, str]]:
 def _readings(file: SetFile) -> dict[str, tuple[str, str, str, str]]:
     """Rows of the sensors of a robot."""
     robot = file.robot
-    if isinstance(robot, EPuckParams):
+    if isinstance(robot, EPuckRobotParams):
         return {
             "ps": (
                 f"({N_SENSORS},)",
@@ -144,12 +144,12 @@ def disturbance_lines(file: SetFile) -> Iterator[str]:
             f"by a normal number with mean 1 and SD {own.odometry_noise:g}.",
         ),
     ]
-    if isinstance(file.robot, EPuckParams):
+    if isinstance(file.robot, EPuckRobotParams):
         sizes_and_lines += _epuck_errors(file.robot)
     return (line for size, line in sizes_and_lines if size)
 
 
-def _epuck_errors(robot: EPuckParams) -> list[tuple[float, str]]:
+def _epuck_errors(robot: EPuckRobotParams) -> list[tuple[float, str]]:
     listed = ", ".join(
         f"{1e3 * distance:g}: {robot.sensor_noise * spread:.2g}"
         for distance, _, spread in TABLE.tolist()

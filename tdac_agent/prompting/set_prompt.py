@@ -17,7 +17,7 @@ from tdac_agent.verification.judge.set_files import level_params
 from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.infrared import PLACES, TABLE
 from tdac_envs.ladder.generators.plates import Plates
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.task_sets import TaskSet
 
 SET_TEMPLATE = "set"
@@ -85,7 +85,7 @@ def _robot(tasks: TaskSet) -> dict[str, Any]:
     """Variables of the robot and its worlds."""
     file = tasks.file
     robot = file.robot
-    if not isinstance(robot, EPuckParams):
+    if not isinstance(robot, EPuckRobotParams):
         return {
             "robot": robot,
             "turn": 2.0 * file.full_step / robot.axle_length,

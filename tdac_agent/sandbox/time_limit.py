@@ -2,8 +2,8 @@
 
 While the judge works, the clock of a program stands. While it runs, the program
 computes, sleeps, or waits for a CPU. It may compute and sleep for a given time: in a
-single call together, in an episode of its own for each. Waiting is the machine's doing: it counts for nothing, and ends the run as a failure of
-the machine in the end.
+single call together, in an episode of its own for each. Waiting is the machine's
+doing: it counts for nothing, and ends the run as a failure of the machine in the end.
 """
 
 from __future__ import annotations

@@ -7,13 +7,16 @@ import json
 from pathlib import Path
 
 from tdac_agent.storage.files import open_regular
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
-
-def sha256_of(data: bytes | str) -> str:
-    """The hash of bytes, or of a text as UTF-8; half characters are kept."""
-    raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
-    return hashlib.sha256(raw).hexdigest()
+__all__ = [
+    "number_of",
+    "sha256_of",
+    "sha256_of_file",
+    "sha256_of_json",
+    "sha256_of_large_file",
+]
 
 
 def sha256_of_json(value: object) -> str:

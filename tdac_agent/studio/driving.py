@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tdac_envs.drawing.canvas import Image
-from tdac_envs.ladder.env import OnSet, make
+from tdac_envs.ladder.env import TaskSetEnv, make
 
 FORWARD = {"ArrowUp", "w", "W"}
 BACKWARD = {"ArrowDown", "s", "S"}
@@ -23,7 +23,7 @@ class KeyboardDrive:
         index: Number of the world.
     """
 
-    def __init__(self, env: OnSet, index: int) -> None:
+    def __init__(self, env: TaskSetEnv, index: int) -> None:
         self._env, self._index = env, index
         self._pressed: set[str] = set()
         self.dt = env.task.dt if env.setup.source is None else env.set.file.dt

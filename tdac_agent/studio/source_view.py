@@ -23,7 +23,7 @@ from tdac_envs.mapping.score import widest_radius
 from tdac_envs.mapping.wording import obstacles_text, scale_text
 from tdac_envs.worlds.bodies import bodies
 from tdac_envs.worlds.bundled import bundled_worlds, world_file
-from tdac_envs.worlds.picture import View, bounds_of, draw_things
+from tdac_envs.worlds.picture import WorldCanvas, bounds_of, draw_things
 from tdac_envs.worlds.wbt.reader import load_world
 
 Kind = Literal["map", "world"]
@@ -122,7 +122,7 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
     image = load_image(bundled.image if bundled else Path(source))
     said = ReadingOptions(None if image.occupied is not None else polarity, None)  # type: ignore[arg-type]
     grid, params, _ = preprocess_with_candidates(
-        image, None, None, 15.0, preset="default", snap=False, heading=0.0, said=said
+        image, None, None, 15.0, preset="default", snap=False, heading=0.0, options=said
     )
     zoom = _zoom(grid.cells)
     picture = _laid_over(image, grid.cells, zoom)
@@ -156,7 +156,7 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
 
 def _of_world(source: str) -> SourceView:
     world = load_world(world_file(source))
-    view = View(bounds_of(world), strip=0)
+    view = WorldCanvas(bounds_of(world), strip=0)
     draw_things(view, world, bodies(world))
     picture = view.canvas.image
     solid = [node.name or node.kind for node in world.unmodelled if node.may_be_solid]

@@ -21,7 +21,7 @@ from tdac_agent.training.plan import (
 )
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.ladder.env import OnSet, make
+from tdac_envs.ladder.env import TaskSetEnv, make
 from tdac_envs.ladder.set_file import shipped_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.ladder.vector import make as make_batch
@@ -65,7 +65,7 @@ def make_set_plan(
     for argument, number in (("n_envs", n_envs), ("episodes", episodes)):
         if number is not None:
             whole_number(argument, number, 1, MOST_ROBOTS)
-    defaults = read_hyperparameters(config or config_file(algo), OnSet.title)
+    defaults = read_hyperparameters(config or config_file(algo), TaskSetEnv.title)
     for own in _OWN & defaults.env.keys():
         raise TaskError(f"env_kwargs: {own} is set by the training; leave it out")
     tasks.check_count(TRAINED, 1, "training worlds")

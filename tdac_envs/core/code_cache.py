@@ -9,11 +9,11 @@ there.
 from __future__ import annotations
 
 import functools
-import hashlib
 import sys
 from importlib.metadata import version
 from pathlib import Path
 
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.trusted_folders import copy, is_private, is_usable, user_cache
 
 PACKAGE = Path(__file__).parents[1]
@@ -86,4 +86,4 @@ def _key() -> str:
     versions = sys.version, version("numba"), version("llvmlite"), version("numpy")
     features = sorted(llvm.get_host_cpu_features().items())
     platform = repr((versions, llvm.get_host_cpu_name(), features, settings))
-    return hashlib.sha256(b"\0".join([platform.encode(), *sources])).hexdigest()[:16]
+    return sha256_of(b"\0".join([platform.encode(), *sources]))[:16]

@@ -76,9 +76,11 @@ class _Progress(event.Listener):  # type: ignore[misc]
     def on_start(self, event: Any) -> None:
         if event.data["dispatcher"] not in KERNELS:
             return
-        done = sum(bool(each.signatures) for each in KERNELS)
-        what = f"compiling for this machine{self.expected}, cached for later runs"
-        self.message = f"{what}: kernel {done + 1}"
+        what = _part_of(event.data["dispatcher"])
+        own = [each for each in KERNELS if _part_of(each) == what]
+        number = min(sum(bool(each.signatures) for each in own) + 1, len(own))
+        how_long = f"{self.expected}cached for later runs"
+        self.message = f"compiling {what}, {number} of {len(own)} ({how_long})"
         now = time.monotonic()
         if now - self._reported >= REPORT_SECONDS:
             self._reported = now
@@ -89,6 +91,18 @@ class _Progress(event.Listener):  # type: ignore[misc]
             self.message = ""
 
 
+def _part_of(compiled: Any) -> str:
+    """What a kernel belongs to, in the words of a user."""
+    package = compiled.py_func.__module__.split(".")[1:2]
+    return _PARTS.get("".join(package), "the environment")
+
+
+_PARTS = {
+    "grid": "the path planner",
+    "ladder": "the maker of worlds",
+    "mapping": "the reader of maps",
+    "webots": "the sensors of Webots",
+}
 _progress = _Progress()
 event.register("numba:compile", _progress)
 
@@ -108,7 +122,7 @@ def expect(seconds: float) -> Iterator[None]:
     begin = time.perf_counter()
     _work()
     here = seconds * (time.perf_counter() - begin) / USUAL
-    _progress.expected = f", about {max(round(here / 5.0) * 5, 5)} s"
+    _progress.expected = f"about {max(round(here / 5.0) * 5, 5)} s, "
     try:
         yield
     finally:

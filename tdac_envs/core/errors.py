@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -14,6 +15,7 @@ MAX_QUOTED = 200
 """Largest number of characters that an error quotes from a file."""
 LEAST_LIKENESS = 0.6
 """Of a known key that is suggested for an unknown one."""
+_MOST_FILES = 10_000
 
 
 class TdacError(Exception):
@@ -170,7 +172,10 @@ def one_line_reason(error: Exception, form: Any = None) -> str:
     if isinstance(error, ValidationError):
         return first_problem(error, form)
     reason = error.strerror if isinstance(error, OSError) else error
-    return " ".join(str(reason).split())[:MAX_QUOTED]
+    beside = ""
+    if isinstance(error, FileNotFoundError) and error.filename is not None:
+        beside = file_hint(error.filename)
+    return " ".join(str(reason).split())[:MAX_QUOTED] + beside
 
 
 def hint(typed: str, known: Iterable[str]) -> str:
@@ -181,6 +186,36 @@ def hint(typed: str, known: Iterable[str]) -> str:
 
 def _meant(names: Sequence[str]) -> str:
     return f" (did you mean {names[0]!r}?)" if names else ""
+
+
+def offer(name: str, place: str, which: str, problem: str) -> str:
+    """What to do about a start or goal that cannot be used, then why it cannot.
+
+    Args:
+        name: `start` or `goal`.
+        place: A place that can be used.
+        which: Describes this place.
+        problem: What is wrong, with the place that was given.
+    """
+    return f"move the {name} to {place}, {which}: {problem}"
+
+
+def file_hint(path: str | Path) -> str:
+    """The suffix " (did you mean 'PATH'?)" for a file that does not exist.
+
+    It names the file in the same folder with the most similar name and the same suffix,
+    or with the same name and another suffix; empty if there is none.
+    """
+    wanted = Path(path)
+    try:
+        names = [other.name for other in islice(wanted.parent.iterdir(), _MOST_FILES)]
+    except (OSError, ValueError):
+        return ""
+    stems = {name.removesuffix(wanted.suffix): name for name in names}
+    same = [stem for stem, name in stems.items() if stem != name]
+    similar = stems.get(nearest(wanted.stem, same) or "")
+    found = similar or next((n for n in names if Path(n).stem == wanted.stem), None)
+    return f" (did you mean {str(wanted.with_name(found))!r}?)" if found else ""
 
 
 def nearest(typed: str, known: Iterable[str]) -> str | None:

@@ -15,7 +15,7 @@ CLOSE_UP = 372
 """Width of a close-up, frame px."""
 
 
-class Window(NamedTuple):
+class CloseUpWindow(NamedTuple):
     """A square part of a map or world: smallest x and y, and side length, px or m."""
 
     x: float
@@ -51,10 +51,10 @@ class Backdrop(Protocol):
     def whole(self) -> Chart:
         """A chart of the whole map or world, with start, goal and shortest path."""
 
-    def window(self, middle: Points, extent: float) -> Window:
+    def window(self, middle: Points, extent: float) -> CloseUpWindow:
         """A part around a point, at least `extent` wide."""
 
-    def close_up(self, window: Window) -> Chart:
+    def close_up(self, window: CloseUpWindow) -> Chart:
         """A chart of a part, `CLOSE_UP` px wide."""
 
 

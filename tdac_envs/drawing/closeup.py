@@ -14,8 +14,8 @@ from tdac_envs.drawing.backdrop import (
     CLOSE_UP,
     Backdrop,
     Chart,
+    CloseUpWindow,
     Points,
-    Window,
     discs_on,
 )
 from tdac_envs.drawing.canvas import (
@@ -206,7 +206,7 @@ def _draw_trail(canvas: Canvas, places: Points) -> None:
 
 def _window(
     background: Backdrop, event: Event, poses: Points, scale: float
-) -> Window | None:
+) -> CloseUpWindow | None:
     """The part to enlarge; None if no close-up is worthwhile."""
     for where in (event.where, poses[-1:, :2]):
         low, high = where.min(axis=0), where.max(axis=0)
@@ -217,7 +217,7 @@ def _window(
     return None
 
 
-def _draw_window(chart: Chart, window: Window) -> None:
+def _draw_window(chart: Chart, window: CloseUpWindow) -> None:
     x, y, side = window
     corners = np.array([(0, 0), (side, 0), (side, side), (0, side), (0, 0)])
     at = chart.at(corners + np.array([x, y]))

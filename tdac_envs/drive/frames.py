@@ -13,7 +13,7 @@ import numpy as np
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import PAPER, Image, blank
 from tdac_envs.drive.env import DrivenEnv
-from tdac_envs.drive.stepping import REACHED, TOUCHED, TRUNCATED
+from tdac_envs.drive.stepping import REACHED, TOUCHED, TRUNCATED, row_of
 
 MOST_DRAWN = 64
 """Largest number of robots in a batch that can be rendered."""
@@ -21,7 +21,7 @@ SIDE = 1280
 """Side of a square into which the frames of all robots fit side by side, px."""
 
 
-class Frames:
+class BatchFrames:
     """Frames of the robots of a batch.
 
     Args:
@@ -39,7 +39,7 @@ class Frames:
     def bind(self, robots: Any) -> None:
         """From now on, draws the robots of these arrays."""
         for i, viewer in enumerate(self._viewers):
-            viewer.robot = robots.row(i)
+            viewer.robot = row_of(robots, i)
 
     def begin(self, which: Iterable[int], tasks: Sequence[Any]) -> None:
         """Begins new trails for robots that have been reset.
@@ -82,7 +82,7 @@ class Frames:
 
 def frames_of(
     mode: object, envs: Sequence[DrivenEnv], robots: Any, count: int
-) -> Frames | None:
+) -> BatchFrames | None:
     """The frames of a batch with this render mode; None if the mode is None.
 
     Raises:
@@ -100,7 +100,7 @@ def frames_of(
             f"a batch of more than {MOST_DRAWN} robots cannot render; expected "
             f"render_mode None or a smaller num_envs, got {count} robots"
         )
-    return Frames(envs, robots, count)
+    return BatchFrames(envs, robots, count)
 
 
 def _fitted(frame: Image, largest: int) -> Image:

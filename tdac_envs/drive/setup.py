@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -16,7 +17,13 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.drive.disturbances import Disturbances, Random
 from tdac_envs.drive.rewards import RewardWeights
-from tdac_envs.drive.task import VARIATIONS
+from tdac_envs.drive.stepping import UNDISTURBED
+from tdac_envs.drive.task import (
+    VARIATIONS,
+    default_horizon,
+    mixed_start,
+    random_task,
+)
 
 
 class TaskSource(Protocol):
@@ -79,6 +86,33 @@ class DriveSetup:
         """`Robot.constants` of the nominal task."""
         raise NotImplementedError
 
+    def shared_constants(self, speed: float, reach: float, friction: float) -> Any:
+        """The entries of `constants` that all robots have, of the nominal task.
+
+        Args:
+            speed: Full speed of a wheel.
+            reach: Largest range of the distance sensors.
+            friction: Coefficient of friction between body and obstacles.
+        """
+        task = self.nominal
+        return [
+            task.axle_length,
+            speed,
+            task.dt,
+            task.body_radius,
+            reach,
+            math.exp(-task.dt / self.motor_lag) if self.motor_lag else 0.0,
+            self.delay,
+            self.on_collision == "terminate",
+            task.full_step,
+            *self.weights,
+            *task.goal,
+            task.goal_tolerance,
+            task.horizon,
+            friction,
+            *UNDISTURBED,
+        ]
+
     def draw(self, options: dict[str, Any], random: Random) -> tuple[Any, Random]:
         """The task of an episode, and the random numbers of its disturbances.
 
@@ -98,28 +132,16 @@ class DriveSetup:
     def _varied(self, options: dict[str, Any], random: Random) -> Any:
         task = self.nominal
         if options:
-            drawn = self._with_ends(options)
+            drawn = task.with_ends(**options)
         elif self.variation == "random":
-            drawn = self._random_task(random)
+            drawn = random_task(task, random)
         elif self.variation == "mixed":
-            return task.moved(self._mixed_start(random))
+            return task.moved(mixed_start(task, random))
         elif self.variation == "jitter":
             return task.moved(task.jittered(random))
         else:
             return task
         if self.fixed_horizon or drawn.goal == task.goal:
             return drawn
-        return replace(drawn, horizon=self._default_horizon(drawn))
-
-    def _with_ends(self, options: dict[str, Any]) -> Any:
-        """The nominal task with the start and goal of the options."""
-        raise NotImplementedError
-
-    def _random_task(self, random: Random) -> Any:
-        raise NotImplementedError
-
-    def _mixed_start(self, random: Random) -> Any:
-        raise NotImplementedError
-
-    def _default_horizon(self, task: Any) -> int:
-        raise NotImplementedError
+        horizon = default_horizon(drawn.shortest, drawn.full_step)
+        return replace(drawn, horizon=horizon)

@@ -1,13 +1,14 @@
 """Parts of a compiled step shared by all environments: motion, reward, episode end.
 
 A robot's state is kept in a few arrays. The constants below are the indices of the
-entries that all environments have; each environment's class `Robot` documents them.
+entries that all environments have; `Map2DRobot` and `EPuckRobot` document them.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from types import EllipsisType
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ from tdac_envs.drive.rewards import RewardWeights, step_reward
 _TWO_PI = 2.0 * math.pi
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Robot = TypeVar("Robot", bound=tuple[NDArray[Any], ...])
+"""The arrays of a robot: `Map2DRobot` or `EPuckRobot`."""
 
 # Entries of `constants`.
 AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
@@ -173,6 +176,22 @@ def info_of(outcome: list[float]) -> dict[str, Any]:
         "path_distance": remaining,
         "clearance": room,
     }
+
+
+def row_of(robots: Robot, index: int) -> Robot:
+    """Views of the arrays of one of many robots."""
+    return type(robots)(*(array[index] for array in robots))
+
+
+def place(robot: Any, task: Any, index: int | EllipsisType = ...) -> None:
+    """Places a robot, or robot `index` of many, at the start of a task.
+
+    The kernel `begin` must be called next.
+    """
+    wanted = *task.goal, task.goal_tolerance, task.horizon
+    robot.constants[index, GOAL_X : HORIZON + 1] = wanted
+    robot.state[index, : HEADING + 1] = task.start
+    robot.outcome[index, REMAINING] = task.shortest
 
 
 @kernel

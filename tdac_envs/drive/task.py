@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class Pose(NamedTuple):
     heading: float
 
 
-def default_horizon_for(shortest: float, full_step: float) -> int:
+def default_horizon(shortest: float, full_step: float) -> int:
     """Six times the steps of the shortest path at full speed, but at least 2500."""
     return max(MIN_HORIZON, math.ceil(min(6.0 * shortest / full_step, 2.0**62)))
 
@@ -56,6 +57,45 @@ def jittered_pose(
             return pose
         reach *= 0.98
     return nominal._replace(heading=pose.heading)
+
+
+def mixed_start(task: Any, random: np.random.Generator) -> Pose:
+    """A jittered start or, with probability 0.5, any feasible one.
+
+    The latter is drawn from the places of the task's field that are connected to the
+    goal, so that a learner sees all parts of the map without having to drive there
+    first.
+    """
+    if random.random() < 0.5:
+        start: Pose = task.jittered(random)
+        return start
+    connected = np.flatnonzero(np.isfinite(task.field))
+    for _ in range(MAX_DRAWS):
+        x, y = task.point(int(random.choice(connected)))
+        heading = wrap_heading(random.uniform(-math.pi, math.pi))
+        if not task.is_at_goal(x, y, task.goal):
+            return Pose(x, y, heading)
+    nominal: Pose = task.start
+    return nominal
+
+
+def random_task(task: Any, random: np.random.Generator) -> Any:
+    """A task with any feasible start and goal; all else but the path is the same.
+
+    Both points are drawn from the places of the task's field that are connected to the
+    nominal goal. If every draw starts within the tolerance of its goal, the result is
+    the nominal task.
+    """
+    connected = np.flatnonzero(np.isfinite(task.field))
+    for _ in range(MAX_DRAWS):
+        end, begin = (int(random.choice(connected)) for _ in range(2))
+        heading = wrap_heading(random.uniform(-math.pi, math.pi))
+        goal, (x, y) = task.point(end), task.point(begin)
+        if not task.is_at_goal(x, y, goal):
+            field, start = task.field_to(end), Pose(x, y, heading)
+            length = float(field.flat[begin])
+            return replace(task, start=start, goal=goal, field=field, shortest=length)
+    return task
 
 
 def check_full_step(dt: float, speed: float, unit: str) -> None:

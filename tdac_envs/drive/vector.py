@@ -25,6 +25,7 @@ from tdac_envs.drive.batching import (
     ends_of,
     infos_of,
     joint_space,
+    make_envs,
     mask_of,
     seeds_of,
     store_actions,
@@ -41,20 +42,22 @@ Result = tuple[Observations, Array, Flags, Flags, dict[str, Any]]
 class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
     """Base class of the vector environments: many independent robots.
 
-    Robot i behaves bit for bit as `envs[i % len(envs)]` does with the same seed and
+    Robot i behaves bit for bit as an environment does with the same arguments, seed and
     actions: both call the same compiled functions.
 
     Args:
-        envs: Environments of one class, whose robots' arrays have the same shapes.
-            Each has a `robot` and a `setup`, as `Map2DEnv` has.
         num_envs: Number of robots.
         autoreset_mode: When the next episode begins after one has ended.
         threads: Number of threads; by default the number of cores.
+        each: Arguments that differ between robots; see `Map2DVectorEnv`. The arrays of
+            all robots have the same shapes.
         render_mode: `"rgb_array"`, for up to 64 robots, or None.
         max_episode_steps: Steps after which an episode is truncated, in addition to
             its horizon, as by Gymnasium's `TimeLimit`; None for no further limit.
+        **options: Arguments of all environments.
 
     Attributes:
+        make: Class of the environments.
         step_rows: The compiled loop over robots; see
             `tdac_envs.map2d.kernels.step_rows`.
         copied: Observation keys that this loop fills in.
@@ -63,20 +66,25 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             shape (num_envs, 3).
     """
 
+    make: Callable[..., Any]
     step_rows: Callable[..., None]
     copied: tuple[str, ...]
     infos_of: Callable[[Array, Flags], dict[str, Any]] = staticmethod(infos_of)
 
     def __init__(
         self,
-        envs: Sequence[Any],
-        num_envs: int,
+        num_envs: int = 1,
         *,
-        autoreset_mode: str | AutoresetMode,
-        threads: int | None,
-        render_mode: str | None,
-        max_episode_steps: int | None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        each: Sequence[dict[str, Any]] = ({},),
+        render_mode: str | None = None,
+        max_episode_steps: int | None = None,
+        **options: Any,
     ) -> None:
+        num_envs = whole_number("num_envs", num_envs, 1)
+        envs = make_envs(self.make, each, options, num_envs)
+        self._adopt(envs, num_envs)
         self._most_steps = time_limit_of(max_episode_steps)
         self.num_envs = num_envs
         self.autoreset_mode = autoreset_mode_of(autoreset_mode)
@@ -115,6 +123,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         self.goals = np.array([task.goal for task in self.tasks], np.float32)
         self._starts = np.array([(*task.start, task.shortest) for task in self.tasks])
         self._bind()
+        self._prepare()
 
     def reset(
         self,
@@ -243,6 +252,12 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             self._frames.bind(self.robots)
         self._bind()
 
+    def _adopt(self, envs: Sequence[Any], num_envs: int) -> None:
+        """Takes from the environments what a subclass needs before arrays are bound."""
+
+    def _prepare(self) -> None:
+        """Prepares what a subclass adds, after all else."""
+
     def _seen(self) -> Observations:
         """The robots' own observation arrays, without noise."""
         raise NotImplementedError
@@ -281,7 +296,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
 
     def _arrays(self, i: int) -> tuple[NDArray[Any], ...]:
         """The arrays of a robot and its world that the kernels take."""
-        return *self.setups[i].world(self.tasks[i]), *self.robots.row(i)
+        return *self.setups[i].world(self.tasks[i]), *stepping.row_of(self.robots, i)
 
     def _begin(self, mask: Flags, options: dict[str, Any]) -> None:
         chosen = np.flatnonzero(mask)
@@ -314,7 +329,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         self.goals[i] = task.goal
         if task.field is not before.field:
             self._addresses.put(i, self.setups[i].world(task))
-        self.robots.place(task, i)
+        stepping.place(self.robots, task, i)
 
     def _random(self, i: int) -> np.random.Generator:
         random = self._randoms[i]

@@ -288,7 +288,7 @@ def stop_at_contact(
         state: Begins with x, y and heading, which are overwritten.
         forward: Arc length, m, negative backwards.
         turn: Change of heading, rad.
-        constants: See `tdac_envs.epuck.robot.Robot`.
+        constants: See `tdac_envs.epuck.robot.EPuckArrays`.
 
     Returns:
         Whether it touched a part, and the fraction of the arc that its wheels drove.

@@ -18,12 +18,12 @@ from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
-from tdac_envs.drive.stepping import info_of
+from tdac_envs.drive.stepping import info_of, place
 from tdac_envs.epuck import kernels, observed
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.movables import Movables
-from tdac_envs.epuck.robot import Robot
-from tdac_envs.epuck.setup import Setup
+from tdac_envs.epuck.robot import EPuckArrays
+from tdac_envs.epuck.setup import EPuckSetup
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
 
@@ -213,7 +213,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             goal_tolerance=goal_tolerance,
             horizon=horizon,
         )
-        setup = Setup(
+        setup = EPuckSetup(
             nominal=nominal,
             variation=variation,
             fixed_horizon=horizon is not None,
@@ -241,7 +241,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     @classmethod
     def of(
         cls,
-        setup: Setup,
+        setup: EPuckSetup,
         sensor_noise: float = 0.0,
         further: Sequence[str] = (),
         render_mode: str | None = None,
@@ -261,7 +261,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
     def _prepare(
         self,
-        setup: Setup,
+        setup: EPuckSetup,
         sensor_noise: float,
         further: tuple[str, ...],
         render_mode: str | None,
@@ -275,7 +275,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self._has_more = bool(self.further or self.disturbances.odometry)
         self.observation_space = space  # type: ignore[assignment]
         self._movables = Movables(setup, setup.nominal)
-        self.robot = Robot.blank(self.delay)
+        self.robot = EPuckArrays.blank(self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
         self._bind()
@@ -298,7 +298,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if task.field is not before.field:
             self._bind()
         self._movables.reset()
-        self.robot.place(task)
+        place(self.robot, task)
         self._hide()
         self._goal[:] = task.goal
         self._call_begin()

@@ -1,6 +1,6 @@
 """Compiled step of TDAC-EPuck-v0: motion up to a contact, sensors, reward, episode end.
 
-`tdac_envs.epuck.robot.Robot` documents the arrays of a robot.
+`tdac_envs.epuck.robot.EPuckArrays` documents the arrays of a robot.
 """
 
 from __future__ import annotations
@@ -241,8 +241,8 @@ def driving(move_body: Any) -> Any:
         `points` to `listed` describe the solid parts and `seen_points` to `seen_listed`
         the visible ones; see `tdac_envs.epuck.gaps` and `nearby.Nearby` beside it.
         `field`, shape (height, width), is the path length to the goal from each grid
-        point, m. The others are the arrays of `Robot`. All of them are overwritten
-        except `constants` and, in `state`, the commands and the slip.
+        point, m. The others are the arrays of `EPuckArrays`. All of them are
+        overwritten except `constants` and, in `state`, the commands and the slip.
         """
         _turn_wheels(constants, state, queue, wheel_speeds, outcome)
         forward, turn, x, y = state[FORWARD], state[TURN], state[X], state[Y]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from tdac_envs.core.addresses import Words
 from tdac_envs.drive.stepping import FORWARD, TOUCHED, TURN
 from tdac_envs.epuck import kernels
-from tdac_envs.epuck.robot import Robot
-from tdac_envs.epuck.setup import Setup
+from tdac_envs.epuck.robot import EPuckArrays
+from tdac_envs.epuck.setup import EPuckSetup
 from tdac_envs.epuck.task import EPuckTask
 
 
@@ -29,7 +29,7 @@ class Movables:
             velocities.
     """
 
-    def __init__(self, setup: Setup, task: EPuckTask) -> None:
+    def __init__(self, setup: EPuckSetup, task: EPuckTask) -> None:
         self._task, self._visible = task, setup.around(task).visible
         ground = task.ground
         # `ground.solid` and `visible` keep the initial positions.
@@ -50,7 +50,7 @@ class Movables:
         self.things[:, :2] = self._task.ground.centres
         self._carry()
 
-    def step(self, words: Words, robot: Robot, drive: Callable[[], None]) -> None:
+    def step(self, words: Words, robot: EPuckArrays, drive: Callable[[], None]) -> None:
         """Runs one step, with the physics engine if an object is near or moves.
 
         Args:
@@ -58,7 +58,7 @@ class Movables:
             robot: Arrays of the robot.
             drive: Runs the step without the physics engine.
         """
-        from tdac_envs.epuck.pushing import Drive, is_near, push
+        from tdac_envs.epuck.pushing import CommandedArc, is_near, push
 
         task, state, outcome = self._task, robot.state, robot.outcome
         if not is_near(self.solid, state, self.things, 1.5 * task.full_step):
@@ -70,7 +70,7 @@ class Movables:
         ground = task.ground
         outcome[TOUCHED] = push(
             self.solid, ground.solid, ground.centres, ground.masses,
-            state, self._speed, self.things, Drive(forward, turn, task.dt),
+            state, self._speed, self.things, CommandedArc(forward, turn, task.dt),
             ground.world.friction,
         )  # fmt: skip
         self._carry()

@@ -17,7 +17,7 @@ from tdac_envs.drive.stepping import HEADING
 from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, sense_ground
 from tdac_envs.epuck.kernels import LEFT_TURNED, MOST_TURNED, RIGHT_TURNED
 from tdac_envs.epuck.prisms import Prisms
-from tdac_envs.epuck.robot import Robot
+from tdac_envs.epuck.robot import EPuckArrays
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
@@ -78,7 +78,9 @@ def noisy(readings: Observed, spreads: Array, normal: Array) -> Observed:
     return np.clip(readings * factor, 0.0, LARGEST).astype(np.float32)
 
 
-def ground_readings(seen: Prisms, floor: float, robot: Robot) -> tuple[Observed, Array]:
+def ground_readings(
+    seen: Prisms, floor: float, robot: EPuckArrays
+) -> tuple[Observed, Array]:
     """Readings of gs0 to gs2 of one robot and their relative standard deviations.
 
     Args:
@@ -91,13 +93,13 @@ def ground_readings(seen: Prisms, floor: float, robot: Robot) -> tuple[Observed,
     return readings, spreads
 
 
-def position(robot: Robot, floor: float | Array) -> Observed:
+def position(robot: EPuckArrays, floor: float | Array) -> Observed:
     """Reading of the GPS: x, y and height, m, shape (3,)."""
     height = np.broadcast_to(np.float32(floor), robot.pose.shape[:-1])
     return np.concatenate([robot.pose[..., :2], height[..., None]], axis=-1)
 
 
-def north(robot: Robot) -> Observed:
+def north(robot: EPuckArrays) -> Observed:
     """Reading of the compass: the direction of +y in the robot's frame, shape (3,)."""
     heading = robot.state[..., HEADING]
     aim = np.stack([np.sin(heading), np.cos(heading), 0.0 * heading], axis=-1)
@@ -109,7 +111,7 @@ def in_encoder_steps(angles: Array) -> Array:
     return ENCODER_STEP * np.round(angles / ENCODER_STEP)
 
 
-def encoder_angles(robot: Robot) -> Observed:
+def encoder_angles(robot: EPuckArrays) -> Observed:
     """Readings of the wheel encoders since the reset, rad, shape (2,): left, right."""
     angles = in_encoder_steps(robot.state[..., LEFT_TURNED : RIGHT_TURNED + 1])
     return np.clip(angles, -MOST_TURNED, MOST_TURNED).astype(np.float32)
@@ -118,7 +120,7 @@ def encoder_angles(robot: Robot) -> Observed:
 def add_instruments(
     observation: dict[str, Observed],
     further: Collection[str],
-    robot: Robot,
+    robot: EPuckArrays,
     floor: float | Array,
 ) -> None:
     """Adds the readings of those instruments that have no noise.

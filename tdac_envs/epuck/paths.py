@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import kernel, read_only
-from tdac_envs.core.errors import TaskError
+from tdac_envs.core.errors import TaskError, offer
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.ground import Ground, Point
 from tdac_envs.epuck.infrared import sees
@@ -31,7 +31,7 @@ def check_body_fits(ground: Ground, name: str, x: float, y: float) -> None:
 
     Raises:
         TaskError: The point is outside the world, in an obstacle or too near to one;
-            the message suggests the nearest free position.
+            the message begins with the nearest free position.
     """
     point = f"{name} ({x:g}, {y:g})"
     left, low, right, high = ground.bounds
@@ -49,18 +49,15 @@ def check_body_fits(ground: Ground, name: str, x: float, y: float) -> None:
             f"is {1e3 * room:.1f} mm from an obstacle, too near for a body of "
             f"{1e3 * BODY_RADIUS:g} mm radius"
         )
-    raise TaskError(f"{point} {problem}; {_nearest_place(ground, x, y)}")
-
-
-def _nearest_place(ground: Ground, x: float, y: float) -> str:
+    problem = f"{point} {problem}"
     rows, columns = np.nonzero(ground.free(BODY_RADIUS))
     if rows.size == 0:
-        return "an e-puck fits nowhere"
-    left, low, _, _ = ground.bounds
+        raise TaskError(f"{problem}; an e-puck fits nowhere")
     u, v = (x - left) / ground.spacing, (y - low) / ground.spacing
     nearest = int(np.argmin((columns - u) ** 2 + (rows - v) ** 2))
     near_x, near_y = ground.at(int(columns[nearest]), int(rows[nearest]))
-    return f"the nearest free position is ({near_x:.3f}, {near_y:.3f})"
+    place = f"({near_x:.3f}, {near_y:.3f})"
+    raise TaskError(offer(name, place, "the nearest free position", problem))
 
 
 def path_entry(

@@ -27,7 +27,7 @@ from tdac_envs.epuck.prisms import FIXED, Array, Prisms
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.footprint import Disc
-from tdac_envs.worlds.picture import View, colour_of, draw_things
+from tdac_envs.worlds.picture import WorldCanvas, colour_of, draw_things
 from tdac_envs.worlds.world import EPuck
 
 SMALLEST_BODY = 6.0
@@ -52,7 +52,7 @@ class EPuckScene:
         ground = task.ground
         pushable = [t for t in ground.things if t.mass is not None and t.solid]
         self._colours = [colour_of(thing.kind) for thing in pushable if movable]
-        self._view = view = View(ground.bounds)
+        self._view = view = WorldCanvas(ground.bounds)
         still = [
             thing
             for thing in ground.things
@@ -100,7 +100,7 @@ class EPuckScene:
         _draw_bars(view, values)
         return canvas.image
 
-    def _draw_movable(self, view: View, solid: Prisms) -> None:
+    def _draw_movable(self, view: WorldCanvas, solid: Prisms) -> None:
         for part in np.flatnonzero(solid.owner != FIXED).tolist():
             colour = self._colours[int(solid.owner[part])]
             at = solid.outline(part)
@@ -121,7 +121,7 @@ class EPuckScene:
         draw_epuck(self._view, robot.pose, radius, _OTHER)
 
 
-def draw_task(view: View, task: EPuckTask) -> None:
+def draw_task(view: WorldCanvas, task: EPuckTask) -> None:
     """Draws the shortest path, the start and the goal."""
     view.canvas.line(view.at(task.shortest_path(task.start)), GREY, 2, 0.75, dash=7)
     start = view.at(task.start[:2])
@@ -149,7 +149,7 @@ def ray_colour(reading: float) -> Colour:
 
 
 def _draw_rays(
-    view: View,
+    view: WorldCanvas,
     pose: tuple[float, float, float],
     readings: NDArray[np.float64],
     reaches: NDArray[np.float64],
@@ -169,7 +169,7 @@ def _draw_rays(
 
 
 def draw_epuck(
-    view: View, pose: tuple[float, float, float], radius: float, colour: Colour
+    view: WorldCanvas, pose: tuple[float, float, float], radius: float, colour: Colour
 ) -> None:
     """Draws a disc with two wheels and a nose ahead; `radius` is in frame px."""
     canvas, middle = view.canvas, view.at(pose[:2])[0]
@@ -184,14 +184,14 @@ def draw_epuck(
     canvas.polygon(_placed(view, pose, nose), FREE)
 
 
-def _placed(view: View, pose: tuple[float, float, float], own: Array) -> Array:
+def _placed(view: WorldCanvas, pose: tuple[float, float, float], own: Array) -> Array:
     """Canvas coordinates of points in the robot's frame (x forward, y left)."""
     x, y, heading = pose
     cos, sin = math.cos(heading), math.sin(heading)
     return view.at(own @ np.array([[cos, sin], [-sin, cos]]) + (x, y))
 
 
-def _write_status(view: View, status: Status) -> None:
+def _write_status(view: WorldCanvas, status: Status) -> None:
     canvas, first = view.canvas, view.canvas.strip_top + 26
     x = canvas.text(12, first, f"step {status.step} / {status.horizon}", INK)
     if status.outcome:
@@ -199,7 +199,7 @@ def _write_status(view: View, status: Status) -> None:
     canvas.text(12, first + 24, f"goal {status.distance:.2f} m away", INK)
 
 
-def _draw_bars(view: View, readings: NDArray[np.float64]) -> None:
+def _draw_bars(view: WorldCanvas, readings: NDArray[np.float64]) -> None:
     """Draws the eight readings as bars, from the left rear to the right rear."""
     canvas, image = view.canvas, view.canvas.image
     whole = N_SENSORS * _BAR + 130

@@ -32,7 +32,7 @@ _NEAR = 0.05
 _ROBOT = 1
 
 
-class Drive(NamedTuple):
+class CommandedArc(NamedTuple):
     """The motion commanded for a step.
 
     Attributes:
@@ -46,7 +46,7 @@ class Drive(NamedTuple):
     dt: float
 
 
-class Movable(NamedTuple):
+class PushedObject(NamedTuple):
     """An object that can be pushed, with its friction on the ground.
 
     Attributes:
@@ -89,7 +89,7 @@ def push(
     state: Array,
     speed: Array,
     things: Array,
-    drive: Drive,
+    drive: CommandedArc,
     friction: float,
 ) -> bool:
     """Simulates one step with physics.
@@ -139,7 +139,9 @@ def push(
     return bool(touched)
 
 
-def _set_wheel_velocity(wheels: Any, robot: Any, drive: Drive, count: int) -> None:
+def _set_wheel_velocity(
+    wheels: Any, robot: Any, drive: CommandedArc, count: int
+) -> None:
     """Sets the velocity towards which the tyres pull the robot, for one substep."""
     dt, turn = drive.dt / count, drive.turn / count
     half = 0.5 * turn
@@ -175,7 +177,7 @@ def _add_robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
 
 def _add_movable(
     space: Any, origin: Prisms, number: int, centre: Array, mass: float, row: Array
-) -> Movable:
+) -> PushedObject:
     """Adds an object that can be pushed, with friction on the ground."""
     outlines: list[tuple[Array, float]] = []
     for part in np.flatnonzero(origin.owner == number).tolist():
@@ -196,10 +198,10 @@ def _add_movable(
     force = SLIDE * mass * _GRAVITY
     slide, spin = _friction(space.static_body, body, force, force * spread)
     space.add(slide, spin)
-    return Movable(body, slide, spin, force, spread)
+    return PushedObject(body, slide, spin, force, spread)
 
 
-def _limit_friction(movable: Movable) -> None:
+def _limit_friction(movable: PushedObject) -> None:
     """Divides friction between sliding and turning: an elliptic limit surface."""
     slid = movable.body.velocity.length
     spun = abs(movable.body.angular_velocity) * movable.spread

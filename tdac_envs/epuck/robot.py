@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import EllipsisType
 from typing import NamedTuple
 
 import numpy as np
@@ -11,13 +10,12 @@ from numpy.typing import NDArray
 from tdac_envs.drive import stepping
 from tdac_envs.epuck import kernels
 from tdac_envs.epuck.infrared import N_SENSORS
-from tdac_envs.epuck.task import EPuckTask
 
 Array = NDArray[np.float64]
 Observed = NDArray[np.float32]
 
 
-class Robot(NamedTuple):
+class EPuckArrays(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
     `kernels._arrays_at` and the indices beside it follow the order of the fields.
@@ -61,7 +59,7 @@ class Robot(NamedTuple):
     outcome: Array
 
     @classmethod
-    def blank(cls, delay: int, *count: int) -> Robot:
+    def blank(cls, delay: int, *count: int) -> EPuckArrays:
         """One robot, or `count` of them, all zeros."""
         return cls(
             np.zeros((*count, kernels.N_CONSTANTS)),
@@ -74,18 +72,3 @@ class Robot(NamedTuple):
             np.zeros((*count, N_SENSORS, 3)),
             np.zeros((*count, stepping.N_OUTCOME)),
         )
-
-    def row(self, index: int) -> Robot:
-        """Views of the arrays of one of many robots."""
-        return Robot(*(array[index] for array in self))
-
-    def place(self, task: EPuckTask, index: int | EllipsisType = ...) -> None:
-        """Places the robot, or robot `index` of many, at the start of a task.
-
-        Call `kernels.begin` next.
-        """
-        goal = slice(stepping.GOAL_X, stepping.HORIZON + 1)
-        wanted = *task.goal, task.goal_tolerance, task.horizon
-        self.constants[index, goal] = wanted
-        self.state[index, : stepping.HEADING + 1] = task.start
-        self.outcome[index, stepping.REMAINING] = task.shortest

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tdac_envs.drawing.backdrop import CLOSE_UP, Window
+from tdac_envs.drawing.backdrop import CLOSE_UP, CloseUpWindow
 from tdac_envs.drawing.canvas import Canvas, Image
 from tdac_envs.drawing.runs import Legend, draw_runs
 from tdac_envs.epuck.ground import Bounds
 from tdac_envs.epuck.picture import SMALLEST_BODY, draw_task
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.bodies import BODY_RADIUS
-from tdac_envs.worlds.picture import SIDE, View, draw_things
+from tdac_envs.worlds.picture import SIDE, WorldCanvas, draw_things
 
 Points = NDArray[np.float64]
 # Width reserved for the scale bar at the right of the strip, frame px.
@@ -52,7 +52,7 @@ def trajectory_picture(
 
 
 def _columns(bounds: Bounds) -> int:
-    return int(View(bounds).canvas.image.shape[1])
+    return int(WorldCanvas(bounds).canvas.image.shape[1])
 
 
 def task_view(
@@ -62,10 +62,10 @@ def task_view(
     strip: int,
     side: int = SIDE,
     margin: float = 0.05,
-) -> View:
-    """A view of a task's world with start, goal and shortest path; see `View`."""
+) -> WorldCanvas:
+    """A picture of a task's world with start, goal and shortest path."""
     ground = task.ground
-    view = View(bounds, strip=strip, side=side, margin=margin)
+    view = WorldCanvas(bounds, strip=strip, side=side, margin=margin)
     things = [thing for thing in ground.things if not thing.is_goal or thing.solid]
     draw_things(view, ground.world, things)
     draw_task(view, task)
@@ -76,7 +76,7 @@ def task_view(
 class WorldChart:
     """A view as a chart; see `tdac_envs.drawing.backdrop.Chart`."""
 
-    view: View
+    view: WorldCanvas
 
     @property
     def canvas(self) -> Canvas:
@@ -106,7 +106,7 @@ class WorldBackground:
     """The backdrop of runs in a world; see `tdac_envs.drawing.backdrop.Backdrop`."""
 
     task: EPuckTask
-    view: View
+    view: WorldCanvas
 
     @classmethod
     def of(cls, task: EPuckTask) -> WorldBackground:
@@ -124,12 +124,12 @@ class WorldBackground:
         view.canvas = self.view.canvas.copy()
         return WorldChart(view)
 
-    def window(self, middle: Points, extent: float) -> Window:
+    def window(self, middle: Points, extent: float) -> CloseUpWindow:
         """A square around a point."""
         x, y = (middle - extent / 2.0).tolist()
-        return Window(x, y, extent)
+        return CloseUpWindow(x, y, extent)
 
-    def close_up(self, window: Window) -> WorldChart:
+    def close_up(self, window: CloseUpWindow) -> WorldChart:
         """An enlarged part of the world."""
         x, y, side = window
         bounds = (x, y, x + side, y + side)

@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import finite_numbers
 from tdac_envs.drive.setup import DriveSetup
-from tdac_envs.drive.stepping import FRICTION, UNDISTURBED
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.stepping import FRICTION
 from tdac_envs.epuck.infrared import RANGE
-from tdac_envs.epuck.kernels import AXLE_LENGTH, FLOOR, N_CONSTANTS
+from tdac_envs.epuck.kernels import FLOOR, N_CONSTANTS
 from tdac_envs.epuck.nearby import NearbyParts, surroundings
 from tdac_envs.epuck.prisms import Prisms
-from tdac_envs.epuck.task import (
-    EPuckTask,
-    default_horizon,
-    make_task,
-    mixed_start,
-    random_task,
-)
+from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Setup(DriveSetup):
+class EPuckSetup(DriveSetup):
     """The part of an environment that does not change between episodes.
 
     Attributes:
@@ -51,34 +42,16 @@ class Setup(DriveSetup):
         return surroundings(task.ground, self.webots, self.goal_visible, reach)
 
     def constants(self) -> NDArray[np.float64]:
-        """`Robot.constants` of the nominal task."""
+        """`EPuckRobot.constants` of the nominal task."""
         task = self.nominal
-        constants = np.array(
-            [
-                AXLE_LENGTH,
-                task.max_wheel_speed,
-                task.dt,
-                BODY_RADIUS,
-                RANGE,
-                math.exp(-task.dt / self.motor_lag) if self.motor_lag else 0.0,
-                self.delay,
-                self.on_collision == "terminate",
-                task.full_step,
-                *self.weights,
-                *task.goal,
-                task.goal_tolerance,
-                task.horizon,
-                task.ground.world.friction,
-                *UNDISTURBED,
-                *np.zeros(N_CONSTANTS - FLOOR),
-            ],
-            np.float64,
-        )
+        friction = task.ground.world.friction
+        shared = self.shared_constants(task.max_wheel_speed, RANGE, friction)
+        constants = np.array([*shared, *np.zeros(N_CONSTANTS - FLOOR)], np.float64)
         self.enter(constants, task)
         return constants
 
     def enter(self, constants: NDArray[np.float64], task: EPuckTask) -> None:
-        """Sets what `Robot.constants` tells of the world of a task."""
+        """Sets what `EPuckRobot.constants` tells of the world of a task."""
         ground = task.ground
         constants[FRICTION] = ground.world.friction
         constants[FLOOR:] = (
@@ -111,25 +84,3 @@ class Setup(DriveSetup):
             seen.points, seen.first, seen.extent, sighted.cells, sighted.listed,
             task.field,
         )  # fmt: skip
-
-    def _with_ends(self, options: dict[str, Any]) -> EPuckTask:
-        task = self.nominal
-        start = tuple(options.get("start", task.start))
-        return make_task(
-            task.ground,
-            finite_numbers("start", (*start, task.start.heading)[:3], 3),
-            options.get("goal", task.goal),
-            max_wheel_speed=task.max_wheel_speed,
-            dt=task.dt,
-            goal_tolerance=task.goal_tolerance,
-            horizon=task.horizon,
-        )
-
-    def _random_task(self, random: np.random.Generator) -> EPuckTask:
-        return random_task(self.nominal, random)
-
-    def _mixed_start(self, random: np.random.Generator) -> Pose:
-        return mixed_start(self.nominal, random)
-
-    def _default_horizon(self, task: EPuckTask) -> int:
-        return default_horizon(task)

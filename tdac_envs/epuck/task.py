@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,10 +19,9 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import (
-    MAX_DRAWS,
     Pose,
     check_full_step,
-    default_horizon_for,
+    default_horizon,
     jittered_pose,
     wrap_heading,
 )
@@ -60,7 +60,7 @@ class EPuckTask:
             the goal, m; see `paths.route`.
         shortest: d0, the length of the shortest grid path from the nominal start, m;
             see `path_from`.
-        about: What `info` says about the world of a task set; None elsewhere.
+        world_facts: What `info` says about the world of a task set; None elsewhere.
     """
 
     env_id: ClassVar = "TDAC-EPuck-v0"
@@ -74,11 +74,11 @@ class EPuckTask:
     horizon: int
     field: NDArray[np.float32]
     shortest: float
-    about: dict[str, Any] | None = None
+    world_facts: dict[str, Any] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         rest = (self.max_wheel_speed, self.goal_tolerance, self.dt, self.horizon)
-        return _restored, (self.ground, self.start, self.goal, *rest, self.about)
+        return _restored, (self.ground, self.start, self.goal, *rest, self.world_facts)
 
     @property
     def body_radius(self) -> float:
@@ -96,8 +96,46 @@ class EPuckTask:
         return self.max_wheel_speed * WHEEL_RADIUS * self.dt
 
     def jittered(self, random: np.random.Generator) -> Pose:
-        """A start of the jitter variation; see `jittered_start`."""
-        return jittered_start(self, random)
+        """A feasible start within a body radius of the nominal one, heading +- 0.5."""
+        may_start = partial(_may_start, self)
+        return jittered_pose(self.start, BODY_RADIUS, random, may_start)
+
+    def point(self, index: int) -> Point:
+        """The grid point, m, at an index of the flattened field."""
+        row, column = divmod(index, self.field.shape[1])
+        return self.ground.at(column, row)
+
+    def field_to(self, index: int) -> NDArray[np.float32]:
+        """`field` for a goal at the grid point of an index."""
+        row, column = divmod(index, self.field.shape[1])
+        return field_to(self.ground, (column, row))
+
+    def is_at_goal(self, x: float, y: float, goal: Point) -> bool:
+        """Whether a robot at (x, y) has reached a goal, m."""
+        return at_goal(self.ground, goal, self.goal_tolerance, x, y)
+
+    def with_ends(
+        self, start: Sequence[float] | None = None, goal: Sequence[float] | None = None
+    ) -> EPuckTask:
+        """This task with another start and goal, which are checked.
+
+        Args:
+            start: (x, y) or (x, y, heading); by default its own.
+            goal: (x, y); by default its own.
+
+        Raises:
+            TaskError: The task is not feasible.
+        """
+        begin = tuple(self.start if start is None else start)
+        return make_task(
+            self.ground,
+            finite_numbers("start", (*begin, self.start.heading)[:3], 3),
+            self.goal if goal is None else goal,
+            max_wheel_speed=self.max_wheel_speed,
+            dt=self.dt,
+            goal_tolerance=self.goal_tolerance,
+            horizon=self.horizon,
+        )
 
     def path_from(self, start: Pose) -> Path:
         """Shortest grid path from `start` to the goal, shape (n, 2), m; may be empty.
@@ -186,13 +224,9 @@ def make_task(
         )
     shortest = path_length_from(ground, field, begin[:2])
     task = EPuckTask(ground, begin, end, limit, tolerance, dt, 1, field, shortest)
-    steps = default_horizon(task) if horizon is None else horizon
-    return replace(task, horizon=horizon_steps(steps))
-
-
-def default_horizon(task: EPuckTask) -> int:
-    """The horizon for the shortest path of a task; see `default_horizon_for`."""
-    return default_horizon_for(task.shortest, task.full_step)
+    if horizon is None:
+        horizon = default_horizon(shortest, task.full_step)
+    return replace(task, horizon=horizon_steps(horizon))
 
 
 def path_length_from(ground: Ground, field: NDArray[np.float32], at: Point) -> float:
@@ -204,73 +238,20 @@ def path_length_from(ground: Ground, field: NDArray[np.float32], at: Point) -> f
     return float(field[row, column]) + math.dist(at, ground.at(column, row))
 
 
-def jittered_start(task: EPuckTask, random: np.random.Generator) -> Pose:
-    """A feasible start within one body radius of the nominal, heading +- 0.5 rad."""
-    return jittered_pose(
-        task.start, BODY_RADIUS, random, lambda pose: _may_start(task, pose)
-    )
-
-
-def mixed_start(task: EPuckTask, random: np.random.Generator) -> Pose:
-    """A jittered start or, with probability 0.5, any feasible one.
-
-    The latter is drawn from the grid points connected to the goal.
-    """
-    if random.random() < 0.5:
-        return jittered_start(task, random)
-    ground = task.ground
-    connected = np.flatnonzero(np.isfinite(task.field))
-    for _ in range(MAX_DRAWS):
-        start = ground.at(*_place(task, int(random.choice(connected))))
-        heading = wrap_heading(random.uniform(-math.pi, math.pi))
-        if not at_goal(ground, task.goal, task.goal_tolerance, *start):
-            return Pose(*start, heading)
-    return task.start
-
-
-def random_task(task: EPuckTask, random: np.random.Generator) -> EPuckTask:
-    """A task with any feasible start and goal; world and horizon are the same.
-
-    Both points are drawn from the grid points connected to the nominal goal.
-    """
-    ground = task.ground
-    connected = np.flatnonzero(np.isfinite(task.field))
-    for _ in range(MAX_DRAWS):
-        ends = [_place(task, int(random.choice(connected))) for _ in range(2)]
-        heading = wrap_heading(random.uniform(-math.pi, math.pi))
-        goal, start = (ground.at(*end) for end in ends)
-        if not at_goal(ground, goal, task.goal_tolerance, *start):
-            field = field_to(ground, ends[0])
-            shortest = float(field[ends[1][::-1]])
-            return replace(
-                task,
-                start=Pose(*start, heading),
-                goal=goal,
-                field=field,
-                shortest=shortest,
-            )
-    return task
-
-
-def _place(task: EPuckTask, index: int) -> tuple[int, int]:
-    row, column = divmod(index, task.field.shape[1])
-    return column, row
-
-
 def _may_start(task: EPuckTask, pose: Pose) -> bool:
     ground = task.ground
     return (
         ground.gap(pose.x, pose.y) >= BODY_RADIUS + 1e-3
         and path_entry(ground, task.field, pose[:2]) is not None
-        and not at_goal(ground, task.goal, task.goal_tolerance, pose.x, pose.y)
+        and not task.is_at_goal(pose.x, pose.y, task.goal)
     )
 
 
 def _restored(ground: Ground, start: Pose, goal: Point, *rest: Any) -> EPuckTask:
     """Restores a pickled task and recomputes what the pickle leaves out."""
-    limit, tolerance, dt, horizon, about = rest
+    limit, tolerance, dt, horizon, world_facts = rest
     field = route(ground, start[:2], goal)
     shortest = path_length_from(ground, field, start[:2])
     return EPuckTask(
-        ground, start, goal, limit, tolerance, dt, horizon, field, shortest, about
+        ground, start, goal, limit, tolerance, dt, horizon, field, shortest, world_facts
     )

@@ -6,11 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import VectorEnv
 
-from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.drive.batching import make_envs
+from tdac_envs.drive.stepping import row_of
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.kernels import step_rows
@@ -53,38 +52,20 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     step_rows = staticmethod(step_rows)
     copied = ("pose", "wheel_speeds", "wheel_positions", "ps")
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        threads: int | None = None,
-        each: Sequence[dict[str, Any]] = ({},),
-        render_mode: str | None = None,
-        max_episode_steps: int | None = None,
-        **options: Any,
-    ) -> None:
-        num_envs = whole_number("num_envs", num_envs, 1)
-        envs = make_envs(self.make, each, options, num_envs)
+    def _adopt(self, envs: Sequence[Any], num_envs: int) -> None:
         if any(env.setup.pushes for env in envs):
             raise TaskError(
                 "a batch cannot push objects; expected on_collision='terminate', a "
                 "world without objects that have a mass, or vectorization_mode='sync'"
             )
-        super().__init__(
-            envs,
-            num_envs,
-            autoreset_mode=autoreset_mode,
-            threads=threads,
-            render_mode=render_mode,
-            max_episode_steps=max_episode_steps,
-        )
         self._envs = [envs[i % len(envs)] for i in range(num_envs)]
+
+    def _prepare(self) -> None:
         self._factors = np.array([env.sensor_noise for env in self._envs])
         self._noisy = set(np.flatnonzero(self._factors).tolist())
         self._floors = np.array([env.task.ground.floor for env in self._envs])
         self._last_ps = self.robots.readings.copy()
-        self._last_ground = np.zeros((num_envs, 3), np.float32)
+        self._last_ground = np.zeros((self.num_envs, 3), np.float32)
 
     def _seen(self) -> Observations:
         robots = self.robots
@@ -131,7 +112,7 @@ class EPuckVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         """Readings of one robot's ground sensors."""
         env = self._envs[i]
         seen, floor = env.setup.around(self.tasks[i]).visible, self._floors[i]
-        readings, spreads = ground_readings(seen, floor, self.robots.row(i))
+        readings, spreads = ground_readings(seen, floor, row_of(self.robots, i))
         if i not in self._noisy:
             return readings
         normal = self._noise(i).standard_normal(readings.size)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.core.errors import MapError
+from tdac_envs.core.hashing import sha256_of
 
 BoolGrid = NDArray[np.bool_]
 FloatGrid = NDArray[np.float32]
@@ -81,7 +81,7 @@ class OccupancyGrid:
         """Hash of the shape and the cells."""
         if self._hash is None:
             head = f"{self.width}x{self.height}:".encode()
-            found = hashlib.sha256(head + np.packbits(self.cells).tobytes()).hexdigest()
+            found = sha256_of(head, np.packbits(self.cells).tobytes())
             object.__setattr__(self, "_hash", found)
             return found
         return self._hash

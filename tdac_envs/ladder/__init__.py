@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from tdac_envs.ladder.plate_worlds import PlatesSpec, make_plates
-    from tdac_envs.ladder.words import world_key
+    from tdac_envs.ladder.random_stream import world_key
     from tdac_envs.ladder.worlds import WorldSpec, make_world
 
 __all__ = ["PlatesSpec", "WorldSpec", "make_plates", "make_world", "world_key"]
@@ -16,7 +16,7 @@ _MODULES = {
     "WorldSpec": "worlds",
     "make_plates": "plate_worlds",
     "make_world": "worlds",
-    "world_key": "words",
+    "world_key": "random_stream",
 }
 
 

@@ -7,14 +7,17 @@ admit the same worlds.
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import read_only
+from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import (
     BoolGrid,
     FloatGrid,
@@ -24,16 +27,17 @@ from tdac_envs.grid.grid import (
 )
 from tdac_envs.grid.plan import distance_field
 from tdac_envs.ladder.difficulty import Difficulty
-from tdac_envs.ladder.generators.draft import Draft
+from tdac_envs.ladder.generators.draft import WorldDraft
 from tdac_envs.ladder.passages import bottleneck
+from tdac_envs.ladder.random_stream import FRACTIONS, RandomStream, rounded
 from tdac_envs.ladder.shortest import shortest_path
 from tdac_envs.ladder.sight import share_in_sight
-from tdac_envs.ladder.words import FRACTIONS, Words, rounded
 from tdac_envs.map2d.rays import leaps_of
 from tdac_envs.map2d.straight import is_straight_path_free
 from tdac_envs.map2d.terrain import Terrain
 
 Pixel = tuple[int, int]
+Found = TypeVar("Found")
 
 _GOALS = 3
 """Goals that are tried on a draft."""
@@ -96,32 +100,60 @@ class Admitted:
     difficulty: Difficulty
 
 
-def admit(draft: Draft, words: Words, conditions: Conditions) -> Admitted | Rejection:
+def admit(
+    draft: WorldDraft, random: RandomStream, conditions: Conditions
+) -> Admitted | Rejection:
     """Draws a start and a goal on a draft, and tests them.
 
     Args:
         draft: The draft.
-        words: Random numbers.
+        random: Random numbers.
         conditions: What the task must fulfil.
 
     Returns:
         The first condition that fails, if one does; the cheap ones come first.
     """
     clear = clearance(draft.cells)
-    goals = _drawn_goals(draft, clear, words, conditions)
+    goals = _drawn_goals(draft, clear, random, conditions)
     if not goals:
         return Rejection.CROWDED
     free = body_free(clear, conditions.radius)
     for goal in goals:
         field = distance_field(free, goal)
-        start = _drawn_start(draft, field, goal, words, conditions)
+        start = _drawn_start(draft, field, goal, random, conditions)
         if start is not None:
             return _tested(draft, clear, start, goal, field, conditions)
     return Rejection.NEAR
 
 
+def first_admitted(
+    tries: int, name: str, attempt: Callable[[], Found | Rejection]
+) -> tuple[Found, tuple[Rejection, ...]]:
+    """What the first successful attempt returns, and why those before it failed.
+
+    Args:
+        tries: Largest number of attempts.
+        name: Name of the generator, for the message.
+        attempt: Draws and tests a draft.
+
+    Raises:
+        TaskError: All attempts fail.
+    """
+    rejected: list[Rejection] = []
+    while len(rejected) < tries:
+        found = attempt()
+        if not isinstance(found, Rejection):
+            return found, tuple(rejected)
+        rejected.append(found)
+    reasons = ", ".join(f"{n} × {why}" for why, n in Counter(rejected).most_common())
+    raise TaskError(
+        f"no feasible world from {tries} drafts of {name!r} ({reasons}); change the "
+        "generator's sizes or the conditions"
+    )
+
+
 def _tested(
-    draft: Draft,
+    draft: WorldDraft,
     clear: FloatGrid,
     start: Pixel,
     goal: Pixel,
@@ -144,7 +176,11 @@ def _tested(
 
 
 def _gap(
-    draft: Draft, clear: FloatGrid, start: Pixel, goal: Pixel, conditions: Conditions
+    draft: WorldDraft,
+    clear: FloatGrid,
+    start: Pixel,
+    goal: Pixel,
+    conditions: Conditions,
 ) -> float:
     """The gap, or 0 if it is too narrow."""
     cells = draft.cells
@@ -190,7 +226,7 @@ def measured(
 
 
 def _drawn_goals(
-    draft: Draft, clear: FloatGrid, words: Words, conditions: Conditions
+    draft: WorldDraft, clear: FloatGrid, random: RandomStream, conditions: Conditions
 ) -> list[Pixel]:
     """Places that the disc cannot reach by less than the shortest path - tolerance.
 
@@ -201,14 +237,14 @@ def _drawn_goals(
     radius, tolerance = conditions.radius, conditions.tolerance
     room = np.float32(math.sqrt(radius * radius + max(tolerance * tolerance, 0.5)))
     places = draft.places[clear[draft.places[:, 1], draft.places[:, 0]] >= room]
-    return [(x, y) for x, y in words.shuffled(places.tolist())[:_GOALS]]
+    return [(x, y) for x, y in random.shuffled(places.tolist())[:_GOALS]]
 
 
 def _drawn_start(
-    draft: Draft,
+    draft: WorldDraft,
     field: NDArray[np.float64],
     goal: Pixel,
-    words: Words,
+    random: RandomStream,
     conditions: Conditions,
 ) -> Pixel | None:
     """A place from which the shortest path is probably long enough.
@@ -227,7 +263,7 @@ def _drawn_start(
     chosen = places[far & (detours >= _MARGIN * conditions.min_detour + _ROUNDING)]
     if len(chosen) == 0:
         return None
-    x, y = chosen[words.integer(0, len(chosen) - 1)].tolist()
+    x, y = chosen[random.integer(0, len(chosen) - 1)].tolist()
     return x, y
 
 

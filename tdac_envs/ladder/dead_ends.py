@@ -30,7 +30,7 @@ class DeadEnds(NamedTuple):
     excess: float
 
 
-class Sensor(NamedTuple):
+class RangeSensor(NamedTuple):
     """Range rays.
 
     Attributes:
@@ -44,7 +44,7 @@ class Sensor(NamedTuple):
     range_max: float
 
 
-def dead_ends(world: LadderWorld, radius: float, sensor: Sensor) -> DeadEnds:
+def dead_ends(world: LadderWorld, radius: float, sensor: RangeSensor) -> DeadEnds:
     """Drives a disc that assumes unseen space to be free, and replans.
 
     The drive is one of pixels: at each pixel the sensor looks ahead, and if the known

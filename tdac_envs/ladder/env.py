@@ -13,22 +13,22 @@ from numpy.typing import NDArray
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.epuck.env import EPuckEnv
-from tdac_envs.epuck.setup import Setup as EPuckSetup
+from tdac_envs.epuck.setup import EPuckSetup
 from tdac_envs.grid.grid import BoolGrid
-from tdac_envs.ladder.observed import View
-from tdac_envs.ladder.plate_pool import MOST
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.observed import SetView
+from tdac_envs.ladder.pool import MOST_PLATES
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import find_set_file
 from tdac_envs.ladder.source import SetSource, read_salt
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.map2d.setup import Setup
+from tdac_envs.map2d.setup import Map2DSetup
 
 TRAIN_POOL = 4096
 """Default number of training worlds."""
 
 
-class OnSet(DrivenEnv):
+class TaskSetEnv(DrivenEnv):
     """What the environments of both robots add for a task set.
 
     Attributes:
@@ -39,13 +39,13 @@ class OnSet(DrivenEnv):
 
     title = "TDAC-Ladder-v0"
     set: TaskSet
-    view: View
+    view: SetView
     readings: str
 
     def _look(self, task_set: TaskSet, privileged: bool) -> None:
         """Observes what the set says, after all else has been prepared."""
         self.set = task_set
-        self.view = View(task_set.file, task_set.largest_side, privileged)
+        self.view = SetView(task_set.file, task_set.largest_side, privileged)
         self._anchor = self.view.anchor(self.nominal)
         self.observation_space = self.view.space(self.observation_space)  # type: ignore[assignment, arg-type]
 
@@ -59,7 +59,7 @@ class OnSet(DrivenEnv):
         """
         seen, whole = super().reset(seed=seed, options=options)
         info = self.view.info(whole, self.pose(), ended=False)
-        return seen, {**info, **deepcopy(self.task.about or {})}
+        return seen, {**info, **deepcopy(self.task.world_facts or {})}
 
     def step(
         self, action: NDArray[np.float32]
@@ -90,7 +90,7 @@ class OnSet(DrivenEnv):
         return self.view.seen(super()._observation(), self.pose(), self._anchor)
 
 
-class LadderEnv(OnSet, Map2DEnv):
+class LadderEnv(TaskSetEnv, Map2DEnv):
     """A robot drives to a goal in worlds that are new to it, one for each episode.
 
     ## Description
@@ -181,7 +181,7 @@ class LadderEnv(OnSet, Map2DEnv):
             level, split, train_pool, salt_file, hidden_folder, nearer_starts
         )
         file = task_set.file
-        setup = Setup(
+        setup = Map2DSetup(
             **_shared(task_set, source, reward_weights),
             range_noise=file.disturbances.range_noise,
             range_dropout=file.disturbances.range_dropout,
@@ -190,7 +190,7 @@ class LadderEnv(OnSet, Map2DEnv):
         self._look(task_set, bool(privileged))
 
 
-class EPuckLadderEnv(OnSet, EPuckEnv):
+class EPuckLadderEnv(TaskSetEnv, EPuckEnv):
     """TDAC-Ladder-v0 with an e-puck; `LadderEnv` documents both.
 
     Headings, and a positive turn, are counter-clockwise here, as in TDAC-EPuck-v0.
@@ -200,7 +200,7 @@ class EPuckLadderEnv(OnSet, EPuckEnv):
         self,
         level: str | Path = "epuck",
         split: str = "train",
-        train_pool: int = MOST,
+        train_pool: int = MOST_PLATES,
         salt_file: str | Path | None = None,
         privileged: bool = False,
         reward_weights: Mapping[str, float] | None = None,
@@ -211,7 +211,7 @@ class EPuckLadderEnv(OnSet, EPuckEnv):
             level, split, train_pool, salt_file, None, nearer_starts
         )
         robot, seen = task_set.file.robot, task_set.file.observed
-        assert isinstance(robot, EPuckParams)
+        assert isinstance(robot, EPuckRobotParams)
         shared = _shared(task_set, source, reward_weights)
         setup = EPuckSetup(**shared, webots=False, goal_visible=False)
         further = tuple(key for key in ("encoders",) if key in seen)

@@ -21,10 +21,10 @@ AT_START = ("world_index", "generator", "difficulty")
 """Entries of the `info` of `reset` in the splits `train` and `dev`, for the user alone:
 no controller sees them."""
 ANCHOR = 7
-"""Numbers of an anchor; see `View.anchor`."""
+"""Numbers of an anchor; see `SetView.anchor`."""
 
 
-class View:
+class SetView:
     """What is observed in a set, for one robot or for many.
 
     Args:

@@ -26,7 +26,7 @@ from tdac_envs.drive.stepping import RADIUS as BODY
 from tdac_envs.grid.grid import FloatGrid
 from tdac_envs.map2d.contact import arc_contact
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.map2d.setup import Setup
+from tdac_envs.map2d.setup import Map2DSetup
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.crowd import next_node
 from tdac_envs.movers.orca import N_PLANE, add_neighbour, chosen_velocity
@@ -52,7 +52,7 @@ FACING = 0.5
 _BESIDE = 3  # pixels around the robot in which its way may begin
 
 
-class Drive(NamedTuple):
+class OrcaDrive(NamedTuple):
     """A drive to the goal: its duration, steps, and its length, px."""
 
     steps: int
@@ -93,7 +93,7 @@ class OrcaDriver:
 
 def drive_by_orca(
     task: Map2DTask, disturbances: Disturbances, noise: np.random.Generator
-) -> Drive | None:
+) -> OrcaDrive | None:
     """The driver's way to the goal; None if it does not reach it.
 
     Args:
@@ -102,7 +102,7 @@ def drive_by_orca(
         noise: Random numbers of the episode's disturbances.
     """
     env = Map2DEnv.of(
-        Setup(
+        Map2DSetup(
             nominal=task,
             variation="nominal",
             fixed_horizon=True,
@@ -123,7 +123,7 @@ def drive_by_orca(
         _, _, terminated, _, info = env.step(driver.action())
         driven, last = driven + math.dist(env.pose()[:2], last[:2]), env.pose()
         if terminated:
-            return Drive(step, driven) if info["is_success"] else None
+            return OrcaDrive(step, driven) if info["is_success"] else None
     return None
 
 

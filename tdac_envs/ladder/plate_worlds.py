@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -11,15 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tdac_envs.core.errors import TaskError
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.drive.task import Pose
-from tdac_envs.ladder.admission import Admitted, Conditions, Rejection, admit
+from tdac_envs.ladder.admission import (
+    Admitted,
+    Conditions,
+    Rejection,
+    admit,
+    first_admitted,
+)
 from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.generators.blocks import PIXEL, Block, centres, raster
-from tdac_envs.ladder.generators.draft import Draft
+from tdac_envs.ladder.generators.draft import WorldDraft
 from tdac_envs.ladder.generators.plates import Plates, PlatesDraft, draw
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 from tdac_envs.ladder.worlds import LadderWorld
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.footprint import Rectangle
@@ -92,34 +96,30 @@ def make_plates(spec: PlatesSpec, key: bytes) -> PlatesWorld:
 
     Args:
         spec: What it is like.
-        key: 32 bytes, from `words.world_key`. All that is random follows from it.
+        key: 32 bytes, from `world_key`. All that is random follows from it.
 
     Raises:
         TaskError: None of the drafts fulfils the conditions.
         ValueError: The key has another length.
     """
-    words = Words(key)
-    rejected: list[Rejection] = []
-    while len(rejected) < spec.tries:
-        draft = draw(words, spec.generator)
-        found = _admitted(draft, words, spec)
-        if isinstance(found, Admitted):
-            return _made(draft, found, words, tuple(rejected))
-        rejected.append(found)
-    reasons = ", ".join(f"{n} × {why}" for why, n in Counter(rejected).most_common())
-    raise TaskError(
-        f"no feasible world from {spec.tries} drafts of 'plates' ({reasons}); "
-        "change the generator's sizes or the conditions"
-    )
+    random = RandomStream(key)
+
+    def attempt() -> tuple[PlatesDraft, Admitted] | Rejection:
+        draft = draw(random, spec.generator)
+        found = _admitted(draft, random, spec)
+        return found if isinstance(found, Rejection) else (draft, found)
+
+    made, rejected = first_admitted(spec.tries, spec.generator.name, attempt)
+    return _made(*made, random, rejected)
 
 
 def _admitted(
-    draft: PlatesDraft, words: Words, spec: PlatesSpec
+    draft: PlatesDraft, random: RandomStream, spec: PlatesSpec
 ) -> Admitted | Rejection:
     """Tests lengths on the pixels within blocks, and the gap on all that they touch."""
     blocks = (*draft.plates, *draft.things)
     inner, outer = (raster(draft.columns, draft.rows, blocks, t) for t in (False, True))
-    found = admit(Draft(inner, draft.places, outer), words, spec.conditions)
+    found = admit(WorldDraft(inner, draft.places, outer), random, spec.conditions)
     if isinstance(found, Rejection):
         return found
     if found.difficulty.steps * spec.dt > spec.max_seconds:
@@ -128,11 +128,14 @@ def _admitted(
 
 
 def _made(
-    draft: PlatesDraft, found: Admitted, words: Words, rejected: tuple[Rejection, ...]
+    draft: PlatesDraft,
+    found: Admitted,
+    random: RandomStream,
+    rejected: tuple[Rejection, ...],
 ) -> PlatesWorld:
     xs, ys = centres(draft.columns) / 1000, centres(draft.rows) / 1000
     start, goal = ((float(xs[i]), float(ys[j])) for i, j in (found.start, found.goal))
-    heading = words.uniform(-math.pi, math.pi)
+    heading = random.uniform(-math.pi, math.pi)
     sides = draft.columns * PIXEL / 1000, draft.rows * PIXEL / 1000
     floor = Rectangle(0.0, 0.0, 0.0, *sides)
     world = World(
@@ -147,14 +150,9 @@ def _made(
     path = found.path * _PIXEL + (xs[0], ys[0])
     length = found.difficulty.length * _PIXEL
     difficulty = replace(found.difficulty, length=length)
-    return PlatesWorld(world, path, difficulty, rejected, _raster(found, heading))
-
-
-def _raster(found: Admitted, heading: float) -> LadderWorld:
-    start = Pose(float(found.start[0]), float(found.start[1]), heading)
-    goal = float(found.goal[0]), float(found.goal[1])
-    rest = (found.field, found.path, found.difficulty, ())
-    return LadderWorld(found.terrain, start, goal, *rest)
+    return PlatesWorld(
+        world, path, difficulty, rejected, LadderWorld.of(found, heading)
+    )
 
 
 def _obstacle(name: str, number: int, block: Block) -> Obstacle:

@@ -9,7 +9,6 @@ one takes microseconds.
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import json
 import math
 import mmap
@@ -27,15 +26,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.trusted_folders import is_usable, user_cache
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.ladder.difficulty import Difficulty
-from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import Terrain
 from tdac_envs.mapping.params import RobotParams
-from tdac_envs.movers.places import Places
+from tdac_envs.movers.destinations import Destinations
 from tdac_envs.movers.state import Movers
 
 _MAPPED = 16_384
@@ -48,7 +48,9 @@ _FOLDER = re.compile("[0-9a-f]{16}-[0-9a-f]{16}")
 """Name of the folder of a set: hashes of the set and of the code."""
 _ALIGNED = 8
 """Alignment of the arrays, bytes."""
-_MOVERS = "traits", "now", "points", "people", *Places._fields
+MOST_PLATES = 512
+"""Tasks of an e-puck that a process keeps, of about 1.2 MB each."""
+_MOVERS = "traits", "now", "points", "people", *Destinations._fields
 """Arrays of movers that are kept; the others are blank at a start."""
 
 
@@ -87,13 +89,43 @@ class TrainingPool:
         if task is None:
             world, made = self._set.world_and_task("train", index)
             assert isinstance(made, Map2DTask)
-            made = self._set.told(made, "train", index, world.difficulty)
+            made = self._set.with_facts(made, "train", index, world.difficulty)
             if path is not None:
                 _write(path, made, world.difficulty)
                 task = _mapped_task(path, self._set, index)
             if task is None:
                 return _keep(self._made, index, made, _IN_MEMORY)
         return _keep(self._mapped, index, task, _MAPPED)
+
+
+class PlatePool:
+    """The training tasks of a set, by the numbers of their worlds.
+
+    Making one takes some 50 ms. Those that were drawn last are kept.
+
+    Args:
+        task_set: The set.
+    """
+
+    def __init__(self, task_set: TaskSet) -> None:
+        self._set = task_set
+        self._tasks: OrderedDict[int, AnyTask] = OrderedDict()
+
+    def task(self, index: int) -> AnyTask:
+        """The task of a training world.
+
+        Raises:
+            TaskError: There is no feasible world.
+        """
+        task = self._tasks.get(index)
+        if task is None:
+            world, made = self._set.world_and_task("train", index)
+            task = self._set.with_facts(made, "train", index, world.difficulty)
+            self._tasks[index] = task
+        self._tasks.move_to_end(index)
+        if len(self._tasks) > MOST_PLATES:
+            self._tasks.popitem(last=False)
+        return task
 
 
 def _keep(
@@ -134,8 +166,8 @@ def _remove_others(folder: Path) -> None:
 def _sources() -> str:
     """Hash of the code that makes worlds."""
     files = sorted(Path(__file__).parent.rglob("*.py"))
-    joined = b"".join(file.read_bytes() for file in files)  # raw read: shipped
-    return hashlib.sha256(joined).hexdigest()[:16]
+    # raw read: shipped
+    return sha256_of(*(file.read_bytes() for file in files))[:16]
 
 
 def _write(path: Path, task: Map2DTask, difficulty: Difficulty) -> None:
@@ -183,7 +215,7 @@ def _mapped_task(path: Path, task_set: TaskSet, index: int) -> Map2DTask | None:
     if len(body) == 0 or zlib.crc32(body) != int.from_bytes(check, "little"):
         return None
     task, difficulty = _task(body, task_set)
-    return task_set.told(task, "train", index, difficulty)
+    return task_set.with_facts(task, "train", index, difficulty)
 
 
 def _arrays(body: memoryview) -> dict[str, NDArray[Any]]:
@@ -221,7 +253,7 @@ def _task(body: memoryview, task_set: TaskSet) -> tuple[Map2DTask, Difficulty]:
 
 def _movers(arrays: dict[str, NDArray[Any]], dt: float) -> Movers:
     """The movers of a task at its start."""
-    places = Places(*(arrays[name] for name in Places._fields))
-    crowd = places if len(arrays["people"]) else None
+    destinations = Destinations(*(arrays[name] for name in Destinations._fields))
+    crowd = destinations if len(arrays["people"]) else None
     movers = Movers.blank(len(arrays["traits"]), arrays["points"], dt, crowd)
     return movers._replace(**{name: arrays[name] for name in _MOVERS})

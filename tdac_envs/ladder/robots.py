@@ -13,7 +13,7 @@ from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
-class EPuckParams(StrictModel):
+class EPuckRobotParams(StrictModel):
     """An e-puck: `robot: {kind: epuck}` in a `set.yaml`."""
 
     kind: Literal["epuck"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from pathlib import Path
@@ -10,7 +9,6 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
-    BaseModel,
     BeforeValidator,
     Field,
     ValidationError,
@@ -19,6 +17,7 @@ from pydantic import (
 
 from tdac_envs.core.arguments import MOST_STEPS
 from tdac_envs.core.errors import TaskError, first_problem, hint, one_line_reason
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.drive.disturbances import MOST_HIDDEN, Disturbances
@@ -28,7 +27,7 @@ from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.generators.registry import AnyParameters
 from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.plate_worlds import PlatesSpec
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
 
@@ -122,7 +121,7 @@ def _robot_of(given: Any) -> Any:
     """The robot of a file: an e-puck if it has a `kind`, else that of maps."""
     if not isinstance(given, dict):
         return given
-    model = EPuckParams if "kind" in given else RobotParams
+    model = EPuckRobotParams if "kind" in given else RobotParams
     try:
         return model.model_validate(given)
     except ValidationError as error:
@@ -142,7 +141,7 @@ class SetFile(StrictModel):
     files: FilesSpec | None = Field(
         None, description="Worlds from files; `worlds: {folder: …}` is short for it."
     )
-    robot: Annotated[RobotParams | EPuckParams, BeforeValidator(_robot_of)] = (
+    robot: Annotated[RobotParams | EPuckRobotParams, BeforeValidator(_robot_of)] = (
         LEVEL_ROBOT
     )
     dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
@@ -202,7 +201,7 @@ class SetFile(StrictModel):
 
     def _check_robot(self) -> None:
         """Checks that worlds and observations are those of the robot."""
-        epuck = isinstance(self.robot, EPuckParams)
+        epuck = isinstance(self.robot, EPuckRobotParams)
         whose = "an e-puck" if epuck else "a robot on maps"
         if epuck and (self.files is not None or self.map):
             raise ValueError("an e-puck drives in generated worlds, without a map")
@@ -221,12 +220,12 @@ class SetFile(StrictModel):
     @property
     def unit(self) -> Literal["px", "m"]:
         """Unit of lengths."""
-        return "m" if isinstance(self.robot, EPuckParams) else "px"
+        return "m" if isinstance(self.robot, EPuckRobotParams) else "px"
 
     @property
     def full_step(self) -> float:
         """Distance of one step at full speed, px or m."""
-        rim = WHEEL_RADIUS if isinstance(self.robot, EPuckParams) else 1.0
+        rim = WHEEL_RADIUS if isinstance(self.robot, EPuckRobotParams) else 1.0
         return self.robot.max_wheel_speed * rim * self.dt
 
     @property
@@ -254,7 +253,7 @@ class SetFile(StrictModel):
             odometry_scale=own.odometry_scale,
             odometry_noise=own.odometry_noise,
             wheel_radius_error=(
-                robot.wheel_radius_error if isinstance(robot, EPuckParams) else 0.0
+                robot.wheel_radius_error if isinstance(robot, EPuckRobotParams) else 0.0
             ),
         )
 
@@ -301,8 +300,7 @@ class SetFile(StrictModel):
             if self.files.tests or self.files.runs > 1:
                 more = {"tests": list(self.files.tests), "runs": self.files.runs}
                 values["files"] |= more
-        text = json.dumps(values, sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode("ascii")).hexdigest()
+        return sha256_of(json.dumps(values, sort_keys=True, separators=(",", ":")))
 
 
 def read_set_file(path: Path) -> SetFile:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +12,22 @@ import numpy as np
 from tdac_envs.core.arguments import number_up_to, whole_number
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import read_file
-from tdac_envs.ladder.nearer import nearer_task
-from tdac_envs.ladder.plate_pool import PlatePool
-from tdac_envs.ladder.pool import TrainingPool
+from tdac_envs.drive.task import Pose
+from tdac_envs.ladder.pool import PlatePool, TrainingPool
+from tdac_envs.ladder.set_file import HorizonSpec
 from tdac_envs.ladder.task_sets import MOST_SALT, AnyTask, AnyWorld, TaskSet
+from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.movers.state import SPEED
 
 MOST_WORLDS = 2**31
 """Exclusive upper bound of the world numbers that are drawn at random."""
-TOLD = ("train", "dev")
+REVEALED = ("train", "dev")
 """Splits of which `info` says which world an episode has."""
+
+TRIES = 20
+"""Largest number of draws of a start without a mover nearby."""
+APART = 2.0
+"""Least time after which a mover may reach the robot at its start, s."""
 
 
 class SetSource:
@@ -90,8 +99,8 @@ class SetSource:
     def _made(self, index: int) -> tuple[int, AnyWorld, AnyTask]:
         if self._last is None or self._last[0] != index:
             world, task = self._set.world_and_task(self._split, index, self._salt)
-            if self._split in TOLD:
-                task = self._set.told(task, self._split, index, world.difficulty)
+            if self._split in REVEALED:
+                task = self._set.with_facts(task, self._split, index, world.difficulty)
             self._last = index, world, task
         return self._last
 
@@ -127,3 +136,48 @@ def read_salt(path: str | Path) -> bytes:
         raise TaskError(f"salt file {path}: {one_line_reason(error)}") from None
     except ValueError:
         raise TaskError(f"salt file {path}: expected hexadecimal digits") from None
+
+
+def nearer_task(
+    task: AnyTask, step: float, horizon: HorizonSpec, random: np.random.Generator
+) -> AnyTask:
+    """A task with a start that is nearer to its goal, facing any way.
+
+    From the start of a world, an untrained robot hardly ever reaches the goal, and so
+    never learns what it is worth.
+    The length of the path from there is drawn uniformly between the goal tolerance
+    and the length from the task's own start. A start too near to a mover is drawn anew.
+
+    Args:
+        task: Task of a world.
+        step: Distance of one step at full speed, px or m.
+        horizon: The horizon of the set.
+        random: Random numbers.
+
+    Returns:
+        The task from there, or `task` if there is no other start.
+    """
+    field, least = task.field, task.goal_tolerance
+    # Narrow enough for a wide choice of places, and wide enough to find some.
+    width = (task.shortest - least) / 20.0
+    for _ in range(TRIES):
+        length = random.uniform(least + width, task.shortest)
+        places = np.flatnonzero(np.abs(field - length) < width)
+        if not len(places):
+            continue
+        x, y = task.point(int(random.choice(places)))
+        moved = task.moved(Pose(x, y, random.uniform(-math.pi, math.pi)))
+        if _is_apart(moved):
+            steps = max(moved.shortest - least, 0.0) / step
+            return replace(moved, horizon=horizon.steps(steps))
+    return task
+
+
+def _is_apart(task: AnyTask) -> bool:
+    """Whether no mover can touch the robot soon."""
+    if not isinstance(task, Map2DTask) or task.movers is None:
+        return True
+    movers = task.movers
+    x, y, radii = movers.discs().T
+    gaps = np.hypot(x - task.start.x, y - task.start.y) - radii - task.robot.radius
+    return bool((gaps > APART * movers.traits[:, SPEED]).all())

@@ -17,7 +17,7 @@ from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.map2d.encounters import foresee
 from tdac_envs.map2d.task import Map2DTask
-from tdac_envs.movers.places import Places
+from tdac_envs.movers.destinations import Destinations
 from tdac_envs.movers.state import RADIUS, SPEED, Movers
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def foreseen(task: Map2DTask, steps: int) -> Array:
     movers = Movers.none() if task.movers is None else task.movers.fresh()
     places = np.empty((steps + 1, len(movers.traits), 2))
     # Arrays of a task that was pickled can be written to.
-    kept = {key: read_only(getattr(movers, key)) for key in Places._fields}
+    kept = {key: read_only(getattr(movers, key)) for key in Destinations._fields}
     terrain, own = task.terrain, movers._replace(**kept)
     foresee(terrain.padded_clear, terrain.leaps, *own, task.dt, places)
     return places

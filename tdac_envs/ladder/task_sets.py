@@ -15,17 +15,17 @@ from tdac_envs.core.intake import printable
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.task import EPuckTask, make_task
 from tdac_envs.ladder.difficulty import Difficulty
-from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.ladder.files.opened import FileWorlds, opened
 from tdac_envs.ladder.files.placed import placed_world
 from tdac_envs.ladder.moving import draw_movers
 from tdac_envs.ladder.observed import AT_START
 from tdac_envs.ladder.orca_driver import drive_by_orca
 from tdac_envs.ladder.plate_worlds import PlatesWorld, make_plates
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.random_stream import world_key
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import SetFile, Split, find_set_file
 from tdac_envs.ladder.space_time import earliest_arrival
-from tdac_envs.ladder.words import world_key
 from tdac_envs.ladder.worlds import LadderWorld, WorldSpec, make_world
 from tdac_envs.map2d.task import Map2DTask
 
@@ -188,7 +188,7 @@ class TaskSet:
         world = self.world(split, index, salt)
         return world, self._with_movers(self.task_of(world), split, index, salt)
 
-    def told(
+    def with_facts(
         self, task: TaskType, split: str, index: int, difficulty: Difficulty
     ) -> TaskType:
         """The task of a world with what `info` says about it; see `observed.AT_START`.
@@ -196,7 +196,7 @@ class TaskSet:
         For the splits `train` and `dev` alone: the others are to be unknown.
         """
         values = index, self.kind(split, index), asdict(difficulty)
-        return replace(task, about=dict(zip(AT_START, values, strict=True)))
+        return replace(task, world_facts=dict(zip(AT_START, values, strict=True)))
 
     def _with_movers(
         self, task: TaskType, split: str, index: int, salt: bytes | None = None
@@ -229,7 +229,7 @@ class TaskSet:
                 goal_tolerance=file.goal_tolerance,
                 horizon=horizon,
             )
-        assert not isinstance(file.robot, EPuckParams)
+        assert not isinstance(file.robot, EPuckRobotParams)
         shortest = float(world.field[round(start.y), round(start.x)])
         return Map2DTask(
             terrain=world.terrain,
@@ -290,7 +290,7 @@ class TaskSet:
             own = ", ".join(self.files.splits)
             raise TaskError(f"set {self.name!r} has the split {own}, not {split!r}")
 
-    def _found(self, split: str, index: int) -> FoundWorld:
+    def _found(self, split: str, index: int) -> FileWorld:
         """World `index` of a split, from its file."""
         assert self.files is not None
         self._check_file_split(split)

@@ -7,27 +7,27 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
 from tdac_envs.epuck.vector import EPuckVectorEnv
 from tdac_envs.ladder.env import EPuckLadderEnv, LadderEnv, env_class
-from tdac_envs.ladder.observed import ALWAYS, View, joined
+from tdac_envs.ladder.observed import ALWAYS, SetView, joined
 from tdac_envs.map2d.vector import Map2DVectorEnv
 
 
-class OnSetVector(DrivenVectorEnv):
+class TaskSetVectorEnv(DrivenVectorEnv):
     """What the vector environments of both robots add for a task set.
 
     Attributes:
         view: What is observed.
     """
 
-    view: View
+    view: SetView
 
-    def _look(self) -> None:
-        """Observes what the set says, after all else has been prepared."""
+    def _prepare(self) -> None:
+        super()._prepare()
         self.view = view = self._first.view
         self._anchors = np.array([view.anchor(task) for task in self.tasks])
 
@@ -42,7 +42,7 @@ class OnSetVector(DrivenVectorEnv):
         poses, none = self.pose(), np.zeros(self.num_envs, np.bool_)
         seen = self.view.seen(whole, poses, self._anchors)
         begun = infos[f"_{ALWAYS[0]}"]
-        return seen, self.view.infos(infos, poses, none) | self._about(begun)
+        return seen, self.view.infos(infos, poses, none) | self._world_facts(begun)
 
     def step(self, actions: Actions) -> Result:
         """Runs one time step, as `DrivenVectorEnv.step` does."""
@@ -51,8 +51,8 @@ class OnSetVector(DrivenVectorEnv):
         ended, view, poses = terminated | truncated, self.view, self.pose()
         seen = view.seen(whole, poses, self._anchors)
         if "final_obs" not in infos:
-            told = view.infos(infos, poses, ended)
-            return seen, rewards, terminated, truncated, told | self._about(begun)
+            infos = view.infos(infos, poses, ended) | self._world_facts(begun)
+            return seen, rewards, terminated, truncated, infos
         final = infos.pop("final_obs")
         placed = view.placed(self.last_poses, before)
         for i in np.flatnonzero(ended).tolist():
@@ -60,21 +60,21 @@ class OnSetVector(DrivenVectorEnv):
             final[i] = view.chosen({**final[i], **own})
         last = view.infos(infos.pop("final_info"), self.last_poses, ended)
         # The new episodes have not ended.
-        told = view.infos(infos, poses, np.zeros_like(ended))
-        told |= self._about(ended)
-        told |= {
+        infos = view.infos(infos, poses, np.zeros_like(ended))
+        infos |= self._world_facts(ended)
+        infos |= {
             "final_obs": final,
             "_final_obs": ended,
             "final_info": last,
             "_final_info": ended.copy(),
         }
-        return seen, rewards, terminated, truncated, told
+        return seen, rewards, terminated, truncated, infos
 
-    def _about(self, begun: NDArray[np.bool_]) -> dict[str, Any]:
+    def _world_facts(self, begun: NDArray[np.bool_]) -> dict[str, Any]:
         """The infos about the worlds of the robots whose episodes have begun."""
         tasks = {i: self.tasks[i] for i in np.flatnonzero(begun).tolist()}
-        told = {i: task.about for i, task in tasks.items() if task.about}
-        return joined(told, self.num_envs)
+        facts = {i: task.world_facts for i, task in tasks.items() if task.world_facts}
+        return joined(facts, self.num_envs)
 
     def _assign(self, i: int, task: Any) -> None:
         super()._assign(i, task)
@@ -82,7 +82,7 @@ class OnSetVector(DrivenVectorEnv):
 
 
 class LadderVectorEnv(
-    OnSetVector, Map2DVectorEnv, VectorEnv[Observations, Actions, Any]
+    TaskSetVectorEnv, Map2DVectorEnv, VectorEnv[Observations, Actions, Any]
 ):
     """A vector of `LadderEnv` that steps in one compiled call on all cores.
 
@@ -103,49 +103,13 @@ class LadderVectorEnv(
 
     make = LadderEnv
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        threads: int | None = None,
-        render_mode: str | None = None,
-        **options: Any,
-    ) -> None:
-        super().__init__(
-            num_envs,
-            autoreset_mode=autoreset_mode,
-            threads=threads,
-            render_mode=render_mode,
-            **options,
-        )
-        self._look()
-
 
 class EPuckLadderVectorEnv(
-    OnSetVector, EPuckVectorEnv, VectorEnv[Observations, Actions, Any]
+    TaskSetVectorEnv, EPuckVectorEnv, VectorEnv[Observations, Actions, Any]
 ):
     """A vector of `EPuckLadderEnv`, as `LadderVectorEnv` is one of `LadderEnv`."""
 
     make = EPuckLadderEnv
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        threads: int | None = None,
-        render_mode: str | None = None,
-        **options: Any,
-    ) -> None:
-        super().__init__(
-            num_envs,
-            autoreset_mode=autoreset_mode,
-            threads=threads,
-            render_mode=render_mode,
-            **options,
-        )
-        self._look()
 
 
 def make(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,14 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from tdac_envs.core.errors import TaskError
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import BoolGrid
-from tdac_envs.ladder.admission import Admitted, Conditions, Rejection, admit
+from tdac_envs.ladder.admission import (
+    Admitted,
+    Conditions,
+    Rejection,
+    admit,
+    first_admitted,
+)
 from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.generators.registry import GENERATORS, AnyParameters, draw
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 from tdac_envs.map2d.terrain import Terrain
 
 
@@ -76,6 +80,27 @@ class LadderWorld:
     rejected: tuple[Rejection, ...]
     barn_steps: float | None = None
 
+    @classmethod
+    def of(
+        cls,
+        found: Admitted,
+        heading: float,
+        rejected: tuple[Rejection, ...] = (),
+        barn_steps: float | None = None,
+    ) -> LadderWorld:
+        """The world of an admitted task, with the heading at its start."""
+        start, goal = found.start, found.goal
+        return cls(
+            found.terrain,
+            Pose(float(start[0]), float(start[1]), heading),
+            (float(goal[0]), float(goal[1])),
+            found.field,
+            found.path,
+            found.difficulty,
+            rejected,
+            barn_steps,
+        )
+
     @property
     def cells(self) -> BoolGrid:
         """The map, shape (height, width), bool, True = occupied."""
@@ -87,32 +112,17 @@ def make_world(spec: WorldSpec, key: bytes) -> LadderWorld:
 
     Args:
         spec: What it is like.
-        key: 32 bytes, from `words.world_key`. All that is random follows from it.
+        key: 32 bytes, from `world_key`. All that is random follows from it.
 
     Raises:
         TaskError: None of the drafts fulfils the conditions.
         ValueError: The key has another length.
     """
-    words = Words(key)
-    rejected: list[Rejection] = []
-    while len(rejected) < spec.tries:
-        draft = draw(words, spec.generator, 2.0 * spec.radius)
-        found = admit(draft, words, spec.conditions)
-        if isinstance(found, Admitted):
-            return _world(found, words, tuple(rejected))
-        rejected.append(found)
-    reasons = ", ".join(f"{n} × {why}" for why, n in Counter(rejected).most_common())
-    raise TaskError(
-        f"no feasible world from {spec.tries} drafts of {spec.generator.name!r} "
-        f"({reasons}); change the generator's sizes or the conditions"
-    )
+    random, name = RandomStream(key), spec.generator.name
 
+    def attempt() -> Admitted | Rejection:
+        draft = draw(random, spec.generator, 2.0 * spec.radius)
+        return admit(draft, random, spec.conditions)
 
-def _world(
-    found: Admitted, words: Words, rejected: tuple[Rejection, ...]
-) -> LadderWorld:
-    heading = words.uniform(-math.pi, math.pi)
-    start = Pose(float(found.start[0]), float(found.start[1]), heading)
-    goal = float(found.goal[0]), float(found.goal[1])
-    rest = (found.field, found.path, found.difficulty, rejected)
-    return LadderWorld(found.terrain, start, goal, *rest)
+    found, rejected = first_admitted(spec.tries, name, attempt)
+    return LadderWorld.of(found, random.uniform(-math.pi, math.pi), rejected)

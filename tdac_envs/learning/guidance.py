@@ -40,7 +40,7 @@ _BESIDE = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Route:
+class GuidedRoute:
     """Routes to a goal from all points of a map or a world.
 
     A route follows the shortest path for the body until there is room for a margin,
@@ -83,7 +83,7 @@ class Route:
         return np.where(np.isfinite(found), at, self.goal)
 
 
-def route_to_goal(task: Map2DTask | EPuckTask, reach: float = REACH) -> Route:
+def route_to_goal(task: Map2DTask | EPuckTask, reach: float = REACH) -> GuidedRoute:
     """The reference route of a task.
 
     Its margin is the widest of `MARGINS` for which the route from the task's start is
@@ -109,7 +109,7 @@ def route_to_goal(task: Map2DTask | EPuckTask, reach: float = REACH) -> Route:
         if _length(wide, start, radius / spacing) <= _DETOUR * task.shortest / spacing:
             roomy = wide
             break
-    return Route(task.goal, reach * radius, roomy, shortest, frame)
+    return GuidedRoute(task.goal, reach * radius, roomy, shortest, frame)
 
 
 def _in_spacings(field: Lengths, spacing: float) -> Lengths:
@@ -205,8 +205,8 @@ def _look_ahead(
     """Finds the next waypoint from a point; all lengths in grid spacings.
 
     Args:
-        roomy: See `Route`.
-        shortest: See `Route`.
+        roomy: See `GuidedRoute`.
+        shortest: See `GuidedRoute`.
         place: Shape (2,), fractional column and row.
         reach: Distance of the waypoint along the route.
         found: Shape (2,), overwritten with a grid point; inf for the goal itself.

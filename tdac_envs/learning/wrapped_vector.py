@@ -18,7 +18,7 @@ from tdac_envs.core.slices import Slices
 from tdac_envs.drive.stepping import STEPS
 from tdac_envs.drive.vector import DrivenVectorEnv, Observations
 from tdac_envs.learning.dead_reckoning import SOURCES, DeadReckoning, source_of
-from tdac_envs.learning.guidance import Route, look_ahead, route_to_goal
+from tdac_envs.learning.guidance import GuidedRoute, look_ahead, route_to_goal
 from tdac_envs.learning.map_view import MapViews, check_map_view, viewed_space
 from tdac_envs.learning.wrappers import (
     Frame,
@@ -73,7 +73,7 @@ class Routes:
         self._tasks = list(tasks)
 
     def ahead(self, poses: Array) -> Array:
-        """The next waypoint of each robot, shape (n, 2); see `Route.ahead`."""
+        """The next waypoint of each robot, shape (n, 2); see `GuidedRoute.ahead`."""
         np.divide(poses[:, :2] - self._corners, self._spacings, out=self._cells)
         self._slices.run(partial(look_ahead, self._shared.words[0]), self._all)
         at = self._found * self._spacings + self._corners
@@ -83,7 +83,7 @@ class Routes:
         """Stops the threads."""
         self._slices.close()
 
-    def _store(self, i: int, route: Route) -> None:
+    def _store(self, i: int, route: GuidedRoute) -> None:
         """Stores frame, goal and reach of a robot's route."""
         *self._corners[i], self._spacings[i] = route.frame
         self._goals[i], self.reach[i] = route.goal, route.reach

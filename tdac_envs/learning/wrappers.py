@@ -28,7 +28,7 @@ from tdac_envs.drive.env import Observation
 from tdac_envs.drive.stepping import STEPS
 from tdac_envs.epuck.infrared import LARGEST
 from tdac_envs.learning.dead_reckoning import SOURCES, source_of
-from tdac_envs.learning.guidance import REACH, Route, route_to_goal
+from tdac_envs.learning.guidance import REACH, GuidedRoute, route_to_goal
 from tdac_envs.learning.map_view import MapView
 from tdac_envs.map2d.task import Map2DTask
 
@@ -123,7 +123,7 @@ class Frame:
         near = radius / np.maximum(ranges, radius)
         return {**observation, "ranges": near.astype(np.float32)}
 
-    def guidance(self, route: Route, poses: ArrayLike) -> NDArray[np.float32]:
+    def guidance(self, route: GuidedRoute, poses: ArrayLike) -> NDArray[np.float32]:
         """The `guidance` of one route at poses of shape (n, 3)."""
         return self.guidance_to(route.ahead(poses), poses, route.reach)
 
@@ -311,7 +311,7 @@ class Guidance(
         space = guided_space(env.observation_space)
         self.observation_space = space  # type: ignore[assignment]
         self._task: Any = None
-        self._route: Route | None = None
+        self._route: GuidedRoute | None = None
 
     def observation(self, observation: Observation) -> Observation:
         """See the class."""

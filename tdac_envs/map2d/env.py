@@ -18,6 +18,7 @@ from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
+from tdac_envs.drive.stepping import place
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.among import begin_among, drive_among
@@ -26,8 +27,8 @@ from tdac_envs.map2d.metric_input import in_pixels, options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
-from tdac_envs.map2d.robot import Robot
-from tdac_envs.map2d.setup import Setup, override
+from tdac_envs.map2d.robot import Map2DArrays
+from tdac_envs.map2d.setup import Map2DSetup, override
 from tdac_envs.map2d.sonar import NOISE
 from tdac_envs.map2d.source import MapSource, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
@@ -267,7 +268,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             heading=given["heading"],
             robot_radius=given["robot_radius"],
             snap=snap,
-            said=ReadingOptions(polarity),
+            options=ReadingOptions(polarity),
             units=units,
         )
         params = prepared.params
@@ -291,7 +292,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             horizon=horizon,
             units=units,
         )
-        setup = Setup(
+        setup = Map2DSetup(
             nominal=nominal,
             variation=variation,
             fixed_horizon=horizon is not None,
@@ -318,13 +319,13 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self._prepare(setup, render_mode)
 
     @classmethod
-    def of(cls, setup: Setup, render_mode: str | None = None) -> Map2DEnv:
+    def of(cls, setup: Map2DSetup, render_mode: str | None = None) -> Map2DEnv:
         """The environment of a setup; it has no `params`."""
         env = cls.__new__(cls)
         env._prepare(setup, render_mode)
         return env
 
-    def _prepare(self, setup: Setup, render_mode: str | None) -> None:
+    def _prepare(self, setup: Map2DSetup, render_mode: str | None) -> None:
         super().__init__(setup, render_mode)
         self.range_noise, self.range_dropout = setup.range_noise, setup.range_dropout
         space = observation_space(setup.nominal)
@@ -338,7 +339,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             space = self._view.space(space)
             self.info_of = partial(_metric_info, self._view)
         self.observation_space = space  # type: ignore[assignment]
-        self.robot = Robot.blank(setup.nominal.robot.n_rays, self.delay)
+        self.robot = Map2DArrays.blank(setup.nominal.robot.n_rays, self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
         self.movers = movers_of(self.nominal)
@@ -362,7 +363,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.task.field is not before.field or self.setup.has_movers:
             self._bind()
         task, robot = self.task, self.robot
-        robot.place(task)
+        place(robot, task)
         self._hide()
         self._goal[:] = task.goal
         self._call_begin()

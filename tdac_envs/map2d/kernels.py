@@ -1,8 +1,8 @@
 """Compiled step of TDAC-Map2D-v0: motion up to a contact, rays, reward, episode end.
 
 `clear` and `leaps` are `padded_clear` and `leaps` of a
-`tdac_envs.map2d.terrain.Terrain`; `tdac_envs.map2d.robot.Robot` documents the arrays of
-a robot.
+`tdac_envs.map2d.terrain.Terrain`; `tdac_envs.map2d.robot.Map2DArrays` documents the
+arrays of a robot.
 """
 
 from __future__ import annotations
@@ -224,8 +224,8 @@ def stop_at_contact(
 
     Args:
         clear: Padded clearance, px.
-        constants: See `Robot`.
-        state: See `Robot`; its pose is overwritten.
+        constants: See `Map2DArrays`.
+        state: See `Map2DArrays`; its pose is overwritten.
         left: Speed of the left wheel, px/s.
         right: Speed of the right wheel, px/s.
 
@@ -279,7 +279,7 @@ def driving(move_body: Any) -> Any:
 
         `field`, shape (height, width), is the path length to the goal from each pixel,
         px; `directions` are from `rays.fan`. `constants` and the arrays after it are
-        those of `Robot`. All of them are overwritten except `constants` and, in
+        those of `Map2DArrays`. All of them are overwritten except `constants` and, in
         `state`, the commands and the slip.
         """
         before = outcome[REMAINING]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tdac_envs.drive import batching
 from tdac_envs.drive.stepping import CONTACT
-from tdac_envs.map2d.setup import Setup
+from tdac_envs.map2d.setup import Map2DSetup
 from tdac_envs.map2d.task import Map2DTask
 
 CONTACTS = None, "wall", "mover", "mover_standing"
@@ -48,7 +48,7 @@ def infos_of(outcome: NDArray[np.float64], mask: NDArray[np.bool_]) -> dict[str,
 
 
 def noisy(
-    ranges: NDArray[np.float32], setup: Setup, random: np.random.Generator
+    ranges: NDArray[np.float32], setup: Map2DSetup, random: np.random.Generator
 ) -> NDArray[np.float64]:
     """The ranges of one robot with relative noise and dropouts, in [0, range_max]."""
     seen, most = ranges.astype(np.float64), setup.nominal.robot.range_max

@@ -16,7 +16,7 @@ from tdac_envs.map2d.encounters import LOOK, nearest_approaches
 from tdac_envs.map2d.starts import KINDS, Person, Point, Random, Start
 from tdac_envs.movers import state as at
 from tdac_envs.movers.crowd import WALL_HORIZON
-from tdac_envs.movers.places import Places, places_of
+from tdac_envs.movers.destinations import Destinations, destinations_of
 from tdac_envs.movers.spec import AnySpec, CrowdSpec
 from tdac_envs.movers.state import Movers
 
@@ -35,14 +35,14 @@ class MoversSetup:
         starts: Where each mover starts.
         traits: `Movers.traits`.
         points: `Movers.points`.
-        places: Where people walk; None without a crowd.
+        destinations: Where people walk; None without a crowd.
         seeing: Of each mover, whether a person sees the robot; None if drawn.
     """
 
     starts: tuple[Start, ...]
     traits: NDArray[np.float64]
     points: NDArray[np.float64]
-    places: Places | None
+    destinations: Destinations | None
     seeing: tuple[bool | None, ...]
 
     @classmethod
@@ -61,14 +61,14 @@ class MoversSetup:
         starts: list[Start] = []
         points: list[Point] = []
         traits = np.zeros((len(each), at.N_TRAITS))
-        places = _places(specs, task)
+        destinations = _destinations(specs, task)
         for m, spec in enumerate(each):
             radius, speed = _size_of(spec, task)
             check_full_step(max(task.dt, LOOK), speed, "px")
             try:
                 own = (
-                    Person(places.nodes(), len(places.fields))
-                    if places and isinstance(spec, CrowdSpec)
+                    Person(destinations.nodes(), len(destinations.fields))
+                    if destinations and isinstance(spec, CrowdSpec)
                     else KINDS[spec.kind](spec, task, radius, speed)
                 )
             except TaskError as error:
@@ -78,7 +78,7 @@ class MoversSetup:
             starts.append(own)
         seeing = tuple(getattr(spec, "sees_robot", None) for spec in each)
         return cls(
-            tuple(starts), traits, np.array(points).reshape(-1, 2), places, seeing
+            tuple(starts), traits, np.array(points).reshape(-1, 2), destinations, seeing
         )
 
     def start(self, task: Map2DTask, random: Random) -> Movers:
@@ -94,14 +94,14 @@ class MoversSetup:
                 mover.
         """
         self._check_goal(task)
-        movers = Movers.blank(len(self.traits), self.points, task.dt, self.places)
+        movers = Movers.blank(len(self.traits), self.points, task.dt, self.destinations)
         movers.traits[:] = self.traits
         scripted = np.flatnonzero(movers.traits[:, at.KIND] != at.CROWD)
         for m in scripted.tolist():
             _put(movers, m, self.starts[m], random)
         for m in _in_the_way(movers, scripted, task).tolist():
             self._draw_again(movers, m, task, random)
-        if self.places:
+        if self.destinations:
             self._gather(movers, task, random)
         return movers
 
@@ -170,13 +170,15 @@ def _size_of(spec: AnySpec, task: Map2DTask) -> tuple[float, float]:
     )
 
 
-def _places(specs: Sequence[AnySpec], task: Map2DTask) -> Places | None:
-    """The places of the people of all crowds; None without a crowd."""
+def _destinations(specs: Sequence[AnySpec], task: Map2DTask) -> Destinations | None:
+    """The destinations of the people of all crowds; None without a crowd."""
     sizes = [_size_of(spec, task) for spec in specs if isinstance(spec, CrowdSpec)]
     if not sizes:
         return None
     radius, speed = (max(each) for each in zip(*sizes, strict=True))
-    return places_of(task.terrain.grid, radius, radius + WALL_HORIZON * speed + 1.0)
+    return destinations_of(
+        task.terrain.grid, radius, radius + WALL_HORIZON * speed + 1.0
+    )
 
 
 def _put(movers: Movers, m: int, start: Start, random: Random) -> None:

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from types import EllipsisType
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.drive import stepping
-from tdac_envs.drive.rewards import RewardWeights
-from tdac_envs.map2d.task import Map2DTask
 
 Array = NDArray[np.float64]
 Observed = NDArray[np.float32]
@@ -20,7 +16,7 @@ FRICTION = 0.4
 """Coulomb friction coefficient between a robot's body and the obstacles."""
 
 
-class Robot(NamedTuple):
+class Map2DArrays(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
     `kernels.arrays_at` and the indices beside it follow the order of the fields.
@@ -58,7 +54,7 @@ class Robot(NamedTuple):
     outcome: Array
 
     @classmethod
-    def blank(cls, n_rays: int, delay: int, *count: int) -> Robot:
+    def blank(cls, n_rays: int, delay: int, *count: int) -> Map2DArrays:
         """One robot, or `count` of them, all zeros."""
         return cls(
             np.zeros((*count, stepping.N_CONSTANTS)),
@@ -69,58 +65,3 @@ class Robot(NamedTuple):
             np.zeros((*count, n_rays), np.float32),
             np.zeros((*count, stepping.N_OUTCOME)),
         )
-
-    def row(self, index: int) -> Robot:
-        """Views of the arrays of one of many robots."""
-        return Robot(*(array[index] for array in self))
-
-    def place(self, task: Map2DTask, index: int | EllipsisType = ...) -> None:
-        """Places the robot, or robot `index` of many, at the start of a task.
-
-        Call `kernels.begin` next.
-        """
-        goal = slice(stepping.GOAL_X, stepping.HORIZON + 1)
-        wanted = *task.goal, task.goal_tolerance, task.horizon
-        self.constants[index, goal] = wanted
-        self.state[index, : stepping.HEADING + 1] = task.start
-        self.outcome[index, stepping.REMAINING] = task.shortest
-
-
-def constants_of(
-    task: Map2DTask,
-    weights: RewardWeights,
-    *,
-    motor_lag: float,
-    delay: int,
-    stops: bool,
-) -> Array:
-    """`Robot.constants` of a task.
-
-    Args:
-        task: Task with robot, goal and horizon.
-        weights: Weights of the reward.
-        motor_lag: Time constant of the wheel speeds, s.
-        delay: Number of steps until an action takes effect.
-        stops: Whether a contact ends the episode.
-    """
-    robot = task.robot
-    return np.array(
-        [
-            robot.axle_length,
-            robot.max_wheel_speed,
-            task.dt,
-            robot.radius,
-            robot.range_max,
-            math.exp(-task.dt / motor_lag) if motor_lag else 0.0,
-            delay,
-            stops,
-            task.full_step,
-            *weights,
-            *task.goal,
-            task.goal_tolerance,
-            task.horizon,
-            FRICTION,
-            *stepping.UNDISTURBED,
-        ],
-        np.float64,
-    )

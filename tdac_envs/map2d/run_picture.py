@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tdac_envs.drawing.backdrop import CLOSE_UP, Points, Window
+from tdac_envs.drawing.backdrop import CLOSE_UP, CloseUpWindow, Points
 from tdac_envs.drawing.canvas import Canvas, Image
 from tdac_envs.drawing.marks import draw_movers, draw_task
 from tdac_envs.drawing.runs import SMALLEST_BODY, Legend, draw_runs
@@ -70,13 +70,13 @@ class Background:
         """A chart of the whole map."""
         return MapChart(self.canvas.copy())
 
-    def window(self, middle: Points, extent: float) -> Window:
+    def window(self, middle: Points, extent: float) -> CloseUpWindow:
         """A square around a point, aligned to whole pixels."""
         side = max(math.ceil(extent), 8)
         x, y = (np.floor(middle - side / 2.0 + 0.5) - 0.5).tolist()
-        return Window(x, y, side)
+        return CloseUpWindow(x, y, side)
 
-    def close_up(self, window: Window) -> MapChart:
+    def close_up(self, window: CloseUpWindow) -> MapChart:
         """An enlarged part of the map."""
         x, y, side = (math.ceil(value) for value in window)
         cells = _part(self.task.terrain.grid.cells, x, y, side)

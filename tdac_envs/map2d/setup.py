@@ -19,19 +19,12 @@ from tdac_envs.core.arguments import (
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.disturbances import Random
 from tdac_envs.drive.setup import DriveSetup
-from tdac_envs.drive.task import Pose
 from tdac_envs.grid.map_units import MapFrame
 from tdac_envs.map2d.placing import MoversSetup
 from tdac_envs.map2d.rays import fan
-from tdac_envs.map2d.robot import constants_of
+from tdac_envs.map2d.robot import FRICTION
 from tdac_envs.map2d.sonar import Sonar
-from tdac_envs.map2d.task import (
-    Map2DTask,
-    default_horizon,
-    make_task,
-    mixed_start,
-    random_task,
-)
+from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.mapping.params import RobotParams
 from tdac_envs.movers.spec import AnySpec
 
@@ -40,7 +33,7 @@ MOST_STARTS = 100
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Setup(DriveSetup):
+class Map2DSetup(DriveSetup):
     """The part of an environment that does not change between episodes.
 
     Attributes:
@@ -120,40 +113,15 @@ class Setup(DriveSetup):
                 return replace(drawn, movers=movers), noise
 
     def constants(self) -> NDArray[np.float64]:
-        """`Robot.constants` of the nominal task."""
-        return constants_of(
-            self.nominal,
-            self.weights,
-            motor_lag=self.motor_lag,
-            delay=self.delay,
-            stops=self.on_collision == "terminate",
-        )
+        """`Map2DRobot.constants` of the nominal task."""
+        robot = self.nominal.robot
+        own = robot.max_wheel_speed, robot.range_max, FRICTION
+        return np.array(self.shared_constants(*own), np.float64)
 
     def world(self, task: Map2DTask) -> tuple[NDArray[Any], ...]:
         """The arrays that `begin` and `drive` take in addition to the robot's."""
         terrain = task.terrain
         return terrain.leaps, terrain.padded_clear, task.field, self.directions
-
-    def _with_ends(self, options: dict[str, Any]) -> Map2DTask:
-        task = self.nominal
-        return make_task(
-            task.terrain,
-            (*options.get("start", task.start), task.start.heading)[:3],
-            options.get("goal", task.goal),
-            task.robot,
-            dt=task.dt,
-            goal_tolerance=task.goal_tolerance,
-            horizon=task.horizon,
-        )
-
-    def _random_task(self, random: np.random.Generator) -> Map2DTask:
-        return random_task(self.nominal, random)
-
-    def _mixed_start(self, random: np.random.Generator) -> Pose:
-        return mixed_start(self.nominal, random)
-
-    def _default_horizon(self, task: Map2DTask) -> int:
-        return default_horizon(task.shortest, task.robot, task.dt)
 
 
 def override(robot: RobotParams, **given: float | None) -> RobotParams:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,7 +18,8 @@ from tdac_envs.core.arguments import (
     one_of,
     positive,
 )
-from tdac_envs.core.errors import MapError, TaskError, hint
+from tdac_envs.core.errors import MapError, TaskError, file_hint, hint
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import printable, read_array
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
@@ -64,7 +64,7 @@ def prepare(
     heading: float | None = None,
     robot_radius: float | None = None,
     snap: bool = False,
-    said: ReadingOptions = DEFAULT_OPTIONS,
+    options: ReadingOptions = DEFAULT_OPTIONS,
     units: MapUnits = PIXELS,
 ) -> Prepared:
     """Reads a map and determines start, goal, heading and body radius.
@@ -78,7 +78,7 @@ def prepare(
         heading: Start heading, rad; overrides `start[2]`.
         robot_radius: Body radius, px; from the params if None, else 15.
         snap: Whether to move start and goal to the nearest place where the body fits.
-        said: Polarity and threshold of an image, where the user gave them.
+        options: Polarity and threshold of an image, where the user gave them.
         units: Units of messages and notes, from `units_of`.
 
     Raises:
@@ -87,9 +87,9 @@ def prepare(
     """
     if robot_radius is not None:
         robot_radius = positive("robot_radius", robot_radius)
-    given = _Given.of(start, goal, heading, robot_radius, snap, said, units)
+    given = _TaskOptions.of(start, goal, heading, robot_radius, snap, options, units)
     if not isinstance(source, str | Path):
-        _refuse(said, "a grid")
+        _refuse(options, "a grid")
         return _with_task(_from_cells(_as_cells(source), "array"), given)
     # To load a folder with the name of a bundled map, write `./maze`.
     if isinstance(source, str) and source in bundled_maps():
@@ -98,17 +98,17 @@ def prepare(
     path = Path(source)
     if path.is_dir():
         _check_is_map_folder(path)
-        _refuse(said, str(path))
+        _refuse(options, str(path))
         return _with_task(_from_folder(path), given)
     if path.suffix == ".npy":
-        _refuse(said, str(path))
+        _refuse(options, str(path))
         return _with_task(_from_npy(path), given)
     check_exists(path)
     return _from_image(path, given)
 
 
 @dataclass(frozen=True, slots=True)
-class _Given:
+class _TaskOptions:
     """The caller's options of the task; None stands for the map's own value."""
 
     start: Point | None
@@ -116,7 +116,7 @@ class _Given:
     heading: float | None
     robot_radius: float | None
     snap: bool
-    said: ReadingOptions
+    options: ReadingOptions
     units: MapUnits = PIXELS
 
     @classmethod
@@ -127,9 +127,9 @@ class _Given:
         heading: float | None,
         robot_radius: float | None,
         snap: bool,
-        said: ReadingOptions,
+        options: ReadingOptions,
         units: MapUnits,
-    ) -> _Given:
+    ) -> _TaskOptions:
         at = end = None
         if start is not None:
             count = 3 if np.size(start) == 3 else 2
@@ -140,22 +140,22 @@ class _Given:
             end = finite_point("goal", goal)
         if heading is not None:
             heading = finite("heading", heading)
-        return cls(at, end, heading, robot_radius, snap, said, units)
+        return cls(at, end, heading, robot_radius, snap, options, units)
 
-    def or_else(self, bundled: BundledMap) -> _Given:
+    def or_else(self, bundled: BundledMap) -> _TaskOptions:
         """These options, with the values of a bundled map instead of None."""
-        return _Given(
+        return _TaskOptions(
             self.start or bundled.start,
             self.goal or bundled.goal,
             bundled.heading if self.heading is None else self.heading,
             self.robot_radius or bundled.robot_radius,
             self.snap,
-            self.said,
+            self.options,
             self.units,
         )
 
 
-def _with_task(prepared: Prepared, given: _Given) -> Prepared:
+def _with_task(prepared: Prepared, given: _TaskOptions) -> Prepared:
     """Overrides the task in the params with the options that are not None."""
     changes: dict[str, Any] = {
         name: value
@@ -216,17 +216,17 @@ def units_of(source: MapSource, frame: str) -> MapUnits:
     return MapUnits.metres(load_image(path))
 
 
-def _from_image(image: Path, given: _Given) -> Prepared:
+def _from_image(image: Path, given: _TaskOptions) -> Prepared:
     # Not cached for a ROS map.yaml: the digest does not cover the image that it names.
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
     radius = given.robot_radius or RobotParams().radius
     ends = given.start, given.goal
-    how = given.snap, given.said, given.units
-    prepared = read(image, _digest(image), *ends, radius, *how)
+    how = given.snap, given.options, given.units
+    prepared = read(image, sha256_of(read_bytes(image)), *ends, radius, *how)
     # Preprocessing has already snapped the points.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
     rest = (given.heading, radius, False, DEFAULT_OPTIONS, given.units)
-    return _with_task(prepared, _Given(start, goal, *rest))
+    return _with_task(prepared, _TaskOptions(start, goal, *rest))
 
 
 # Preprocessing takes most of the time of `gym.make`; a grid takes one byte per pixel.
@@ -238,28 +238,28 @@ def _read_image(
     goal: Point | None,
     radius: float,
     snap: bool,
-    said: ReadingOptions,
+    options: ReadingOptions,
     units: MapUnits,
 ) -> Prepared:
     # Imported late: grids need no preprocessing.
     from tdac_envs.mapping.preprocessing import preprocess
 
-    how: Any = {"polarity": said.polarity, "threshold": said.threshold, "units": units}
+    how: Any = {
+        "polarity": options.polarity,
+        "threshold": options.threshold,
+        "units": units,
+    }
     grid, params = preprocess(image, start, goal, radius, snap=snap, **how)
     return Prepared(grid, params, image)
 
 
-def _refuse(said: ReadingOptions, what: str) -> None:
+def _refuse(options: ReadingOptions, what: str) -> None:
     """Refuses image options for a map that is not an image."""
-    if said != DEFAULT_OPTIONS:
+    if options != DEFAULT_OPTIONS:
         raise TaskError(
             f"{what} already defines which cells are obstacles; leave out polarity and "
             "threshold"
         )
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(read_bytes(path)).hexdigest()
 
 
 def _as_cells(source: NDArray[Any] | Sequence[Sequence[Any]]) -> NDArray[Any]:
@@ -330,11 +330,12 @@ def check_exists(path: Path) -> None:
     """Checks that a map exists.
 
     Raises:
-        MapError: It does not; the message suggests a bundled map with a similar name.
+        MapError: It does not; the message suggests a file beside it or a bundled map
+            with a similar name.
     """
     if path.exists():
         return
-    known = ""
+    known = file_hint(path)
     if not path.suffix:
         names = bundled_maps()
         known = f"{hint(str(path), names)}; bundled maps: {', '.join(names)}"

@@ -52,7 +52,7 @@ class Start(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Route:
+class RouteStart:
     """A route, of which one round goes there and back if it is not a loop.
 
     Attributes:
@@ -70,7 +70,9 @@ class Route:
     kind: int = at.ROUTE
 
     @classmethod
-    def of(cls, spec: RouteSpec, task: Map2DTask, radius: float, speed: float) -> Route:
+    def of(
+        cls, spec: RouteSpec, task: Map2DTask, radius: float, speed: float
+    ) -> RouteStart:
         """The route of a disc, checked on the map of a task.
 
         Raises:
@@ -159,7 +161,7 @@ class Bouncer:
     """Where a bouncing disc starts.
 
     Attributes:
-        place_given: The place, px; None if drawn.
+        fixed_place: The place, px; None if drawn.
         heading: The heading, rad; None if drawn.
         stands: Whether the mover never moves.
         places: Indices of the pixels where the disc fits.
@@ -168,7 +170,7 @@ class Bouncer:
         kind: See `Start`.
     """
 
-    place_given: Point | None
+    fixed_place: Point | None
     heading: float | None
     stands: bool
     places: NDArray[np.int64]
@@ -204,24 +206,24 @@ class Bouncer:
     @property
     def is_drawn(self) -> bool:
         """See `Start`."""
-        return self.place_given is None or self.heading is None
+        return self.fixed_place is None or self.heading is None
 
     def place(self, random: Random) -> Place:
         """See `Start`; the last entry is the heading."""
-        if self.place_given is None:
+        if self.fixed_place is None:
             row, column = divmod(
                 int(self.places[random.integers(self.places.size)]), self.width
             )
             x, y = float(column), float(row)
         else:
-            x, y = self.place_given
+            x, y = self.fixed_place
         if self.heading is None:
             return x, y, random.uniform(-math.pi, math.pi)
         return x, y, self.heading
 
     def stays_within(self) -> Sequence[Point]:
         """See `Start`."""
-        return (self.place_given,) if self.stands and self.place_given else ()
+        return (self.fixed_place,) if self.stands and self.fixed_place else ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -253,7 +255,7 @@ class Person:
 
 
 KINDS: dict[str, Callable[[Any, Any, float, float], Start]] = {
-    "route": Route.of,
+    "route": RouteStart.of,
     "bounce": Bouncer.of,
 }
 """The start of a scripted mover: from its entry, task, radius (px) and speed (px/s)."""

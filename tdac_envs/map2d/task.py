@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,10 +19,9 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import (
-    MAX_DRAWS,
     Pose,
     check_full_step,
-    default_horizon_for,
+    default_horizon,
     jittered_pose,
     wrap_heading,
 )
@@ -48,10 +48,7 @@ __all__ = [
     "Map2DTask",
     "Terrain",
     "at_goal",
-    "default_horizon",
-    "jittered_start",
     "make_task",
-    "random_task",
     "widest_connected_radius",
 ]
 
@@ -77,7 +74,7 @@ class Map2DTask:
         shortest: d0, the length of the shortest grid path from the nominal start, px;
             see `path_from`.
         movers: The movers at the start of the episode; None without movers.
-        about: What `info` says about the world of a task set; None elsewhere.
+        world_facts: What `info` says about the world of a task set; None elsewhere.
     """
 
     env_id: ClassVar = "TDAC-Map2D-v0"
@@ -92,12 +89,12 @@ class Map2DTask:
     field: NDArray[np.float32]
     shortest: float
     movers: Movers | None = None
-    about: dict[str, Any] | None = None
+    world_facts: dict[str, Any] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         rest = self.robot, self.goal_tolerance, self.dt, self.horizon
         ends = self.terrain, self.start, self.goal
-        return _restored, (*ends, *rest, self.movers, self.about)
+        return _restored, (*ends, *rest, self.movers, self.world_facts)
 
     @property
     def body_radius(self) -> float:
@@ -115,8 +112,45 @@ class Map2DTask:
         return self.robot.max_wheel_speed * self.dt
 
     def jittered(self, random: np.random.Generator) -> Pose:
-        """A start of the jitter variation; see `jittered_start`."""
-        return jittered_start(self, random)
+        """A feasible start within a body radius of the nominal one, heading +- 0.5."""
+        may_start = partial(_may_start, self)
+        return jittered_pose(self.start, self.robot.radius, random, may_start)
+
+    def point(self, index: int) -> tuple[float, float]:
+        """The pixel (x, y) at an index of the flattened field."""
+        row, column = divmod(index, self.field.shape[1])
+        return float(column), float(row)
+
+    def field_to(self, index: int) -> NDArray[np.float32]:
+        """`field` for a goal at the pixel of an index."""
+        x, y = map(int, self.point(index))
+        return field_to(self.terrain, (x, y), self.robot.radius)
+
+    def is_at_goal(self, x: float, y: float, goal: tuple[float, float]) -> bool:
+        """Whether a robot at (x, y) has reached a goal, px."""
+        return at_goal(self.terrain, goal, self.goal_tolerance, x, y)
+
+    def with_ends(
+        self, start: Sequence[float] | None = None, goal: Sequence[float] | None = None
+    ) -> Map2DTask:
+        """This task with another start and goal, which are checked.
+
+        Args:
+            start: (x, y) or (x, y, heading); by default its own.
+            goal: (x, y); by default its own.
+
+        Raises:
+            TaskError: The task is not feasible.
+        """
+        return make_task(
+            self.terrain,
+            (*(self.start if start is None else start), self.start.heading)[:3],
+            self.goal if goal is None else goal,
+            self.robot,
+            dt=self.dt,
+            goal_tolerance=self.goal_tolerance,
+            horizon=self.horizon,
+        )
 
     def path_from(self, start: Pose) -> Path:
         """Shortest grid path from `start` to the goal, shape (n, 2), px; may be empty.
@@ -215,59 +249,9 @@ def make_task(
             f"{units.length(tolerance, 1)}; move one of them"
         )
     if horizon is None:
-        horizon = default_horizon(shortest, robot, dt)
+        horizon = default_horizon(shortest, robot.max_wheel_speed * dt)
     steps = horizon_steps(horizon)
     return Map2DTask(terrain, begin, end, robot, tolerance, dt, steps, field, shortest)
-
-
-def default_horizon(shortest: float, robot: RobotParams, dt: float) -> int:
-    """The horizon for a path of `shortest` px; see `default_horizon_for`."""
-    return default_horizon_for(shortest, robot.max_wheel_speed * dt)
-
-
-def jittered_start(task: Map2DTask, random: np.random.Generator) -> Pose:
-    """A feasible start within one body radius of the nominal, heading +- 0.5 rad."""
-    return jittered_pose(
-        task.start, task.robot.radius, random, lambda pose: _may_start(task, pose)
-    )
-
-
-def mixed_start(task: Map2DTask, random: np.random.Generator) -> Pose:
-    """A jittered start or, with probability 0.5, any feasible one.
-
-    The latter is drawn from the free pixels connected to the goal, so that a learner
-    sees all parts of the map without having to drive there first.
-    """
-    if random.random() < 0.5:
-        return jittered_start(task, random)
-    width = task.field.shape[1]
-    connected = np.flatnonzero(np.isfinite(task.field))
-    for _ in range(MAX_DRAWS):
-        y, x = divmod(int(random.choice(connected)), width)
-        heading = wrap_heading(random.uniform(-math.pi, math.pi))
-        if not at_goal(task.terrain, task.goal, task.goal_tolerance, x, y):
-            return Pose(x, y, heading)
-    return task.start
-
-
-def random_task(task: Map2DTask, random: np.random.Generator) -> Map2DTask:
-    """A task with any feasible start and goal; map, robot and horizon are the same.
-
-    Both points are drawn from the free pixels connected to the nominal goal. If every
-    draw starts within the tolerance of its goal, the result is the nominal task.
-    """
-    width = task.field.shape[1]
-    connected = np.flatnonzero(np.isfinite(task.field))
-    for _ in range(MAX_DRAWS):
-        goal_y, goal_x = divmod(int(random.choice(connected)), width)
-        start_y, start_x = divmod(int(random.choice(connected)), width)
-        heading = wrap_heading(random.uniform(-math.pi, math.pi))
-        start, goal = Pose(start_x, start_y, heading), (float(goal_x), float(goal_y))
-        if not at_goal(task.terrain, goal, task.goal_tolerance, start_x, start_y):
-            field = field_to(task.terrain, (goal_x, goal_y), task.robot.radius)
-            shortest = float(field[start_y, start_x])
-            return replace(task, start=start, goal=goal, field=field, shortest=shortest)
-    return task
 
 
 def _may_start(task: Map2DTask, pose: Pose) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import kernel, read_only
-from tdac_envs.core.errors import TaskError
+from tdac_envs.core.errors import TaskError, offer
 from tdac_envs.grid.grid import (
     FloatGrid,
     OccupancyGrid,
@@ -136,7 +136,7 @@ def check_body_fits(
 
     Raises:
         TaskError: The point is outside the map, in an obstacle or too near to one; the
-            message suggests the nearest free pixel.
+            message begins with the nearest free pixel.
     """
     grid = terrain.grid
     point = f"{name} {units.point(x, y)}"
@@ -154,20 +154,15 @@ def check_body_fits(
         )
     else:
         return
-    nearest = _nearest_place(terrain, x, y, radius, units)
-    raise TaskError(f"{point} {problem}; {nearest}")
-
-
-def _nearest_place(
-    terrain: Terrain, x: float, y: float, radius: float, units: MapUnits
-) -> str:
+    problem = f"{point} {problem}"
     nearest = nearest_free(body_free(terrain.clear, radius), x, y)
     if nearest is None:
-        return (
-            "the body fits nowhere; the largest clearance is "
+        raise TaskError(
+            f"{problem}; the body fits nowhere; the largest clearance is "
             f"{units.length(float(terrain.clear.max()), 1)}"
         )
-    return f"the nearest free {units.place} is {units.point(*nearest)}"
+    place, which = units.point(*nearest), f"the nearest free {units.place}"
+    raise TaskError(offer(name, place, which, problem))
 
 
 @kernel

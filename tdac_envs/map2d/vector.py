@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.drive.batching import make_envs
+from tdac_envs.drive.stepping import row_of
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
 from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.among import step_rows_among
@@ -49,29 +48,11 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     copied = ("pose", "wheel_speeds", "ranges")
     infos_of = staticmethod(infos_of)
 
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        threads: int | None = None,
-        each: Sequence[dict[str, Any]] = ({},),
-        render_mode: str | None = None,
-        max_episode_steps: int | None = None,
-        **options: Any,
-    ) -> None:
-        num_envs = whole_number("num_envs", num_envs, 1)
-        envs = make_envs(self.make, each, options, num_envs)
+    def _adopt(self, envs: Sequence[Any], num_envs: int) -> None:
         self._among = any(env.setup.has_movers for env in envs)
         self._movers = [Movers.none() for _ in range(num_envs)]
-        super().__init__(
-            envs,
-            num_envs,
-            autoreset_mode=autoreset_mode,
-            threads=threads,
-            render_mode=render_mode,
-            max_episode_steps=max_episode_steps,
-        )
+
+    def _prepare(self) -> None:
         self._units = MapUnits(self.setups[0].metric)
         self._view = _view_of([setup.metric for setup in self.setups])
         noisy = [setup.has_inexact_ranges for setup in self.setups]
@@ -100,12 +81,12 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         if view is None:
             return result
         seen, rewards, terminated, truncated, infos = result
-        told = view.info(infos)
-        if "final_obs" in told:
-            for i in np.flatnonzero(told["_final_obs"]).tolist():
-                told["final_obs"][i] = view.seen(told["final_obs"][i], i)
-            told["final_info"] = view.info(told["final_info"])
-        return view.seen(seen), rewards, terminated, truncated, told
+        infos = view.info(infos)
+        if "final_obs" in infos:
+            for i in np.flatnonzero(infos["_final_obs"]).tolist():
+                infos["final_obs"][i] = view.seen(infos["final_obs"][i], i)
+            infos["final_info"] = view.info(infos["final_info"])
+        return view.seen(seen), rewards, terminated, truncated, infos
 
     @property
     def step_rows(self) -> Callable[..., None]:  # type: ignore[override]
@@ -152,7 +133,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
 
     def _listen(self, i: int, ranges: NDArray[np.float32]) -> None:
         """Replaces the ranges of robot i by those of its sonars."""
-        robots, discs = self.robots.row(i), self._movers[i].discs()
+        robots, discs = row_of(self.robots, i), self._movers[i].discs()
         terrain = self.tasks[i].terrain
         self.setups[i].sonar.read(terrain, robots.state, discs, robots.ranges)
         ranges[i] = robots.ranges

@@ -39,7 +39,7 @@ THREADS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidate:
+class MapCandidate:
     """An evaluated reading of the map with a planner's margin.
 
     Attributes:
@@ -66,7 +66,7 @@ class Candidate:
         return -np.inf if self.terms is None else score(self.terms)
 
 
-def ranked(scene: MapProblem, preset: Preset) -> list[Candidate]:
+def ranked(scene: MapProblem, preset: Preset) -> list[MapCandidate]:
     """All evaluated candidates, the chosen one first.
 
     Feasible candidates are sorted by descending score; infeasible ones follow in the
@@ -86,7 +86,7 @@ def ranked(scene: MapProblem, preset: Preset) -> list[Candidate]:
     return sorted(tried, key=lambda c: (c.reason is not None, -c.score))
 
 
-def _staged_search(scene: MapProblem) -> Iterator[Candidate]:
+def _staged_search(scene: MapProblem) -> Iterator[MapCandidate]:
     """Tries readings, each with all margins, up to the first feasible one."""
     for reading in readings(scene):
         candidates = _with_margins(scene, reading)
@@ -98,8 +98,8 @@ def _staged_search(scene: MapProblem) -> Iterator[Candidate]:
 
 
 def _without_detour(
-    candidate: Candidate, plain: Candidate, units: MapUnits
-) -> Candidate:
+    candidate: MapCandidate, plain: MapCandidate, units: MapUnits
+) -> MapCandidate:
     """Makes a margin infeasible if it lengthens the path too much."""
     if candidate.terms is None or plain.terms is None:
         return candidate
@@ -111,7 +111,7 @@ def _without_detour(
     return replace(candidate, reason=lambda: why, terms=None)
 
 
-def _paper_grid(scene: MapProblem) -> list[Candidate]:
+def _paper_grid(scene: MapProblem) -> list[MapCandidate]:
     """The full grid polarity x cleanup x inflation, without repeated computation."""
     given = scene.image.occupied
     bases = (
@@ -147,11 +147,11 @@ def _family(scene: MapProblem, base: MapReading) -> _Family:
 
 def _judged(
     scene: MapProblem, family: _Family, pool: ThreadPoolExecutor
-) -> list[Candidate]:
+) -> list[MapCandidate]:
     """The readings with each margin, up to the first infeasible one."""
     trip, guide = scene.trip, family.guide
     if trip is None:
-        return [Candidate(reading) for reading in family.readings]
+        return [MapCandidate(reading) for reading in family.readings]
     if guide is None:
         return [_candidate(reading, trip) for reading in family.readings]
     # Readings that are equal after cleanup share their array.
@@ -169,10 +169,10 @@ def _judged(
     ]
 
 
-def _with_margins(scene: MapProblem, reading: MapReading) -> list[Candidate]:
+def _with_margins(scene: MapProblem, reading: MapReading) -> list[MapCandidate]:
     """The reading with each margin, up to the first infeasible one."""
     if scene.trip is None:
-        return [Candidate(reading)]
+        return [MapCandidate(reading)]
     ground = GridMetrics.of(reading.cells)
     guide = guide_of(ground.clear, scene.trip)
     if guide is None:
@@ -183,7 +183,7 @@ def _with_margins(scene: MapProblem, reading: MapReading) -> list[Candidate]:
 
 def _candidates(
     reading: MapReading, trip: NavigationTask, terms: Sequence[ScoreTerms | None]
-) -> list[Candidate]:
+) -> list[MapCandidate]:
     candidates = []
     for inflation, each in zip(INFLATIONS, terms, strict=True):
         candidates.append(_candidate(reading, trip, inflation, each))
@@ -197,6 +197,6 @@ def _candidate(
     trip: NavigationTask,
     inflation: int = 0,
     terms: ScoreTerms | None = None,
-) -> Candidate:
+) -> MapCandidate:
     why = cache(partial(explain, reading.cells, trip, inflation))
-    return Candidate(reading, inflation, why if terms is None else None, terms)
+    return MapCandidate(reading, inflation, why if terms is None else None, terms)

@@ -26,7 +26,7 @@ Sides = tuple[BoolGrid, BoolGrid]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fault:
+class MapFault:
     """The place on a map where a task is infeasible.
 
     Attributes:
@@ -45,7 +45,7 @@ class Fault:
     goal_side: BoolGrid
 
 
-def fault_of(cells: BoolGrid, params: MapParams, units: MapUnits) -> Fault | None:
+def fault_of(cells: BoolGrid, params: MapParams, units: MapUnits) -> MapFault | None:
     """Finds where a task is infeasible for the body; None if it is feasible.
 
     Args:
@@ -72,14 +72,14 @@ def fault_of(cells: BoolGrid, params: MapParams, units: MapUnits) -> Fault | Non
         return None
     widest = widest_radius(clear, start, goal)
     if widest < 0.5:
-        return Fault("closed here", _wall(clear, start, goal), None, *sides)
+        return MapFault("closed here", _wall(clear, start, goal), None, *sides)
     label = f"narrowest gap: a radius of {units.at_most(widest)} gets through"
-    return Fault(label, _gap(clear, widest, start, goal), None, *sides)
+    return MapFault(label, _gap(clear, widest, start, goal), None, *sides)
 
 
 def _misplaced(
     cells: BoolGrid, free: BoolGrid, ends: tuple[Pixel, Pixel], sides: Sides
-) -> Fault | None:
+) -> MapFault | None:
     """The fault of an end that is walled off or where the body does not fit."""
     beyond = end_outside(cells, *ends)
     for name, (x, y), there, other in zip(
@@ -96,7 +96,7 @@ def _misplaced(
         else:
             continue
         better = nearest_free(other if other.any() else places, x, y)
-        return Fault(f"{name} {what}", (x, y), better, *sides)
+        return MapFault(f"{name} {what}", (x, y), better, *sides)
     return None
 
 
@@ -104,7 +104,7 @@ def _pixel(point: Point) -> Pixel:
     return math.floor(point[0] + 0.5), math.floor(point[1] + 0.5)
 
 
-def _off_the_map(cells: BoolGrid, ends: dict[str, Point]) -> Fault | None:
+def _off_the_map(cells: BoolGrid, ends: dict[str, Point]) -> MapFault | None:
     """The fault of the first end outside the map, at the nearest border."""
     height, width = cells.shape
     none = np.zeros_like(cells)
@@ -113,7 +113,7 @@ def _off_the_map(cells: BoolGrid, ends: dict[str, Point]) -> Fault | None:
         if not (0 <= column < width and 0 <= row < height):
             at = min(max(x, 0.0), width - 1.0), min(max(y, 0.0), height - 1.0)
             label = f"{name} outside the map, in this direction"
-            return Fault(label, at, None, none, none)
+            return MapFault(label, at, None, none, none)
     return None
 
 

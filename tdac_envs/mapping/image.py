@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 import warnings
 from collections.abc import Generator
@@ -14,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.errors import MapError
+from tdac_envs.core.errors import MapError, file_hint
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import IMAGE_BYTES, one_line, printable, read_file
 from tdac_envs.grid.grid import BoolGrid
 
@@ -95,9 +95,7 @@ def luminance(colour: ColourImage) -> GreyImage:
 def read_picture(path: Path) -> MapImage:
     """Reads a PNG, JPEG, PGM, BMP, GIF, TIFF or WebP file of any depth."""
     data = read_bytes(path)
-    return MapImage(
-        decode(data, path.name), printable(path.name), hashlib.sha256(data).hexdigest()
-    )
+    return MapImage(decode(data, path.name), printable(path.name), sha256_of(data))
 
 
 def from_array(array: NDArray[np.generic]) -> MapImage:
@@ -107,7 +105,7 @@ def from_array(array: NDArray[np.generic]) -> MapImage:
         array: bool (height, width), True = occupied; or uint8 of shape
             (height, width), (height, width, 3) RGB or (height, width, 4) RGBA.
     """
-    digest = hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()
+    digest = sha256_of(np.ascontiguousarray(array).tobytes())
     if array.dtype == np.bool_ and array.ndim == 2:
         occupied = np.asarray(array, np.bool_)
         shade = np.where(occupied, 0, 255).astype(np.uint8)
@@ -129,7 +127,9 @@ def read_bytes(path: Path, most: int = IMAGE_BYTES) -> bytes:
     try:
         return read_file(path, most)
     except FileNotFoundError:
-        raise MapError(f"{path}: no such file; check the path") from None
+        raise MapError(
+            f"{path}: no such file{file_hint(path)}; check the path"
+        ) from None
     except IsADirectoryError:
         raise MapError(f"{path}: is a folder; give the map file in it") from None
     except OSError as error:

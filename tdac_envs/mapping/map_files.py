@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from tdac_envs.core.errors import MapError, first_problem
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, printable, read_array
 from tdac_envs.mapping.image import (
     MapImage,
@@ -21,7 +21,7 @@ from tdac_envs.mapping.image import (
     read_bytes,
     read_picture,
 )
-from tdac_envs.mapping.ros_rule import RosMap, ros_cells, ros_notes
+from tdac_envs.mapping.ros_rule import RosMapFile, ros_cells, ros_notes
 
 
 def load_image(path: str | Path) -> MapImage:
@@ -62,7 +62,7 @@ def read_ros_yaml(path: Path) -> MapImage:
     return MapImage(
         composite(pixels) if (alpha < 255).any() else pixels[..., :3],
         printable(path.name),
-        hashlib.sha256(text + data).hexdigest(),
+        sha256_of(text, data),
         ~cells.free,
         f"ros {ros.mode}",
         ros.resolution,
@@ -72,7 +72,7 @@ def read_ros_yaml(path: Path) -> MapImage:
     )
 
 
-def _parse_ros(text: bytes, path: Path) -> RosMap:
+def _parse_ros(text: bytes, path: Path) -> RosMapFile:
     try:
         fields = parse_yaml(text)
     except ValueError as error:
@@ -80,9 +80,9 @@ def _parse_ros(text: bytes, path: Path) -> RosMap:
     if not isinstance(fields, dict) or "image" not in fields:
         raise MapError(f"{path}: not a ROS map: expected a field `image`")
     try:
-        return RosMap.model_validate(fields)
+        return RosMapFile.model_validate(fields)
     except ValidationError as error:
-        raise MapError(f"{path}: {first_problem(error, RosMap)}") from None
+        raise MapError(f"{path}: {first_problem(error, RosMapFile)}") from None
 
 
 def read_grid(path: Path) -> MapImage:
@@ -122,7 +122,7 @@ def read_movingai(path: Path) -> MapImage:
     cells = np.frombuffer(b"".join(rows), np.uint8).reshape(height, width)
     occupied = ~np.isin(cells, np.frombuffer(b".GS", np.uint8))
     shade = np.where(occupied, 0, 255).astype(np.uint8)
-    digest = hashlib.sha256(data).hexdigest()
+    digest = sha256_of(data)
     colour = np.repeat(shade[..., None], 3, axis=2)
     return MapImage(colour, printable(path.name), digest, occupied, "movingai")
 

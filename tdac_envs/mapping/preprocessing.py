@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.errors import PolarityError, RefusedError, TaskError
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
-from tdac_envs.mapping.candidates import Candidate, Preset, ranked
+from tdac_envs.mapping.candidates import MapCandidate, Preset, ranked
 from tdac_envs.mapping.image import MapImage, from_array
 from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.params import (
@@ -74,8 +74,8 @@ def preprocess(
         RefusedError: The task is feasible on no reading.
         TaskError: An argument is invalid.
     """
-    source, said = as_image(image), ReadingOptions(polarity, threshold)
-    scene, notes = _scene(source, start, goal, robot_radius, snap, said, units)
+    source, options = as_image(image), ReadingOptions(polarity, threshold)
+    scene, notes = _scene(source, start, goal, robot_radius, snap, options, units)
     candidates = ranked(scene, preset)
     if is_polarity_unclear(scene, candidates[0].reading.polarity):
         if scene.trip is not None:
@@ -93,9 +93,9 @@ def preprocess_with_candidates(
     preset: Preset,
     snap: bool,
     heading: float,
-    said: ReadingOptions,
+    options: ReadingOptions,
     units: MapUnits = PIXELS,
-) -> tuple[OccupancyGrid, MapParams, list[Candidate]]:
+) -> tuple[OccupancyGrid, MapParams, list[MapCandidate]]:
     """The results of `preprocess`, and all evaluated candidates; see `ranked`.
 
     Raises:
@@ -105,7 +105,7 @@ def preprocess_with_candidates(
         TaskError: As `preprocess` does.
     """
     source = as_image(image)
-    scene, notes = _scene(source, start, goal, robot_radius, snap, said, units)
+    scene, notes = _scene(source, start, goal, robot_radius, snap, options, units)
     candidates = ranked(scene, preset)
     if is_polarity_unclear(scene, candidates[0].reading.polarity):
         raise _close_call(scene, source, preset, heading)
@@ -119,16 +119,16 @@ def _scene(
     goal: tuple[float, float] | None,
     robot_radius: float,
     snapping: bool,
-    said: ReadingOptions,
+    options: ReadingOptions,
     units: MapUnits,
 ) -> tuple[MapProblem, list[str]]:
     """The picture with its task, and notes on moved points."""
-    if source.occupied is not None and said != DEFAULT_OPTIONS:
+    if source.occupied is not None and options != DEFAULT_OPTIONS:
         raise TaskError(
             f"{source.name} itself defines which cells are obstacles; leave out "
             "polarity and threshold"
         )
-    alone = MapProblem.of(source, None, None, robot_radius, said, units)
+    alone = MapProblem.of(source, None, None, robot_radius, options, units)
     for name, point in (("start", start), ("goal", goal)):
         if point is not None and not np.isfinite(point).all():
             raise TaskError(f"expected {name} to be two finite numbers, got {point}")
@@ -142,7 +142,11 @@ def _scene(
 
 
 def _result(
-    scene: MapProblem, best: Candidate, preset: Preset, heading: float, notes: list[str]
+    scene: MapProblem,
+    best: MapCandidate,
+    preset: Preset,
+    heading: float,
+    notes: list[str],
 ) -> tuple[OccupancyGrid, MapParams]:
     """The grid and the parameters of the best candidate.
 
@@ -186,7 +190,7 @@ def _close_call(
     summaries: list[str] = []
     pictures: dict[str, Any] = {}
     for polarity in scene.polarities:
-        one = replace(scene, said=replace(scene.said, polarity=polarity))
+        one = replace(scene, options=replace(scene.options, polarity=polarity))
         best = ranked(one, preset)[0]
         free = float(1 - best.reading.cells.mean())
         summaries.append(
@@ -200,7 +204,7 @@ def _close_call(
     return PolarityError(f"{message}; {advice}", scene.image.name, pictures)
 
 
-def _path(best: Candidate, units: MapUnits) -> str:
+def _path(best: MapCandidate, units: MapUnits) -> str:
     """A remark on the length of the path."""
     if best.terms is not None:
         return f" and a grid path of {units.length(best.terms.path_length, 0)}"
@@ -214,7 +218,7 @@ def rank_candidates(
     robot_radius: float = 15.0,
     *,
     preset: Preset = "default",
-) -> list[Candidate]:
+) -> list[MapCandidate]:
     """All evaluated candidates, the chosen one first; see `ranked`."""
     return ranked(MapProblem.of(as_image(image), start, goal, robot_radius), preset)
 
@@ -255,7 +259,7 @@ def _outside(
     x, y = {"start": start, "goal": goal}[name] or (0.0, 0.0)
     image, units = alone.image, alone.units
     reading = next(readings(alone))
-    params = _params(alone, Candidate(reading), 0.0, [])
+    params = _params(alone, MapCandidate(reading), 0.0, [])
     params = params.model_copy(update={"start": start, "goal": goal})
     reason = (
         f"{name} {units.point(x, y)} lies outside the map; "
@@ -288,7 +292,7 @@ def _snapped(scene: MapProblem, light_free: bool) -> tuple[MapProblem, list[str]
     reading = _clearest(scene, light_free)
     moved = snap(reading.cells, scene.start, scene.goal, scene.radius, scene.units)
     ends = [None if p is None else _pixel(p) for p in (moved.start, moved.goal)]
-    pointed = tuple(scene.ends) if reading.words else ()
+    pointed = tuple(scene.ends) if reading.lettering else ()
     return scene.with_ends(ends[0], ends[1], pointed), list(moved.notes)
 
 
@@ -298,8 +302,8 @@ def _clearest(scene: MapProblem, light_free: bool) -> MapReading:
     for reading in readings(scene, light_free):
         fitting = sum(body_fits(reading.cells, p, scene.radius) for p in scene.ends)
         # Thin lines and specks under a start may be obstacles, words are not.
-        if best is None or (fitting, reading.words) > most:
-            best, most = reading, (fitting, reading.words)
+        if best is None or (fitting, reading.lettering) > most:
+            best, most = reading, (fitting, reading.lettering)
         if fitting == len(scene.ends):
             break
     assert best is not None
@@ -308,12 +312,12 @@ def _clearest(scene: MapProblem, light_free: bool) -> MapReading:
 
 def _changed(reading: MapReading, preset: Preset) -> list[str]:
     """Notes on the obstacles that the reading removes from the picture."""
-    if not (reading.opening or reading.cleanup or reading.words):
+    if not (reading.opening or reading.cleanup or reading.lettering):
         return []
     if preset == "paper":
         what = f"pieces and holes under {reading.cleanup} px removed, gaps closed"
         return [f"cleaned with strength {reading.cleanup}: {what}; check the preview"]
-    parts = ["words over start or goal"] if reading.words else []
+    parts = ["words over start or goal"] if reading.lettering else []
     if reading.opening:
         parts.append(f"lines under {reading.opening} px")
     if reading.cleanup:
@@ -323,7 +327,7 @@ def _changed(reading: MapReading, preset: Preset) -> list[str]:
 
 
 def _params(
-    scene: MapProblem, best: Candidate, heading: float, notes: list[str]
+    scene: MapProblem, best: MapCandidate, heading: float, notes: list[str]
 ) -> MapParams:
     image, reading = scene.image, best.reading
     height, width = scene.luminance.shape

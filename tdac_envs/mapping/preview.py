@@ -23,7 +23,7 @@ from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.plan import path_length
 from tdac_envs.mapping.binarize import otsu, saturated
-from tdac_envs.mapping.fault import Fault
+from tdac_envs.mapping.fault import MapFault
 from tdac_envs.mapping.image import ColourImage, MapImage, luminance
 from tdac_envs.mapping.params import MapParams
 from tdac_envs.mapping.readings import unknown_grey
@@ -53,7 +53,7 @@ def draw_preview(
     params: MapParams,
     path: tuple[str, Path],
     units: MapUnits = PIXELS,
-    fault: Fault | None = None,
+    fault: MapFault | None = None,
     reason: str = "",
 ) -> Picture:
     """The tinted source image with task, legend and rulers, uint8 RGB.
@@ -98,7 +98,7 @@ def draw_preview(
 
 
 def _classes(
-    image: MapImage, cells: BoolGrid, params: MapParams, fault: Fault | None
+    image: MapImage, cells: BoolGrid, params: MapParams, fault: MapFault | None
 ) -> Classes:
     """What each pixel is: an index of `_NAMES`, shape (height, width)."""
     classes = cells.astype(np.uint8)
@@ -157,7 +157,7 @@ def _draw_task(canvas: Canvas, params: MapParams, path: Path) -> None:
         canvas.disc(params.goal, 4, GREEN)
 
 
-def _draw_fault(canvas: Canvas, fault: Fault) -> None:
+def _draw_fault(canvas: Canvas, fault: MapFault) -> None:
     """Rings the place where the task fails, and points to a better one."""
     if fault.better is not None:
         way = np.array([fault.at, fault.better])
@@ -189,7 +189,7 @@ def _shade(source: ColourImage, chosen: BoolGrid, tint: Colour) -> Colour:
 
 
 def _places(
-    params: MapParams, path: tuple[str, Path], units: MapUnits, fault: Fault | None
+    params: MapParams, path: tuple[str, Path], units: MapUnits, fault: MapFault | None
 ) -> list[Entry]:
     """Legend entries of start, goal, path and fault, each if there is one."""
     entries: list[Entry] = []

@@ -25,11 +25,11 @@ from tdac_envs.mapping.binarize import (
 )
 from tdac_envs.mapping.cleanup import thick_share, without_lines, without_specks
 from tdac_envs.mapping.image import GreyImage, luminance
+from tdac_envs.mapping.lettering import without_lettering
 from tdac_envs.mapping.lighting import LEVEL
 from tdac_envs.mapping.params import DEFAULT_OPTIONS
 from tdac_envs.mapping.scene import MapProblem, MapReading, decide_light_free, touches
 from tdac_envs.mapping.wording import OUTSIDE_CLOSED
-from tdac_envs.mapping.words import without_words
 
 SLIVER = 6.0
 """Largest width of a strip that counts as part of the outside, px."""
@@ -66,7 +66,7 @@ def readings(scene: MapProblem, light_free: bool | None = None) -> Iterator[MapR
 def _plain_to_bold(
     scene: MapProblem, plain: MapReading, unmarked: MapReading | None
 ) -> Iterator[MapReading]:
-    mixed = _mixed(scene) if scene.said == DEFAULT_OPTIONS else None
+    mixed = _mixed(scene) if scene.options == DEFAULT_OPTIONS else None
     if mixed is not None:
         yield from _with_words(scene, [mixed])
         for extent in (4, 8, 16):
@@ -94,11 +94,11 @@ def _with_words(scene: MapProblem, plainest: list[MapReading]) -> Iterator[MapRe
 
 def _wordless(scene: MapProblem, base: MapReading) -> MapReading | None:
     """The reading without the words over start and goal; None if there are none."""
-    cells = without_words(base.cells, scene.pointed or scene.ends)
+    cells = without_lettering(base.cells, scene.pointed or scene.ends)
     if cells is None:
         return None
     note = "words over start or goal ignored"
-    return replace(base, cells=cells, method=f"{base.method}, {note}", words=True)
+    return replace(base, cells=cells, method=f"{base.method}, {note}", lettering=True)
 
 
 def _beyond_the_plan(scene: MapProblem, plain: MapReading) -> BoolGrid:
@@ -139,11 +139,11 @@ def plain_reading(scene: MapProblem, light_free: bool) -> MapReading:
     light strong colours such as yellow are walls, too.
     """
     threshold, method = scene.threshold, "otsu"
-    if scene.said.threshold is not None:
+    if scene.options.threshold is not None:
         method = "threshold as given"
     elif scene.photo:
         method = "light evened"
-    if scene.said.polarity is not None:
+    if scene.options.polarity is not None:
         method += ", polarity as given"
     level = scene.unknown
     if level is not None:

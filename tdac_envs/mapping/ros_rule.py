@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
+from tdac_envs.core.strict_model import LenientModel
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.mapping.image import GreyImage
 from tdac_envs.mapping.params import Length, Place
@@ -21,11 +22,11 @@ def _lowered(value: Any) -> Any:
     return value.lower() if isinstance(value, str) else value
 
 
-class RosMap(BaseModel):
-    """Contents of a ROS `map.yaml` (wiki.ros.org/map_server)."""
+class RosMapFile(LenientModel):
+    """Contents of a ROS `map.yaml` (wiki.ros.org/map_server).
 
-    # Tools add other fields (e.g. `lethal_cost`), which do not matter for the grid.
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
+    Tools add other fields (e.g. `lethal_cost`), which do not matter for the grid.
+    """
 
     image: str = Field(description="Picture, relative to the yaml file.")
     resolution: Length = Field(description="Metres per pixel.")
@@ -53,7 +54,7 @@ class RosCells:
     unknown: BoolGrid
 
 
-def ros_cells(grey: GreyImage, alpha: GreyImage, ros: RosMap) -> RosCells:
+def ros_cells(grey: GreyImage, alpha: GreyImage, ros: RosMapFile) -> RosCells:
     """The cells of a picture, by the rule of nav2's map server (`map_io.cpp`).
 
     An occupancy of `free_thresh` or less is free, of `occupied_thresh` or more
@@ -82,7 +83,7 @@ def ros_cells(grey: GreyImage, alpha: GreyImage, ros: RosMap) -> RosCells:
     return RosCells(free, ~free & ~occupied)
 
 
-def ros_notes(grey: GreyImage, free: BoolGrid, ros: RosMap) -> tuple[str, ...]:
+def ros_notes(grey: GreyImage, free: BoolGrid, ros: RosMapFile) -> tuple[str, ...]:
     """A note if the map saver's grey for unknown pixels counts as free; else none."""
     share = float((free & (grey == SAVED_UNKNOWN)).mean())
     if ros.mode == "raw" or share == 0:

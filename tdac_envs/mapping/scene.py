@@ -39,7 +39,7 @@ class MapReading:
         threshold: Luminance threshold that was applied, 0..255.
         cleanup: Strength of `cleanup.cleanings`, or largest size of dropped specks, px.
         opening: Lines thinner than this were dropped, px.
-        words: Whether words over start or goal were dropped.
+        lettering: Whether words over start or goal were dropped.
     """
 
     cells: BoolGrid
@@ -48,7 +48,7 @@ class MapReading:
     threshold: float | None = None
     cleanup: int = 0
     opening: int = 0
-    words: bool = False
+    lettering: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class MapProblem:
         start: Pixel (x, y), or None.
         goal: Pixel (x, y), or None.
         radius: Body radius, px.
-        said: The user's settings.
+        options: The user's settings.
         photo: Whether it is a photograph whose light was evened.
         units: Units of messages.
         pointed: Where the user pointed, if words that cover these places are to be
@@ -73,7 +73,7 @@ class MapProblem:
     start: Point | None
     goal: Point | None
     radius: float
-    said: ReadingOptions = DEFAULT_OPTIONS
+    options: ReadingOptions = DEFAULT_OPTIONS
     photo: bool = False
     units: MapUnits = PIXELS
     pointed: tuple[Point, ...] = ()
@@ -85,7 +85,7 @@ class MapProblem:
         start: Point | None,
         goal: Point | None,
         radius: float,
-        said: ReadingOptions = DEFAULT_OPTIONS,
+        options: ReadingOptions = DEFAULT_OPTIONS,
         units: MapUnits = PIXELS,
     ) -> MapProblem:
         """The scene of an image and a task; start and goal may be None.
@@ -96,8 +96,8 @@ class MapProblem:
         if not radius > 0:
             raise TaskError(f"expected a robot radius above 0 px, got {radius:g}")
         positive("robot_radius", radius)  # checks the upper limit
-        grey, task = luminance(image.colour), (start, goal, radius, said)
-        automatic = image.occupied is None and said.threshold is None
+        grey, task = luminance(image.colour), (start, goal, radius, options)
+        automatic = image.occupied is None and options.threshold is None
         even = evened(image.colour, grey) if automatic and photographed(grey) else None
         if even is None:
             return cls(image, grey, *task, units=units)
@@ -112,8 +112,8 @@ class MapProblem:
     @property
     def polarities(self) -> tuple[Shade, ...]:
         """The possible polarities: both, unless the user has chosen one."""
-        said = self.said.polarity
-        return ("dark", "light") if said is None else (said,)
+        polarity = self.options.polarity
+        return ("dark", "light") if polarity is None else (polarity,)
 
     @property
     def trip(self) -> NavigationTask | None:
@@ -125,8 +125,8 @@ class MapProblem:
     @cached_property
     def threshold(self) -> float:
         """Luminance above which a pixel is light: given, `LEVEL` (photo), or Otsu's."""
-        if self.said.threshold is not None:
-            return self.said.threshold
+        if self.options.threshold is not None:
+            return self.options.threshold
         return LEVEL if self.photo else otsu(self.luminance)
 
     def with_ends(
@@ -166,7 +166,7 @@ class MapProblem:
     @cached_property
     def unknown(self) -> int | None:
         """The "unknown" grey; None if there is none or all given ends are on it."""
-        automatic = self.said.threshold is None and not self.photo
+        automatic = self.options.threshold is None and not self.photo
         level = unknown_level(self.luminance) if automatic else None
         if level is None:
             return None
@@ -176,14 +176,14 @@ class MapProblem:
 
 def decide_light_free(scene: MapProblem) -> bool:
     """Whether the light side is free: as given, or by the evidence."""
-    if scene.said.polarity is not None:
-        return scene.said.polarity == "dark"
+    if scene.options.polarity is not None:
+        return scene.options.polarity == "dark"
     return scene.evidence > 0
 
 
 def is_polarity_unclear(scene: MapProblem, polarity: Polarity) -> bool:
     """Whether the other polarity is nearly as likely as this one, or likelier."""
-    settled = scene.image.occupied is not None or scene.said.polarity is not None
+    settled = scene.image.occupied is not None or scene.options.polarity is not None
     if settled or polarity not in ("dark", "light"):
         return False
     towards = scene.evidence if polarity == "dark" else -scene.evidence

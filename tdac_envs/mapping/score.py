@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tdac_envs.core.errors import offer
 from tdac_envs.grid.astar import Guide
 from tdac_envs.grid.grid import BoolGrid, FloatGrid, body_free, clearance
 from tdac_envs.grid.map_units import PIXELS, MapUnits
@@ -166,8 +167,9 @@ def explain(cells: BoolGrid, trip: NavigationTask, inflation: int = 0) -> str:
             if cells[y, x]
             else f"is {units.length(clear[y, x], 1)} from an obstacle, too near"
         )
-        near = _nearest_text(free, name, trip, inflation)
-        return f"{name} {units.point(x, y)} {what}; {near}{_narrower(clear, trip)}"
+        problem = f"{name} {units.point(x, y)} {what}"
+        advice = _advice(free, name, trip, inflation, problem)
+        return f"{advice}{_narrower(clear, trip)}"
     widest = widest_radius(clear, start, goal)
     advice = (
         "no robot gets through: a wall blocks the way"
@@ -187,10 +189,11 @@ def _beyond_wall(
     point, other = trip.units.point, "goal" if name == "start" else "start"
     at, there = _at_and_there(trip, name)
     within = free & connected_with(~cells, there)
-    return (
+    problem = (
         f"{name} {point(*at)} lies outside of the closed wall around {other} "
-        f"{point(*there)}; {_nearest_text(within, name, trip, inflation)}"
+        f"{point(*there)}"
     )
+    return _advice(within, name, trip, inflation, problem)
 
 
 def _at_and_there(trip: NavigationTask, name: End) -> tuple[Point, Point]:
@@ -213,19 +216,22 @@ def _narrower(clear: FloatGrid, trip: NavigationTask) -> str:
     return f"; from this start to this goal a radius of {radius} gets through"
 
 
-def _nearest_text(
-    free: BoolGrid, name: End, trip: NavigationTask, inflation: int
+def _advice(
+    free: BoolGrid, name: End, trip: NavigationTask, inflation: int, problem: str
 ) -> str:
-    """The free place nearest to an end; if the other end is free, connected with it."""
+    """Offers the free place nearest to an end, then says what is wrong with the end.
+
+    If the other end is free, the place is connected with it.
+    """
     at, there = _at_and_there(trip, name)
     robot, reach = _robot(trip, inflation), ""
     if free[there[::-1]]:
         free, reach = connected_with(free, there), f" {REACHABLE[name]}"
     nearest = nearest_free(free, *at)
     if nearest is None:
-        return f"{robot} fits nowhere on this map"
-    place = trip.units.point(*nearest)
-    return f"the nearest free {trip.units.place} for {robot}{reach} is {place}"
+        return f"{problem}; {robot} fits nowhere on this map"
+    which = f"the nearest free {trip.units.place} for {robot}{reach}"
+    return offer(name, trip.units.point(*nearest), which, problem)
 
 
 def connected(free: BoolGrid, start: Point, goal: Point) -> bool:

@@ -69,10 +69,30 @@ def snap(
     notes = [
         f"{name} moved from {units.point(*ends[name])} to {units.point(*place)}"
         + (_reach(name, len(moved), units) if is_joined else "")
+        + _why(cells, ends[name], place, radius, units)
         + _remark(cells, ends[name], place)
         for name, place in moved.items()
     ]
     return Snapped(found["start"], found["goal"], tuple(notes))
+
+
+def _why(
+    cells: BoolGrid, point: Point, moved: Pixel, radius: float, units: MapUnits
+) -> str:
+    """Why an end that moved far could not stay; empty if it moved by a body radius."""
+    if math.dist(point, moved) <= radius:
+        return ""
+    x, y = _pixel_of(point)
+    height, width = cells.shape
+    if not (0 <= x < width and 0 <= y < height):
+        reason = "lies outside the map"
+    elif cells[y, x]:
+        reason = "lies in an obstacle"
+    else:
+        room = units.length(clearance_at(cells, x, y, radius + 1.0), 1)
+        reason = f"is {room} from an obstacle, for a body of {units.length(radius)}"
+        reason += " radius"
+    return f"; {units.point(*point)} {reason}"
 
 
 def _reach(name: End, moved: int, units: MapUnits) -> str:

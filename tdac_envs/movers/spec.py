@@ -33,7 +33,7 @@ Length = Annotated[float, Field(ge=SMALLEST, le=LARGEST)]
 Speed = Annotated[float, Field(ge=0.0, le=LARGEST)]
 
 
-class _Mover(StrictModel):
+class _MoverSpec(StrictModel):
     speed: Speed | None = Field(
         None, description="px/s. Default: half of the robot's largest wheel speed."
     )
@@ -42,7 +42,7 @@ class _Mover(StrictModel):
     )
 
 
-class RouteSpec(_Mover):
+class RouteSpec(_MoverSpec):
     """A disc that drives along waypoints for ever, and passes through other movers."""
 
     kind: Literal["route"] = "route"
@@ -76,7 +76,7 @@ class RouteSpec(_Mover):
         return 1
 
 
-class BounceSpec(_Mover):
+class BounceSpec(_MoverSpec):
     """Discs that drive straight, bounce off walls, and pass through other movers."""
 
     kind: Literal["bounce"] = "bounce"
@@ -100,7 +100,7 @@ class BounceSpec(_Mover):
         return self.count
 
 
-class CrowdSpec(_Mover):
+class CrowdSpec(_MoverSpec):
     """People who walk to places of their own and avoid each other (ORCA)."""
 
     kind: Literal["crowd"] = "crowd"

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import subkernel
+from tdac_envs.movers.destinations import Destinations
 from tdac_envs.movers.orca import N_PLANE
-from tdac_envs.movers.places import Places
 from tdac_envs.movers.walls import MOST_WALLS, Cells
 
 Array = NDArray[np.float64]
@@ -73,11 +73,11 @@ class Movers(NamedTuple):
             the state of its random numbers; for how long it has been stuck (s); its
             velocity (px/s) and place in the current step.
         planes: Shape (2 * `MOST_PLANES` + `MOST_NEIGHBOURS`, 4), or (0, 4): scratch.
-        walls: The last five arrays are those of `Places`, which are only read.
-        first: See `Places`.
-        listed: See `Places`.
-        fields: See `Places`.
-        spacing: See `Places`.
+        walls: The last five arrays are those of `Destinations`, which are only read.
+        first: See `Destinations`.
+        listed: See `Destinations`.
+        fields: See `Destinations`.
+        spacing: See `Destinations`.
     """
 
     traits: Array
@@ -96,7 +96,11 @@ class Movers(NamedTuple):
 
     @classmethod
     def blank(
-        cls, count: int, points: Array, dt: float, places: Places | None = None
+        cls,
+        count: int,
+        points: Array,
+        dt: float,
+        destinations: Destinations | None = None,
     ) -> Movers:
         """Arrays of `count` movers for steps of `dt` s; all zeros but what is given.
 
@@ -104,10 +108,10 @@ class Movers(NamedTuple):
             count: Number of movers.
             points: Waypoints.
             dt: Duration of a step, s.
-            places: What people know of the map; None without a crowd.
+            destinations: What people know of the map; None without a crowd.
         """
         steps = max(round(STANDING_SECONDS / dt), 1)
-        people, rows = (0, 0) if places is None else (count, _N_ROWS)
+        people, rows = (0, 0) if destinations is None else (count, _N_ROWS)
         return cls(
             np.zeros((count, N_TRAITS)),
             np.zeros((count, N_NOW)),
@@ -117,7 +121,7 @@ class Movers(NamedTuple):
             np.zeros((steps, 2)),
             np.zeros((people, N_PEOPLE)),
             np.zeros((rows, N_PLANE)),
-            *(Places.none() if places is None else places),
+            *(Destinations.none() if destinations is None else destinations),
         )
 
     @classmethod

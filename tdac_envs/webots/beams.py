@@ -8,7 +8,6 @@ the image determines the reflectance.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +15,11 @@ import numpy as np
 from tdac_envs.epuck.infrared import ELEVATION, TABLE
 from tdac_envs.epuck.prisms import FACTOR, Array, Prisms
 from tdac_envs.webots.floors import Floors
+from tdac_envs.webots.mounts import in_world, lookup_table, sorted_rows
 from tdac_envs.webots.rays import nearest_hit
-from tdac_envs.worlds.wbt.fields import number, number_list, text
-from tdac_envs.worlds.wbt.frames import Frame
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.fields import number, text
+from tdac_envs.worlds.wbt.frames import NodeFrame
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 TYPES = {"generic": 0, "infra-red": 1, "sonar": 2, "laser": 3}
 _USUAL = (0.0, 0.0, 0.0, 0.1, 1000.0, 0.0)
@@ -87,7 +87,7 @@ def ground_sensors() -> tuple[Beam, ...]:
     )
 
 
-def read_beam(node: Node, frame: Frame) -> Beam:
+def read_beam(node: WbtNode, frame: NodeFrame) -> Beam:
     """Reads a DistanceSensor, or the PROTO E-puckDistanceSensor.
 
     Args:
@@ -106,11 +106,7 @@ def read_beam(node: Node, frame: Frame) -> Beam:
         kind = text(node, "type", "generic")
         kind = kind if kind in TYPES else "generic"  # as in Webots
         aperture = number(node, "aperture", 1.5708)
-        table = number_list(node, "lookupTable") or _USUAL
-        if len(table) % 3:
-            raise node.error(
-                "expected rows of 3 numbers for lookupTable", "lookupTable"
-            )
+        table = lookup_table(node, _USUAL)
     ahead = frame.matrix[:, 0]
     length = float(np.linalg.norm(ahead))
     direction = tuple((ahead / length).tolist()) if length > 0.0 else _AHEAD
@@ -126,9 +122,8 @@ def _beam(
     kind: str,
     aperture: float,
 ) -> Beam:
-    rows = np.array(table).reshape(-1, 3)
-    rows = rows[np.argsort(rows[:, 0], kind="stable")]
-    return Beam(name, np.array(place), np.array(direction), rows, kind, aperture)
+    at, way = np.array(place), np.array(direction)
+    return Beam(name, at, way, sorted_rows(table), kind, aperture)
 
 
 def reading(
@@ -149,11 +144,7 @@ def reading(
         seen: Visible parts of the world.
         floors: Textured floors; their images determine the reflectance.
     """
-    x, y, heading = pose
-    cos, sin = math.cos(heading), math.sin(heading)
-    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    at = turn @ beam.place + (x, y, base)
-    way = turn @ beam.direction
+    at, way = in_world(pose, base, beam.place, beam.direction)
     longest = float(beam.table[-1, 0]) or _LONGEST
     ray = (*at.tolist(), *way.tolist(), longest)
     distance, part = nearest_hit(*seen.arrays(), *ray)

@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from tdac_envs.core.errors import WorldError
 from tdac_envs.worlds.wbt.fields import children
-from tdac_envs.worlds.wbt.frames import Frame, Matrix, axis_angle
+from tdac_envs.worlds.wbt.frames import Matrix, NodeFrame, axis_angle
 from tdac_envs.worlds.wbt.geometry import GROUPS
 from tdac_envs.worlds.wbt.placing import placed
 from tdac_envs.worlds.wbt.robots import is_epuck
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
-Found = tuple[Node, Frame]
+Found = tuple[WbtNode, NodeFrame]
 
 _CONTAINERS = (*GROUPS, "Solid")
 
@@ -39,7 +39,7 @@ class FileFrame:
     height: float
 
     @classmethod
-    def of(cls, top: Frame, robot: Frame, heading: float) -> FileFrame:
+    def of(cls, top: NodeFrame, robot: NodeFrame, heading: float) -> FileFrame:
         """The conversion for the frame of a file and a robot's frame and heading."""
         return cls(top.matrix, robot.matrix, heading, float(robot.origin[2]))
 
@@ -84,7 +84,7 @@ class FileFrame:
         return [float(value) for value in self.rotation(heading).T @ ahead]
 
 
-def walk_frames(nodes: Iterable[Node], frame: Frame) -> Iterator[Found]:
+def walk_frames(nodes: Iterable[WbtNode], frame: NodeFrame) -> Iterator[Found]:
     """Yields nodes that have a position, with their frames, outer nodes first."""
     for node in nodes:
         is_container = node.kind in _CONTAINERS

@@ -12,7 +12,7 @@ from tdac_envs.webots.instruments import Instruments
 from tdac_envs.webots.mounts import Mount
 from tdac_envs.webots.scanners import LIDAR_TYPE, RANGE_FINDER_TYPE, ScannerFacts
 from tdac_envs.worlds.wbt.fields import number, text
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 Offset = tuple[float, ...]
 
@@ -140,7 +140,7 @@ def renamed(mounted: tuple[Mount, ...], kind: str) -> list[tuple[str, int]]:
     ]
 
 
-def _facts_of(node: Node) -> dict[str, Any]:
+def _facts_of(node: WbtNode) -> dict[str, Any]:
     """Facts about a device that is not modelled."""
     names = ("horizontalResolution", "numberOfLayers"), (512.0, 4.0)
     if node.kind != "Lidar":

@@ -28,10 +28,10 @@ from tdac_envs.worlds.wbt.fields import (
     number_list,
     numbers,
 )
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.geometry import GROUPS
 from tdac_envs.worlds.wbt.placing import placed
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 _LEVEL = 0.02
 """Largest tilt of a floor, rad."""
@@ -120,7 +120,7 @@ class Floors:
         return None
 
 
-def find_floors(nodes: Iterable[Node], top: Frame, folder: Path) -> Floors:
+def find_floors(nodes: Iterable[WbtNode], top: NodeFrame, folder: Path) -> Floors:
     """Finds the textured floors of a file.
 
     Args:
@@ -137,7 +137,9 @@ def find_floors(nodes: Iterable[Node], top: Frame, folder: Path) -> Floors:
     return floors
 
 
-def _surfaces(nodes: Iterable[Node], frame: Frame) -> Iterator[tuple[Node, Frame]]:
+def _surfaces(
+    nodes: Iterable[WbtNode], frame: NodeFrame
+) -> Iterator[tuple[WbtNode, NodeFrame]]:
     """Nodes that may be textured floors, and their frames."""
     for node in nodes:
         if node.kind in ("RectangleArena", "Floor", "SolidBox"):
@@ -149,7 +151,7 @@ def _surfaces(nodes: Iterable[Node], frame: Frame) -> Iterator[tuple[Node, Frame
             yield from _surfaces(children(node), inner)
 
 
-def _add(floors: Floors, node: Node, frame: Frame, folder: Path) -> None:
+def _add(floors: Floors, node: WbtNode, frame: NodeFrame, folder: Path) -> None:
     name = {"Floor": "appearance", "RectangleArena": "floorAppearance"}
     look = child(node, name.get(node.kind, "appearance"))
     laid = _laid(node, frame)
@@ -172,10 +174,10 @@ def _add(floors: Floors, node: Node, frame: Frame, folder: Path) -> None:
     )
 
 
-_Laid = tuple[Frame, list[list[float]], Array]
+_Laid = tuple[NodeFrame, list[list[float]], Array]
 
 
-def _laid(node: Node, frame: Frame) -> _Laid | None:
+def _laid(node: WbtNode, frame: NodeFrame) -> _Laid | None:
     """Frame (FLU) of a surface's centre, its bounds, and its transform to (u, v)."""
     if node.kind in ("RectangleArena", "Floor"):
         arena = node.kind == "RectangleArena"
@@ -190,7 +192,7 @@ def _laid(node: Node, frame: Frame) -> _Laid | None:
     return None if shape is None else _laid_shape(shape, frame)
 
 
-def _laid_shape(shape: Node, frame: Frame) -> _Laid | None:
+def _laid_shape(shape: WbtNode, frame: NodeFrame) -> _Laid | None:
     if shape.kind == "Plane":
         size = numbers(shape, "size", (1.0, 1.0))
         return _rectangle(frame, size, size)
@@ -201,7 +203,7 @@ def _laid_shape(shape: Node, frame: Frame) -> _Laid | None:
     return None
 
 
-def _box(frame: Frame, size: tuple[float, ...]) -> _Laid | None:
+def _box(frame: NodeFrame, size: tuple[float, ...]) -> _Laid | None:
     """The upper face of a box."""
     x, y, z = size
     height, face = (y, (x, z)) if frame.y_up else (z, (x, y))
@@ -210,7 +212,7 @@ def _box(frame: Frame, size: tuple[float, ...]) -> _Laid | None:
 
 
 def _rectangle(
-    frame: Frame, size: tuple[float, ...], tile: tuple[float, ...]
+    frame: NodeFrame, size: tuple[float, ...], tile: tuple[float, ...]
 ) -> _Laid | None:
     """A rectangle; u and v are 0 at its corner and increase by 1 per tile.
 
@@ -230,7 +232,7 @@ def _rectangle(
     return frame.flu(), [(-half[::-1]).tolist(), half[::-1].tolist()], uv
 
 
-def _faces(shape: Node, frame: Frame) -> _Laid | None:
+def _faces(shape: WbtNode, frame: NodeFrame) -> _Laid | None:
     """A flat mesh whose texture coordinates are an affine function of its points."""
     coord, texture = child(shape, "coord"), child(shape, "texCoord")
     if coord is None or texture is None or not frame.flu().matrix[:2, :2].any():
@@ -250,7 +252,7 @@ def _faces(shape: Node, frame: Frame) -> _Laid | None:
     if np.ptp(flat[:, 2]) > _NEAR:
         return None
     local = frame.flu()
-    local = Frame(local.matrix, local.at((0.0, 0.0, float(flat[0, 2]))), False)
+    local = NodeFrame(local.matrix, local.at((0.0, 0.0, float(flat[0, 2]))), False)
     system = np.column_stack([flat[:, :2], np.ones(len(flat))])
     uv, *_ = np.linalg.lstsq(system, given[at], rcond=None)
     if np.abs(system @ uv - given[at]).max() > 0.01:
@@ -259,11 +261,11 @@ def _faces(shape: Node, frame: Frame) -> _Laid | None:
     return local, [least.tolist(), most.tolist()], np.asarray(uv.T)
 
 
-def _indices(shape: Node, name: str) -> list[int]:
+def _indices(shape: WbtNode, name: str) -> list[int]:
     return [int(n) for n in number_list(shape, name) if n >= 0]
 
 
-def _texture(look: Node, folder: Path, missing: list[str]) -> Texture | None:
+def _texture(look: WbtNode, folder: Path, missing: list[str]) -> Texture | None:
     """The image of an appearance; None if it has none that can be read."""
     picture = next((child(look, name) for name in _MAPS if name in look.fields), None)
     if picture is None or picture.kind != "ImageTexture":
@@ -288,7 +290,7 @@ def _texture(look: Node, folder: Path, missing: list[str]) -> Texture | None:
     return Texture(shown, dimmed, _transform(look), repeats)
 
 
-def _transform(look: Node) -> Array:
+def _transform(look: WbtNode) -> Array:
     """The TextureTransform of an appearance, shape (2, 3)."""
     node = child(look, "textureTransform")
     if node is None:
@@ -302,7 +304,7 @@ def _transform(look: Node) -> Array:
     return np.column_stack([matrix, matrix @ (middle + shift) - middle])
 
 
-def _strings(node: Node, name: str) -> list[str]:
+def _strings(node: WbtNode, name: str) -> list[str]:
     if name not in node.fields:
         return []
     return [item for item in node.fields[name].items if isinstance(item, str)]

@@ -22,7 +22,7 @@ from tdac_envs.webots.mounts import Mount
 from tdac_envs.worlds.bodies import floor_under
 from tdac_envs.worlds.wbt.fields import text
 from tdac_envs.worlds.wbt.robots import ROBOTS
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 _EPUCK_TABLE_NAMES = {f"ps{k}" for k in range(8)} | {f"ls{k}" for k in range(8)}
 _LARGEST = 4200.0
@@ -59,7 +59,10 @@ class Instruments:
 
 
 def find_instruments(
-    robot: Node, mounted: tuple[Mount, ...], lights: tuple[Light, ...], floors: Floors
+    robot: WbtNode,
+    mounted: tuple[Mount, ...],
+    lights: tuple[Light, ...],
+    floors: Floors,
 ) -> Instruments:
     """Finds the sensors of an e-puck.
 

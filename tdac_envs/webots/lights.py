@@ -18,18 +18,18 @@ import numpy as np
 from tdac_envs.core.errors import WorldError
 from tdac_envs.epuck.infrared import PLACES
 from tdac_envs.epuck.prisms import Array
+from tdac_envs.webots.mounts import in_world, lookup_table, sorted_rows
 from tdac_envs.worlds.wbt.fields import (
     children,
     flag,
     number,
-    number_list,
     numbers,
     text,
 )
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.geometry import GROUPS
 from tdac_envs.worlds.wbt.placing import placed
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 _HEIGHT = 0.0329
 _TABLE = (1.0, 4095.0, 0.01, 2.0, 0.0, 0.01)
@@ -96,7 +96,7 @@ def _spot(angle: float, width: float, cut_off: float) -> float:
     return (angle - cut_off) / (width - cut_off)
 
 
-def find_lights(nodes: Iterable[Node], frame: Frame) -> tuple[Light, ...]:
+def find_lights(nodes: Iterable[WbtNode], frame: NodeFrame) -> tuple[Light, ...]:
     """The lights of a file that are on.
 
     Args:
@@ -106,7 +106,7 @@ def find_lights(nodes: Iterable[Node], frame: Frame) -> tuple[Light, ...]:
     return tuple(_lights(nodes, frame))
 
 
-def _lights(nodes: Iterable[Node], frame: Frame) -> Iterator[Light]:
+def _lights(nodes: Iterable[WbtNode], frame: NodeFrame) -> Iterator[Light]:
     for node in nodes:
         try:
             if node.kind in _KINDS and flag(node, "on", True):
@@ -120,7 +120,7 @@ def _lights(nodes: Iterable[Node], frame: Frame) -> Iterator[Light]:
             continue
 
 
-def _light(node: Node, frame: Frame) -> Light:
+def _light(node: WbtNode, frame: NodeFrame) -> Light:
     down = (0.0, -1.0, 0.0) if frame.y_up else (0.0, 0.0, -1.0)
     if node.kind == "SpotLight":
         down = (0.0, 0.0, -1.0)
@@ -184,10 +184,7 @@ class LightCell:
             base: Height of the robot's origin, m.
             lights: The lights.
         """
-        x, y, heading = pose
-        cos, sin = math.cos(heading), math.sin(heading)
-        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        at, axis = turn @ self.place + (x, y, base), turn @ self.axis
+        at, axis = in_world(pose, base, self.place, self.axis)
         total = sum(light.irradiance(at, axis, self.colours) for light in lights)
         return float(np.interp(total, self.table[:, 0], self.table[:, 1]))
 
@@ -207,7 +204,7 @@ def standard_cells() -> tuple[LightCell, ...]:
     )
 
 
-def read_cell(node: Node, frame: Frame) -> LightCell:
+def read_cell(node: WbtNode, frame: NodeFrame) -> LightCell:
     """Reads a LightSensor.
 
     Args:
@@ -217,15 +214,11 @@ def read_cell(node: Node, frame: Frame) -> LightCell:
     Raises:
         WorldError: A field is invalid.
     """
-    table = number_list(node, "lookupTable") or _USUAL
-    if len(table) % 3 or len(table) < 3:
-        raise node.error("expected rows of 3 numbers for lookupTable", "lookupTable")
     axis = frame.matrix[:, 0]
-    rows = np.array(table).reshape(-1, 3)
     return LightCell(
         text(node, "name", "light sensor"),
         np.asarray(frame.origin),
         axis / max(float(np.linalg.norm(axis)), 1e-9),
-        rows[np.argsort(rows[:, 0], kind="stable")],
+        sorted_rows(lookup_table(node, _USUAL)),
         np.array(numbers(node, "colorFilter", (1.0, 1.0, 1.0))),
     )

@@ -10,7 +10,7 @@ from tdac_envs.webots.mounts import Mount
 from tdac_envs.worlds.wbt.fields import text
 from tdac_envs.worlds.wbt.known_fields import KNOWN
 from tdac_envs.worlds.wbt.robots import ROBOTS
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 MOST_NAMED = 20
 _MODELLED = {
@@ -51,7 +51,7 @@ def missing_devices(absent: Iterable[str], mounted: Iterable[Mount]) -> list[str
     return notes
 
 
-def _is_unknown(node: Node) -> bool:
+def _is_unknown(node: WbtNode) -> bool:
     return node.kind not in KNOWN.keys() | NAMES_OF.keys() | _MODELLED | _NO_DEVICES
 
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.webots.coordinates import FileFrame, Found, walk_frames
-from tdac_envs.worlds.wbt.found import name_of
-from tdac_envs.worlds.wbt.frames import Frame
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.content import name_of
+from tdac_envs.worlds.wbt.frames import NodeFrame
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 Point = tuple[float, float]
 Place = tuple[list[float], list[float]]
@@ -30,7 +30,7 @@ class Movable:
         origin: Origin of the node relative to the centre at the start, m.
     """
 
-    node: Node
+    node: WbtNode
     frame: FileFrame
     centre: Point
     origin: Point
@@ -54,7 +54,7 @@ class Movable:
 
 
 def find_movables(
-    ground: Ground, nodes: Iterable[Node], top: Frame
+    ground: Ground, nodes: Iterable[WbtNode], top: NodeFrame
 ) -> tuple[Movable | None, ...]:
     """Finds the nodes of the objects that can be pushed.
 

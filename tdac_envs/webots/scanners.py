@@ -11,12 +11,12 @@ import numpy as np
 
 from tdac_envs.core.compiled import read_only
 from tdac_envs.epuck.prisms import Array
-from tdac_envs.webots.mounts import Mount
+from tdac_envs.webots.mounts import Mount, unit_axes
 from tdac_envs.webots.rays import scan
 from tdac_envs.webots.scenery import Scenery
 from tdac_envs.worlds.wbt.fields import flag, number, text
-from tdac_envs.worlds.wbt.frames import Frame
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.frames import NodeFrame
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 MOST_RANGES = 1 << 20
 """Most values of a range image; devices with more are not modelled."""
@@ -26,7 +26,6 @@ _LEAST = 0.01
 _PI = math.pi
 # Widest fields of view, rad: of a spherical and of a plane projection.
 _ALL_AROUND, _FLATTEST = 2.0 * _PI + 1e-3, _PI - 0.01
-_LEAST_SCALE = 1e-6
 _LIDAR = {
     "horizontalResolution": 512.0, "numberOfLayers": 4.0, "fieldOfView": _PI / 2.0,
     "verticalFieldOfView": 0.2, "near": _LEAST, "minRange": _LEAST, "maxRange": 1.0,
@@ -236,7 +235,7 @@ def find_scanners(mounted: Iterable[Mount]) -> tuple[ScannerFacts, ...]:
     return tuple(found.values())
 
 
-def _lidar(node: Node, frame: Frame) -> ScannerFacts:
+def _lidar(node: WbtNode, frame: NodeFrame) -> ScannerFacts:
     proto = _PROTOS.get(node.kind, _Proto("lidar", {}))
     usual = {**_LIDAR, **proto.fields}
     own = ("noise",) if node.kind in _PROTOS else tuple(_LIDAR)
@@ -247,7 +246,6 @@ def _lidar(node: Node, frame: Frame) -> ScannerFacts:
     name = text(node, "name", proto.name)
     is_rotating = proto.is_rotating or text(node, "type").lower().startswith("r")
     is_spherical = is_rotating or flag(node, "spherical", True)
-    near, min_range, max_range = _limits(values, usual)
     return ScannerFacts(
         name=name,
         is_lidar=True,
@@ -257,11 +255,7 @@ def _lidar(node: Node, frame: Frame) -> ScannerFacts:
         vertical_field_of_view=min(
             _positive(values, usual, "verticalFieldOfView"), _PI
         ),
-        near=near,
-        min_range=min_range,
-        max_range=max_range,
-        noise=max(values["noise"], 0.0),
-        resolution=values["resolution"],
+        **_ranging(values, usual),
         frequencies=(
             values["defaultFrequency"], values["minFrequency"], values["maxFrequency"],
         ),
@@ -270,11 +264,11 @@ def _lidar(node: Node, frame: Frame) -> ScannerFacts:
         is_spherical=is_spherical,
         y_up=frame.y_up,
         place=frame.origin,
-        axes=_axes(node, frame, name),
+        axes=unit_axes(node, frame, f"the device {name!r}"),
     )  # fmt: skip
 
 
-def _finder(node: Node, frame: Frame) -> ScannerFacts:
+def _finder(node: WbtNode, frame: NodeFrame) -> ScannerFacts:
     values = {name: number(node, name, value) for name, value in _FINDER.items()}
     name = text(node, "name", "range-finder")
     columns = _count(values, _FINDER, "width")
@@ -284,7 +278,6 @@ def _finder(node: Node, frame: Frame) -> ScannerFacts:
     vertical = angle * rows / columns
     if not is_spherical:
         vertical = 2.0 * math.atan(math.tan(angle / 2.0) * rows / columns)
-    near, min_range, max_range = _limits(values, _FINDER)
     return ScannerFacts(
         name=name,
         is_lidar=False,
@@ -292,29 +285,30 @@ def _finder(node: Node, frame: Frame) -> ScannerFacts:
         rows=rows,
         field_of_view=angle,
         vertical_field_of_view=vertical,
-        near=near,
-        min_range=min_range,
-        max_range=max_range,
-        noise=max(values["noise"], 0.0),
-        resolution=values["resolution"],
+        **_ranging(values, _FINDER),
         frequencies=(0.0, 0.0, 0.0),
         tilt=0.0,
         is_rotating=False,
         is_spherical=is_spherical,
         y_up=frame.y_up,
         place=frame.origin,
-        axes=_axes(node, frame, name),
+        axes=unit_axes(node, frame, f"the device {name!r}"),
     )
 
 
 # Invalid fields are replaced as in Webots.
-def _limits(
+def _ranging(
     values: Mapping[str, float], usual: Mapping[str, float]
-) -> tuple[float, float, float]:
-    """Distance of the near plane, smallest and largest range, m."""
+) -> dict[str, float]:
+    """Near plane, limits and errors of the ranges, by attribute."""
     least, most = _positive(values, usual, "minRange"), values["maxRange"]
-    near = min(_positive(values, usual, "near"), least)
-    return near, least, most if most > least else least + 1.0
+    return {
+        "near": min(_positive(values, usual, "near"), least),
+        "min_range": least,
+        "max_range": most if most > least else least + 1.0,
+        "noise": max(values["noise"], 0.0),
+        "resolution": values["resolution"],
+    }
 
 
 def _angle(
@@ -333,11 +327,3 @@ def _positive(
 
 def _count(values: Mapping[str, float], usual: Mapping[str, float], name: str) -> int:
     return max(int(_positive(values, usual, name)), 1)
-
-
-def _axes(node: Node, frame: Frame, name: str) -> Array:
-    axes = frame.flu().matrix
-    lengths = np.linalg.norm(axes, axis=0)
-    if lengths.min() < _LEAST_SCALE:
-        raise node.error(f"the device {name!r} has the scale 0")
-    return np.asarray(axes / lengths)

@@ -8,7 +8,7 @@ from typing import Any
 
 from tdac_envs.worlds.wbt.household import HOUSEHOLD
 from tdac_envs.worlds.wbt.robots import ROBOTS, is_epuck
-from tdac_envs.worlds.wbt.tree import Field, Item, Node
+from tdac_envs.worlds.wbt.tree import Item, WbtField, WbtNode
 
 SF_BOOL, SF_INT32, SF_FLOAT, SF_VEC2F, SF_VEC3F = 1, 2, 3, 4, 5
 SF_ROTATION, SF_COLOR, SF_STRING, SF_NODE, MF = 6, 7, 8, 9, 16
@@ -102,13 +102,13 @@ class NodeTable:
         nodes: Top-level nodes of the file.
     """
 
-    def __init__(self, nodes: Iterable[Node]) -> None:
+    def __init__(self, nodes: Iterable[WbtNode]) -> None:
         self.nodes = [SceneNode("Group", "Group", "", -1, [])]
         self._numbers: dict[int, int] = {}
         children = [self._add(node, 0) for node in nodes]
         self.nodes[0].fields.append(["children", MF + SF_NODE, children])
 
-    def number(self, node: Node) -> int:
+    def number(self, node: WbtNode) -> int:
         """Number of one of the file's nodes."""
         return self._numbers[id(node)]
 
@@ -131,7 +131,7 @@ class NodeTable:
         names = [value for name, _, value in node.fields if name == "name"]
         return f'{node.kind} "{names[0]}"' if names else node.kind
 
-    def _add(self, node: Node, parent: int) -> int:
+    def _add(self, node: WbtNode, parent: int) -> int:
         if id(node) in self._numbers:  # a USE
             return self._numbers[id(node)]
         number = self._numbers[id(node)] = len(self.nodes)
@@ -144,12 +144,12 @@ class NodeTable:
             own.fields.append([name, *self._value(name, field, number)])
         return number
 
-    def _value(self, name: str, field: Field, parent: int) -> tuple[int, Any]:
+    def _value(self, name: str, field: WbtField, parent: int) -> tuple[int, Any]:
         items: list[Any] = [
-            self._add(item, parent) if isinstance(item, Node) else item
+            self._add(item, parent) if isinstance(item, WbtNode) else item
             for item in field.items
         ]
-        if any(isinstance(item, Node) or item is None for item in field.items):
+        if any(isinstance(item, WbtNode) or item is None for item in field.items):
             numbers = [-1 if item is None else item for item in items]
             if name in _LISTS or len(numbers) > 1:
                 return MF + SF_NODE, [number for number in numbers if number >= 0]
@@ -157,7 +157,7 @@ class NodeTable:
         return _typed(name, field.items)
 
 
-def base_type(node: Node) -> str:
+def base_type(node: WbtNode) -> str:
     """Node type; for a PROTO, its base type."""
     if is_epuck(node) or node.kind in ROBOTS:
         return "Robot"
@@ -166,7 +166,7 @@ def base_type(node: Node) -> str:
     return _BACKGROUNDS.get(node.kind, node.kind)
 
 
-def _defaults(node: Node, base: str) -> dict[str, Any]:
+def _defaults(node: WbtNode, base: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     if base in ("Solid", "Robot", "Pose", "Transform"):
         values |= {key: list(value) for key, value in _POSE.items()}

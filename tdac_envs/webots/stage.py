@@ -35,11 +35,11 @@ from tdac_envs.webots.views import Viewer
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.wbt.colours import BLACK_SKY, Sky, sky_of
 from tdac_envs.worlds.wbt.fields import flag, text
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.protofiles import ProtoFolder
 from tdac_envs.worlds.wbt.reader import frame_of, read_text, read_world, with_goal
 from tdac_envs.worlds.wbt.robots import is_epuck
-from tdac_envs.worlds.wbt.tree import Node, parse
+from tdac_envs.worlds.wbt.tree import WbtNode, parse
 from tdac_envs.worlds.wbt.unknown import unknown_fields
 from tdac_envs.worlds.world import World, check_modelled
 
@@ -77,7 +77,7 @@ class ControllerWorld:
     left_out: tuple[str, ...]
     notes: tuple[str, ...]
     scene: NodeTable
-    robot: Node
+    robot: WbtNode
     frame: FileFrame
     movables: tuple[Movable | None, ...]
     devices: tuple[DeviceFacts, ...]
@@ -208,7 +208,7 @@ def open_stage(
     lights = find_lights(document.nodes, top)
     instruments = find_instruments(robot, mounted, lights, floors)
     notes += instruments.notes()
-    cameras, too_large = find_cameras(robot, own, in_file)
+    cameras, too_large = find_cameras(robot, own, mounted)
     scanners = find_scanners(mounted)
     limit = world.robot.max_wheel_speed
     devices, absent = find_devices(limit, mounted, instruments, cameras, scanners)
@@ -250,7 +250,9 @@ def _driven_by(controller: str, world: World) -> tuple[World, tuple[str, ...]]:
     return replace(world, robots=(own[0], *others)), (note,)
 
 
-def _find_robot(nodes: Iterable[Node], top: Frame, name: str, controller: str) -> Found:
+def _find_robot(
+    nodes: Iterable[WbtNode], top: NodeFrame, name: str, controller: str
+) -> Found:
     """The e-puck of `_driven_by` and its frame, in the order of the reader."""
     found = [pair for pair in walk_frames(nodes, top) if is_epuck(pair[0])]
     own = [pair for pair in found if text(pair[0], "controller") == controller]

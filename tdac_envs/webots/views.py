@@ -14,7 +14,7 @@ from tdac_envs.worlds.bodies import floor_under
 from tdac_envs.worlds.wbt.colours import Sky
 from tdac_envs.worlds.wbt.frames import axis_angle
 from tdac_envs.worlds.wbt.robots import ROBOTS
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import World
 
 
@@ -68,7 +68,7 @@ class Views:
         viewers: Iterable[Viewer],
         world: World,
         sky: Sky,
-        robot: Node,
+        robot: WbtNode,
         env: EPuckEnv,
     ) -> None:
         self._viewers = {viewer.name: viewer for viewer in viewers}

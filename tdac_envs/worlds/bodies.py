@@ -27,7 +27,7 @@ def bodies(world: World) -> tuple[Obstacle, ...]:
     floor = floor_under(world)
     fallen = [_fallen(thing, world.obstacles, floor) for thing in world.obstacles]
     walls = [arena.wall() for arena in world.arenas if arena.has_wall]
-    return (*fallen, *walls, *map(standing_robot, world.robots[1:]))
+    return (*fallen, *walls, *map(parked_robot, world.robots[1:]))
 
 
 def floor_under(world: World) -> float:
@@ -50,7 +50,7 @@ def at_body_height(parts: Iterable[Part], floor: float) -> tuple[Part, ...]:
     return tuple(part for part in parts if part.top > low and part.bottom < high)
 
 
-def standing_robot(robot: EPuck) -> Obstacle:
+def parked_robot(robot: EPuck) -> Obstacle:
     """An e-puck that is not driven, as an obstacle."""
     disc = Disc(robot.x, robot.y, BODY_RADIUS)
     part = Part(disc, robot.z + BODY_BOTTOM, robot.z + BODY_TOP)

@@ -55,7 +55,7 @@ class Disc:
     radius: float
 
     def __post_init__(self) -> None:
-        _keep_digits(self, "x", "y", "radius")
+        keep_digits(self, "x", "y", "radius")
         _above_zero(radius=self.radius)
 
     def contains(self, x: float, y: float) -> bool:
@@ -93,7 +93,7 @@ class Rectangle:
     width: float
 
     def __post_init__(self) -> None:
-        _keep_digits(self, "x", "y", "length", "width")
+        keep_digits(self, "x", "y", "length", "width")
         _above_zero(length=self.length, width=self.width)
         length, width, yaw = self.length, self.width, self.yaw
         if length < width:
@@ -263,7 +263,8 @@ def _bounds(vertices: Points) -> tuple[float, float, float, float]:
     return left, low, right, high
 
 
-def _keep_digits(shape: object, *names: str) -> None:
+def keep_digits(shape: object, *names: str) -> None:
+    """Rounds attributes of a frozen dataclass as `metres` does."""
     for name in names:
         object.__setattr__(shape, name, metres(name, getattr(shape, name)))
 

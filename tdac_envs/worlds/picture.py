@@ -46,7 +46,7 @@ _LEVEL = 0.0025
 """Parts that end within this height of the floor are drawn as floor, m."""
 
 
-class View:
+class WorldCanvas:
     """A canvas with a mapping from world to canvas coordinates.
 
     Args:
@@ -152,7 +152,7 @@ def draw_world(world: World) -> Image:
     Parts that the robot cannot hit are pale: they are above or below it, or not solid.
     Unmodelled nodes that may be solid are marked with a cross.
     """
-    view = View(bounds_of(world))
+    view = WorldCanvas(bounds_of(world))
     draw_things(view, world, bodies(world))
     if world.goal is not None:
         _draw_goal(view, world.goal)
@@ -165,7 +165,7 @@ def draw_world(world: World) -> Image:
     return view.canvas.image
 
 
-def draw_things(view: View, world: World, things: Iterable[Obstacle]) -> None:
+def draw_things(view: WorldCanvas, world: World, things: Iterable[Obstacle]) -> None:
     """Draws the floors, the grid, and all things except robots."""
     floor = floor_under(world)
     for arena in world.arenas:
@@ -201,7 +201,7 @@ def bounds_of(world: World) -> tuple[float, float, float, float]:
     return left, low, right, high
 
 
-def _draw_obstacle(view: View, thing: Obstacle, floor: float) -> None:
+def _draw_obstacle(view: WorldCanvas, thing: Obstacle, floor: float) -> None:
     colour = GREEN if thing.is_goal else colour_of(thing.kind)
     near = set(at_body_height(thing.solid, floor))
     pale = {
@@ -223,7 +223,7 @@ def _draw_obstacle(view: View, thing: Obstacle, floor: float) -> None:
         view.canvas.disc(view.at((thing.x, thing.y)), 3.0, FREE, 0.9)
 
 
-def _draw_goal(view: View, goal: tuple[float, float]) -> None:
+def _draw_goal(view: WorldCanvas, goal: tuple[float, float]) -> None:
     at = view.at(goal)
     radius = max(_TOLERANCE * view.scale, 9.0)
     view.canvas.disc(at, radius, GREEN, 0.2)
@@ -231,7 +231,7 @@ def _draw_goal(view: View, goal: tuple[float, float]) -> None:
     view.canvas.disc(at, 3.0, GREEN)
 
 
-def _draw_robot(view: View, robot: EPuck, driven: bool) -> None:
+def _draw_robot(view: WorldCanvas, robot: EPuck, driven: bool) -> None:
     x, y = view.at((robot.x, robot.y))[0].tolist()
     radius = max(BODY_RADIUS * view.scale, 5.0)
     view.canvas.disc((x, y), radius + 2, FREE)
@@ -241,7 +241,7 @@ def _draw_robot(view: View, robot: EPuck, driven: bool) -> None:
         view.canvas.disc((x, y), radius, FREE, 0.55)
 
 
-def _draw_cross(view: View, place: tuple[float, float]) -> None:
+def _draw_cross(view: WorldCanvas, place: tuple[float, float]) -> None:
     middle = view.at(place)[0]
     for width, ink in ((5, FREE), (2, RED)):
         for slope in (1.0, -1.0):
@@ -249,7 +249,7 @@ def _draw_cross(view: View, place: tuple[float, float]) -> None:
             view.canvas.line(np.array([middle - arm, middle + arm]), ink, width)
 
 
-def _write_strip(view: View, world: World) -> None:
+def _write_strip(view: WorldCanvas, world: World) -> None:
     canvas, first = view.canvas, view.canvas.strip_top + 24
     x = _LEFT
     entries = _legend(world)

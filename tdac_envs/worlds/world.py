@@ -23,6 +23,7 @@ from tdac_envs.worlds.footprint import (
     Footprint,
     Rectangle,
     frame,
+    keep_digits,
     metres,
     ring,
     wrap_angle,
@@ -49,8 +50,7 @@ class Part:
     top: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bottom", metres("bottom", self.bottom))
-        object.__setattr__(self, "top", metres("top", self.top))
+        keep_digits(self, "bottom", "top")
         if self.bottom > self.top:
             raise WorldError(
                 f"expected a bottom below the top, got {self.bottom} and {self.top}"
@@ -90,11 +90,9 @@ class Obstacle:
     looks: tuple[Look, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "x", metres("x", self.x))
-        object.__setattr__(self, "y", metres("y", self.y))
-        object.__setattr__(self, "reflectance", metres("reflectance", self.reflectance))
+        keep_digits(self, "x", "y", "reflectance")
         if self.mass is not None:
-            object.__setattr__(self, "mass", metres("mass", self.mass))
+            keep_digits(self, "mass")
             if self.mass <= 0.0:
                 raise WorldError(f"expected a mass above 0, got {self.mass}")
         if not 0.2 <= self.reflectance <= 1.0:
@@ -126,8 +124,7 @@ class EPuck:
     controller: str = ""
 
     def __post_init__(self) -> None:
-        for key in ("x", "y", "z"):
-            object.__setattr__(self, key, metres(key, getattr(self, key)))
+        keep_digits(self, "x", "y", "z")
         object.__setattr__(self, "heading", wrap_angle(self.heading))
         if self.version not in MAX_WHEEL_SPEED:
             raise WorldError(f'expected version "1" or "2", got {self.version!r}')
@@ -166,8 +163,7 @@ class Arena:
     wall_look: Look = field(default=ALUMINIUM, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        for key in ("wall_thickness", "wall_height", "z"):
-            object.__setattr__(self, key, metres(key, getattr(self, key)))
+        keep_digits(self, "wall_thickness", "wall_height", "z")
         wall = (self.wall_thickness, self.wall_height)
         if min(wall) < 0.0 or (min(wall) == 0.0) != (max(wall) == 0.0):
             raise WorldError(f"a wall needs thickness and height above 0, got {wall}")
@@ -259,13 +255,13 @@ class World:
     notes: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "time_step", metres("time_step", self.time_step))
+        keep_digits(self, "time_step")
         if self.time_step <= 0.0:
             raise WorldError(f"expected a time step above 0, got {self.time_step}")
         if not 0.0 <= self.friction <= INFINITE_FRICTION:
             wanted = f"expected a friction from 0 to {INFINITE_FRICTION:g}"
             raise WorldError(f"{wanted}, got {self.friction}")
-        object.__setattr__(self, "friction", metres("friction", self.friction))
+        keep_digits(self, "friction")
         if self.goal is not None:
             point = (metres("x", self.goal[0]), metres("y", self.goal[1]))
             object.__setattr__(self, "goal", point)

@@ -90,14 +90,16 @@ def failure(cells, clear, free, start, goal, radius, inflation):
         pieces = cv2.connectedComponents(free.astype(np.uint8), connectivity=4)[1]
         joined = pieces == pieces[other[::-1]] if free[other[::-1]] else able
         near = nearest_free(joined, x, y)
-        reach = "from which the goal can be reached "
-        reach = "that can be reached from the start " if name == "goal" else reach
+        reach = " from which the goal can be reached"
+        reach = " that can be reached from the start" if name == "goal" else reach
         reach = reach if free[other[::-1]] else ""
-        text = f"the nearest free pixel for {robot} {reach}is {near}"
-        text = f"{robot} fits nowhere on this map" if near is None else text
+        text = f"the nearest free pixel for {robot}{reach}"
+        problem = f"{name} ({x}, {y}) {what}"
+        text = f"move the {name} to {near}, {text}: {problem}"
+        text = f"{problem}; {robot} fits nowhere on this map" if near is None else text
         room = widest(clear, start, goal)
         way = f"from this start to this goal a radius of {room:.1f} px gets through"
-        return f"{name} ({x}, {y}) {what}; {text}{f'; {way}' if room >= 0.5 else ''}"
+        return f"{text}{f'; {way}' if room >= 0.5 else ''}"
     if connected(free, start, goal):
         return None
     room = widest(clear, start, goal)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from tdac_envs.worlds.bodies import floor_under, standing_robot
+from tdac_envs.worlds.bodies import floor_under, parked_robot
 from tdac_envs.worlds.footprint import Disc
 from tdac_envs.worlds.world import Obstacle, Part, World
 
@@ -23,7 +23,7 @@ def flat_world(world: World, dt: float) -> World:
         world: World from `open_world`, with a robot and a goal.
         dt: Duration of a step, s.
     """
-    others = tuple(map(standing_robot, world.robots[1:]))
+    others = tuple(map(parked_robot, world.robots[1:]))
     return replace(
         world,
         robots=(world.robot,),

@@ -42,16 +42,16 @@ def _drive_among_movers() -> None:
 
 def _make_worlds() -> None:
     """Makes a small world, and a draft of another kind."""
-    from tdac_envs.ladder.dead_ends import Sensor, dead_ends
+    from tdac_envs.ladder.dead_ends import RangeSensor, dead_ends
     from tdac_envs.ladder.generators.clutter import Clutter, draw
-    from tdac_envs.ladder.words import Words
+    from tdac_envs.ladder.random_stream import RandomStream
     from tdac_envs.ladder.worlds import WorldSpec, make_world
 
     clutter = Clutter.model_validate({"name": "clutter", "width": 60, "height": 60})
-    draw(Words(bytes(32)), clutter, 8.0)
+    draw(RandomStream(bytes(32)), clutter, 8.0)
     maze = {"name": "mazes", "width": 60, "height": 60, "loops": 0.0}
     spec = WorldSpec.model_validate({"generator": maze, "radius": 4, "min_steps": 10})
-    dead_ends(make_world(spec, bytes(32)), spec.radius, Sensor(18, 2.0, 40.0))
+    dead_ends(make_world(spec, bytes(32)), spec.radius, RangeSensor(18, 2.0, 40.0))
 
 
 def _plan_among_movers() -> None:

@@ -245,7 +245,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         spec.goal,
         robot_radius=spec.robot.radius,
         snap=spec.snap,
-        said=ReadingOptions(spec.polarity, spec.threshold),
+        options=ReadingOptions(spec.polarity, spec.threshold),
         units=units,
     )
     params = _with_robot(prepared.params, spec.robot)

@@ -16,7 +16,7 @@ from tdac_agent.tasks.setting import JudgedEnv
 from tdac_agent.tasks.units import Point
 from tdac_agent.verification.suite.reference import steer
 from tdac_envs.drive.env import Observation
-from tdac_envs.learning.guidance import Route, route_to_goal
+from tdac_envs.learning.guidance import GuidedRoute, route_to_goal
 from tdac_envs.learning.wrappers import Frame
 
 Kind = Literal[
@@ -104,7 +104,7 @@ class SteeringDriver:
         self._env, self._guided = env, guided
         plain: Any = env
         self._frame = Frame.of(plain)
-        self._route: Route | None = None
+        self._route: GuidedRoute | None = None
 
     def reset(self, observation: Observation) -> None:  # noqa: ARG002
         """Computes the route, if it is guided."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TaskError
-from tdac_envs.ladder.robots import EPuckParams
+from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import CpuSpec, DisturbanceSpec, SetFile
 from tdac_envs.ladder.task_sets import AnyTask
 from tdac_envs.map2d.task import Map2DTask
@@ -64,7 +64,7 @@ def level_params(file: SetFile) -> dict[str, Any]:
     """What `params.json` tells a controller: the robot and its budget, no world."""
     robot, disturbances = file.robot, file.disturbances.model_dump()
     sizes: dict[str, Any]
-    if isinstance(robot, EPuckParams):
+    if isinstance(robot, EPuckRobotParams):
         sizes = {"kind": robot.kind, **robot.sizes}
         disturbances |= robot.errors
     else:

@@ -27,8 +27,8 @@ from tdac_agent.verification.judge.cpu_budget import Budgeted
 from tdac_agent.verification.judge.episode_row import EpisodeRow, plan_facts
 from tdac_agent.verification.judge.set_files import write_as_level, write_files
 from tdac_envs.drive.env import Observation
-from tdac_envs.ladder.env import OnSet, make
-from tdac_envs.ladder.orca_driver import Drive, drive_by_orca
+from tdac_envs.ladder.env import TaskSetEnv, make
+from tdac_envs.ladder.orca_driver import OrcaDrive, drive_by_orca
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.source import read_salt
 from tdac_envs.ladder.space_time import earliest_arrival
@@ -193,7 +193,7 @@ class TaskEpisodes:
 class SetEpisodes:
     """See `Worlds`. Everything in an episode follows from its world."""
 
-    env: OnSet
+    env: TaskSetEnv
     worlds: SetWorlds
 
     @property
@@ -272,7 +272,7 @@ class SetEpisodes:
             cpu_seconds=round(time.process_time() - began, 3),
         )
 
-    def _plan(self, task: Map2DTask, number: int) -> Drive | None:
+    def _plan(self, task: Map2DTask, number: int) -> OrcaDrive | None:
         """Steps and length of the planner's drive; None if it does not arrive."""
         if any(group.kind == "crowd" for group in self.file.movers):
             noise = self.tasks.noise(self.worlds.split, number, self.salt)
@@ -281,7 +281,7 @@ class SetEpisodes:
         if arrival is None:
             return None
         legs = np.hypot(*np.diff(arrival.path[:, 1:], axis=0).T)
-        return Drive(arrival.steps, float(legs.sum()))
+        return OrcaDrive(arrival.steps, float(legs.sum()))
 
     def _facts(self, number: int) -> dict[str, Any]:
         source = self.env.setup.source

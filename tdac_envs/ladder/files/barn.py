@@ -11,12 +11,13 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from tdac_envs.core.errors import TaskError, first_problem, one_line_reason
+from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.core.strict_model import LenientModel
 from tdac_envs.grid.grid import BoolGrid
-from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.file_world import FileWorld
 
 BARN_SPEED = 2.0
 """Top speed that the challenge's score refers to, m/s."""
@@ -26,19 +27,15 @@ MOST_SIDE = 8192
 """Largest width or height of a map, px."""
 
 
-class BarnWorld(BaseModel):
+class BarnWorld(LenientModel):
     """A world: the centres of its cylinders, and the length of its planned path, m."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     cylinders: list[tuple[float, float]]
     path_length: float = Field(gt=0)
 
 
-class BarnFile(BaseModel):
+class BarnFile(LenientModel):
     """A file of worlds, by name; lengths in m, y is up."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     cylinder_radius: float = Field(gt=0, le=10)
     start: tuple[float, float, float] = Field(description="x, y, heading (rad)")
@@ -46,7 +43,7 @@ class BarnFile(BaseModel):
     worlds: dict[str, BarnWorld] = Field(min_length=1, max_length=10_000)
 
 
-def read_barn(path: Path, resolution: float) -> list[FoundWorld]:
+def read_barn(path: Path, resolution: float) -> list[FileWorld]:
     """The worlds of a file, in its order.
 
     A pixel is occupied if its centre is in a cylinder. The map ends with the cylinders,
@@ -62,13 +59,11 @@ def read_barn(path: Path, resolution: float) -> list[FoundWorld]:
     try:
         file = BarnFile.model_validate(parse_json(read_file(path, RECORD_BYTES)))
         return [_world(path, file, name, resolution) for name in file.worlds]
-    except ValidationError as error:
-        raise TaskError(f"{path}: {first_problem(error, BarnFile)}") from None
     except (OSError, ValueError) as error:
         raise TaskError(f"{path}: {one_line_reason(error)}") from None
 
 
-def _world(path: Path, file: BarnFile, name: str, resolution: float) -> FoundWorld:
+def _world(path: Path, file: BarnFile, name: str, resolution: float) -> FileWorld:
     world, heading = file.worlds[name], file.start[2]
     centres = np.array(world.cylinders, np.float64).reshape(-1, 2)
     ends = np.array([file.start[:2], file.goal])
@@ -87,7 +82,7 @@ def _world(path: Path, file: BarnFile, name: str, resolution: float) -> FoundWor
     pixels = _pixels(np.vstack([ends, centres]), (left, top), resolution)
     cells = _drawn(pixels[2:], file.cylinder_radius / resolution, (height, width))
     start, goal = ((round(x), round(y)) for x, y in pixels[:2].tolist())
-    return FoundWorld(
+    return FileWorld(
         name=name,
         file=f"{path}, world {name}",
         kind="barn",

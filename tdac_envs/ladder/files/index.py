@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AliasChoices, Field, ValidationError
 
 from tdac_envs.core.errors import TaskError, TdacError, first_problem, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, printable, read_file
+from tdac_envs.core.strict_model import LenientModel
 from tdac_envs.grid.grid import BoolGrid
-from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.map2d.source import prepare
 from tdac_envs.mapping.image import luminance
 from tdac_envs.mapping.map_files import load_image
@@ -28,10 +29,8 @@ _SHADES: dict[str, Literal["dark", "light"]] = {
 }
 
 
-class MapEntry(BaseModel):
+class MapEntry(LenientModel):
     """A task of `index.json`; other keys are not read. Lengths are px, y is down."""
-
-    model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False)
 
     file: str = Field(min_length=1, description="Map, relative to the folder.")
     start: tuple[float, float] = Field(description="Rounded to whole px.")
@@ -52,7 +51,7 @@ class MapEntry(BaseModel):
 
 def read_folder(
     folder: Path, radius: float, skipped: list[str] | None
-) -> list[FoundWorld]:
+) -> list[FileWorld]:
     """The worlds of a folder, in the order of its index.
 
     Args:
@@ -135,19 +134,19 @@ def _cells(folder: Path, entry: MapEntry, radius: float) -> BoolGrid:
     try:
         if entry.truth is not None:
             return np.asarray(luminance(load_image(path).colour) < 128)
-        said = ReadingOptions(_SHADES.get(entry.polarity or ""))
+        options = ReadingOptions(_SHADES.get(entry.polarity or ""))
         task = (entry.start, entry.goal)
-        return prepare(path, *task, robot_radius=radius, said=said).grid.cells
+        return prepare(path, *task, robot_radius=radius, options=options).grid.cells
     except TdacError as error:
         text = str(error)
         named = path.name in text
         raise TaskError(text if named else f"{entry.file}: {text}") from None
 
 
-def _world(entry: MapEntry, cells: BoolGrid) -> FoundWorld:
+def _world(entry: MapEntry, cells: BoolGrid) -> FileWorld:
     height, width = cells.shape
     (x, y), (goal_x, goal_y) = entry.start, entry.goal
-    return FoundWorld(
+    return FileWorld(
         name=entry.name or entry.file,
         file=entry.file,
         kind=entry.kind,

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import accumulate
 from pathlib import Path
 
 from tdac_envs.core.errors import TaskError, one_line_reason
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.ladder.files.barn import read_barn
-from tdac_envs.ladder.files.found import FoundWorld
-from tdac_envs.ladder.files.groups import links, shared_out
+from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.ladder.files.index import files_of, read_folder
-from tdac_envs.ladder.files.spec import AnySplit, FilesSpec
+from tdac_envs.ladder.files.spec import AnySplit, FileSplit, FilesSpec
 
 Stamp = tuple[tuple[str, int, int], ...]
+SHARES: dict[FileSplit, int] = {"train": 3, "dev": 1, "test": 1}
+"""Expected shares of the splits; of those that a set has."""
 _SHARED = {"map": "map", "from": "origin"}
 
 
@@ -33,7 +35,7 @@ class FileWorlds:
         runs: Episodes of each world.
     """
 
-    splits: Mapping[AnySplit, tuple[FoundWorld, ...]]
+    splits: Mapping[AnySplit, tuple[FileWorld, ...]]
     skipped: tuple[str, ...]
     sha256: str
     hidden_folder: Path | None = None
@@ -45,7 +47,7 @@ class FileWorlds:
         """Number of episodes of each split."""
         return {s: len(worlds) * self.runs for s, worlds in self.splits.items()}
 
-    def of(self, split: str, index: int) -> FoundWorld:
+    def of(self, split: str, index: int) -> FileWorld:
         """The world of an episode: all have their first run, then all their second.
 
         Args:
@@ -153,10 +155,69 @@ def _opened(
             f"{spec.path} has no feasible world; the first of {len(skipped)}: "
             f"{skipped[0]}"
         )
-    joined = "".join(sorted(world.sha256 for world in feasible))
-    digest = hashlib.sha256(joined.encode()).hexdigest()
+    digest = sha256_of(*sorted(world.sha256 for world in feasible))
     try:
         splits = shared_out(feasible, spec.splits, spec.tests)
     except ValueError as error:
         raise TaskError(f"{spec.path}: {error}") from None
     return FileWorlds(splits, tuple(skipped), digest, runs=spec.runs)
+
+
+def shared_out(
+    worlds: Sequence[FileWorld],
+    splits: Sequence[FileSplit],
+    tests: Collection[str] = (),
+) -> dict[AnySplit, tuple[FileWorld, ...]]:
+    """The worlds of each split, in an order that follows from their hashes.
+
+    Worlds with the same map or the same origin belong to a group, and so do those that
+    are linked by others. The hash of its name decides where a group goes, so further
+    files do not move it.
+
+    Args:
+        worlds: All worlds.
+        splits: The splits.
+        tests: Names of the worlds of `test`, if they are given; the groups of these
+            worlds go there, and no other.
+
+    Raises:
+        ValueError: There is no world of a name.
+    """
+    shared: dict[AnySplit, list[FileWorld]] = {split: [] for split in splits}
+    named = groups(worlds)
+    pairs = list(zip(worlds, named, strict=True))
+    chosen = {group for world, group in pairs if world.name in tests}
+    if unknown := set(tests) - {world.name for world in worlds}:
+        raise ValueError(f"`tests`: there is no world {min(unknown)!r}")
+    others = [split for split in splits if split != "test"] if tests else splits
+    for world, group in pairs:
+        split = "test" if group in chosen else _split_of(group, others)
+        shared[split].append(world)
+    return {
+        split: tuple(sorted(found, key=lambda world: world.sha256))
+        for split, found in shared.items()
+    }
+
+
+def groups(worlds: Sequence[FileWorld]) -> list[str]:
+    """The name of each world's group: its first origin, or its first map's hash."""
+    names = [links(each) for each in worlds]
+    group: dict[str, set[str]] = {}
+    for link in names:
+        joined = set().union(link, *(group.get(name, set()) for name in link))
+        for name in joined:
+            group[name] = joined
+    # "from …" comes before "map …".
+    return [min(group[next(iter(link))]) for link in names]
+
+
+def links(world: FileWorld) -> set[str]:
+    """What makes a world one of a group: its map, and its origin if that is known."""
+    origin = [f"from {world.origin}"] if world.origin else []
+    return {f"map {world.content}", *origin}
+
+
+def _split_of(group: str, splits: Sequence[FileSplit]) -> FileSplit:
+    bounds = list(accumulate(SHARES[split] for split in splits))
+    ticket = int(sha256_of(group)[:16], 16) % bounds[-1]
+    return next(s for s, b in zip(splits, bounds, strict=True) if ticket < b)

@@ -8,18 +8,17 @@ import numpy as np
 
 from tdac_envs.core.compiled import read_only
 from tdac_envs.core.errors import TaskError
-from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import body_free, clearance
 from tdac_envs.grid.plan import distance_field
 from tdac_envs.ladder.admission import Conditions, measured
-from tdac_envs.ladder.files.found import FoundWorld
+from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.ladder.passages import bottleneck
-from tdac_envs.ladder.words import rounded
+from tdac_envs.ladder.random_stream import rounded
 from tdac_envs.ladder.worlds import LadderWorld
 
 
 def placed_world(
-    found: FoundWorld, radius: float, step: float, tolerance: float, dt: float
+    found: FileWorld, radius: float, step: float, tolerance: float, dt: float
 ) -> LadderWorld:
     """A feasible world of a file with the figures of its difficulty.
 
@@ -43,15 +42,6 @@ def placed_world(
     if ready.difficulty.steps <= 0.0:
         raise TaskError(f"{found.file}: the start is within the tolerance of the goal")
     seconds = found.barn_seconds
-    return LadderWorld(
-        terrain=ready.terrain,
-        start=Pose(
-            float(start[0]), float(start[1]), math.remainder(found.heading, math.tau)
-        ),
-        goal=(float(goal[0]), float(goal[1])),
-        field=ready.field,
-        path=ready.path,
-        difficulty=ready.difficulty,
-        rejected=(),
-        barn_steps=None if seconds is None else seconds / dt,
-    )
+    steps = None if seconds is None else seconds / dt
+    heading = math.remainder(found.heading, math.tau)
+    return LadderWorld.of(ready, heading, barn_steps=steps)

@@ -10,19 +10,19 @@ from pydantic import Field
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.generators.draft import (
     Band,
-    Draft,
-    Parameters,
+    GeneratorParameters,
     Share,
+    WorldDraft,
     as_places,
     frame,
     pixels,
     whole_pixels,
 )
 from tdac_envs.ladder.generators.lanes import Lane, lanes_from, spread
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 
 
-class Aisles(Parameters):
+class Aisles(GeneratorParameters):
     """Parameters of aisles."""
 
     name: Literal["aisles"] = "aisles"
@@ -37,24 +37,24 @@ class Aisles(Parameters):
     )
 
 
-def draw(words: Words, params: Aisles, body: float) -> Draft:
+def draw(random: RandomStream, params: Aisles, body: float) -> WorldDraft:
     """Draws a warehouse whose shelves stand in columns.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         params: Size and shape.
         body: Diameter of the body, px.
     """
     cells = np.zeros((params.height, params.width), np.bool_)
-    wall = words.integer(2, 4)
+    wall = random.integer(2, 4)
     frame(cells, wall)
-    columns = _lanes(words, params.aisles, params.shelves, body, wall, params.width)
-    rows = _lanes(words, params.aisles, params.blocks, body, wall, params.height)
+    columns = _lanes(random, params.aisles, params.shelves, body, wall, params.width)
+    rows = _lanes(random, params.aisles, params.blocks, body, wall, params.height)
     for x0, x1 in columns[1::2]:
         for y0, y1 in rows[1::2]:
             _shelf(cells, x0, x1, y0, y1)
         for y0, y1 in rows[::2]:
-            if words.chance(params.closed):
+            if random.chance(params.closed):
                 _shelf(cells, x0, x1, y0, y1)
     places = [
         ((x0 + x1 - 1) // 2, (y0 + y1 - 1) // 2)
@@ -64,14 +64,14 @@ def draw(words: Words, params: Aisles, body: float) -> Draft:
     ]
     for x0, x1 in columns[::2]:
         for y0, y1 in rows[1::2]:
-            if words.chance(params.pallets):
-                _pallet(words, cells, (x0, x1), (y0, y1), body)
+            if random.chance(params.pallets):
+                _pallet(random, cells, (x0, x1), (y0, y1), body)
     clear = [(x, y) for x, y in places if not cells[y, x]]
-    return Draft(cells, as_places(clear))
+    return WorldDraft(cells, as_places(clear))
 
 
 def _lanes(
-    words: Words,
+    random: RandomStream,
     aisles: tuple[float, float],
     shelves: tuple[float, float],
     body: float,
@@ -79,15 +79,15 @@ def _lanes(
     extent: int,
 ) -> list[Lane]:
     """Begin and end of aisle, shelf, aisle, …, aisle from wall to wall, px."""
-    widths = [pixels(words, aisles, body)]
+    widths = [pixels(random, aisles, body)]
     left = extent - 2 * wall - widths[0]
     least = whole_pixels(shelves[0], body), whole_pixels(aisles[0], body)
     while left >= sum(least):
-        drawn = pixels(words, shelves, body), pixels(words, aisles, body)
+        drawn = pixels(random, shelves, body), pixels(random, aisles, body)
         chosen = drawn if sum(drawn) <= left else least
         widths += chosen
         left -= sum(chosen)
-    return lanes_from(wall, spread(words, widths, left))
+    return lanes_from(wall, spread(random, widths, left))
 
 
 def _shelf(cells: BoolGrid, x0: int, x1: int, y0: int, y1: int) -> None:
@@ -95,12 +95,12 @@ def _shelf(cells: BoolGrid, x0: int, x1: int, y0: int, y1: int) -> None:
 
 
 def _pallet(
-    words: Words, cells: BoolGrid, lane: Lane, along: Lane, body: float
+    random: RandomStream, cells: BoolGrid, lane: Lane, along: Lane, body: float
 ) -> None:
     """Parks a square pallet at one side of an aisle, or one that fills its width."""
-    side = whole_pixels(words.uniform(0.4, 0.9), body)
-    begin = words.integer(along[0], max(along[1] - side, along[0]))
+    side = whole_pixels(random.uniform(0.4, 0.9), body)
+    begin = random.integer(along[0], max(along[1] - side, along[0]))
     width = lane[1] - lane[0]
-    across = width if words.chance(0.5) else min(side, width)
-    x0 = lane[0] if words.chance(0.5) else lane[1] - across
+    across = width if random.chance(0.5) else min(side, width)
+    x0 = lane[0] if random.chance(0.5) else lane[1] - across
     cells[begin : begin + side, x0 : x0 + across] = True

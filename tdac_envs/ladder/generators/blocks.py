@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.grid.grid import BoolGrid
-from tdac_envs.ladder.words import rounded
+from tdac_envs.ladder.random_stream import rounded
 from tdac_envs.worlds.footprint import Disc, Rectangle
 
 PIXEL = 5

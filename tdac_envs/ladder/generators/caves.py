@@ -12,13 +12,13 @@ from pydantic import Field
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.generators.draft import (
     Band,
-    Draft,
-    Parameters,
+    GeneratorParameters,
+    WorldDraft,
     frame,
     free_places,
     whole_pixels,
 )
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 
 _PLACES = 48
 _ROUNDS = 3
@@ -26,7 +26,7 @@ _MAJORITY = 5
 """Occupied cells among a cell and its eight neighbours that make it rock."""
 
 
-class Caves(Parameters):
+class Caves(GeneratorParameters):
     """Parameters of caves."""
 
     name: Literal["caves"] = "caves"
@@ -34,28 +34,28 @@ class Caves(Parameters):
     rock: float = Field(0.45, ge=0.3, le=0.6, description="Share of rock at first.")
 
 
-def draw(words: Words, params: Caves, body: float) -> Draft:
+def draw(random: RandomStream, params: Caves, body: float) -> WorldDraft:
     """Draws a cave; pockets without a connection to the largest one are filled.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         params: Size and shape.
         body: Diameter of the body, px.
     """
     low, high = (max(whole_pixels(grain, body), 2) for grain in params.grain)
-    side = words.integer(low, high)
+    side = random.integer(low, high)
     rows, columns = -(-params.height // side) + 1, -(-params.width // side) + 1
-    rock = words.chances(params.rock, (rows, columns))
+    rock = random.chances(params.rock, (rows, columns))
     for _ in range(_ROUNDS):
         rock = _counts(rock, 1) >= _MAJORITY
-    left, top = words.integer(0, side - 1), words.integer(0, side - 1)
+    left, top = random.integer(0, side - 1), random.integer(0, side - 1)
     cells = rock.repeat(side, axis=0).repeat(side, axis=1)
     cells = cells[top : top + params.height, left : left + params.width]
     reach = side // 2 + 2
     cells = 2 * _counts(cells, reach) > (2 * reach + 1) ** 2
     frame(cells, 3)
     cells = _without_pockets(cells)
-    return Draft(cells, free_places(words, cells, _PLACES))
+    return WorldDraft(cells, free_places(random, cells, _PLACES))
 
 
 def _counts(cells: BoolGrid, reach: int) -> NDArray[np.int32]:

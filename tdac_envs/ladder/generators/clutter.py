@@ -12,14 +12,14 @@ from pydantic import Field
 from tdac_envs.core.compiled import kernel
 from tdac_envs.ladder.generators.draft import (
     Band,
-    Draft,
-    Parameters,
+    GeneratorParameters,
     Share,
+    WorldDraft,
     fill_disc,
     frame,
     free_places,
 )
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 
 Circle = tuple[int, int, int]
 """Centre and radius, sixteenths of a px."""
@@ -32,7 +32,7 @@ _FAILURES = 25
 _BORDER = 2
 
 
-class Clutter(Parameters):
+class Clutter(GeneratorParameters):
     """Parameters of clutter."""
 
     name: Literal["clutter"] = "clutter"
@@ -44,24 +44,24 @@ class Clutter(Parameters):
     density: Share = Field(0.34, description="Share of the floor that is occupied.")
 
 
-def draw(words: Words, params: Clutter, body: float) -> Draft:
+def draw(random: RandomStream, params: Clutter, body: float) -> WorldDraft:
     """Draws circles until the floor is as full as wanted, or hardly any more fit.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         params: Size and shape.
         body: Diameter of the body, px.
     """
     cells = np.zeros((params.height, params.width), np.bool_)
     frame(cells, _BORDER)
-    gap = _sixteenths(words.uniform(*params.gaps) * body)
+    gap = _sixteenths(random.uniform(*params.gaps) * body)
     circles, count = np.empty((params.chain, 3), np.int64), 0
-    wanted = round(words.uniform(0.8 * params.density, params.density) * cells.size)
+    wanted = round(random.uniform(0.8 * params.density, params.density) * cells.size)
     failures, occupied = 0, np.count_nonzero(cells)
     while failures < _FAILURES and occupied < wanted:
         if count + params.chain > len(circles):
             circles = np.concatenate([circles, np.empty_like(circles)])
-        chain = _chain(words, params, body, circles, count, gap)
+        chain = _chain(random, params, body, circles, count, gap)
         if not chain:
             failures += 1
             continue
@@ -71,7 +71,7 @@ def draw(words: Words, params: Clutter, body: float) -> Draft:
         circles[count : count + len(chain)] = chain
         count += len(chain)
         occupied = np.count_nonzero(cells)
-    return Draft(cells, free_places(words, cells, _PLACES))
+    return WorldDraft(cells, free_places(random, cells, _PLACES))
 
 
 def _sixteenths(length: float) -> int:
@@ -79,19 +79,24 @@ def _sixteenths(length: float) -> int:
 
 
 def _chain(
-    words: Words, params: Clutter, body: float, circles: Circles, count: int, gap: int
+    random: RandomStream,
+    params: Clutter,
+    body: float,
+    circles: Circles,
+    count: int,
+    gap: int,
 ) -> list[Circle]:
     """A row of overlapping circles, up to the first that does not fit."""
     chain: list[Circle] = []
-    x = words.integer(0, 16 * params.width)
-    y = words.integer(0, 16 * params.height)
+    x = random.integer(0, 16 * params.width)
+    y = random.integer(0, 16 * params.height)
     # Directions without trigonometry: points of a square, scaled to the distance.
-    ahead_x, ahead_y = words.integer(-64, 64), words.integer(-64, 64)
-    for _ in range(words.integer(1, params.chain)):
-        radius = _sixteenths(words.uniform(*params.radii) * body)
+    ahead_x, ahead_y = random.integer(-64, 64), random.integer(-64, 64)
+    for _ in range(random.integer(1, params.chain)):
+        radius = _sixteenths(random.uniform(*params.radii) * body)
         if chain:
-            ahead_x += words.integer(-48, 48)
-            ahead_y += words.integer(-48, 48)
+            ahead_x += random.integer(-48, 48)
+            ahead_y += random.integer(-48, 48)
             length = max(isqrt(ahead_x * ahead_x + ahead_y * ahead_y), 1)
             far = 3 * (chain[-1][2] + radius) // 4
             x, y = x + far * ahead_x // length, y + far * ahead_y // length

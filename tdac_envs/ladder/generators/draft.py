@@ -13,7 +13,7 @@ from pydantic import AfterValidator, Field
 from tdac_envs.core.compiled import kernel
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.grid.grid import BoolGrid
-from tdac_envs.ladder.words import FRACTIONS, Words
+from tdac_envs.ladder.random_stream import FRACTIONS, RandomStream
 
 Places = NDArray[np.int64]
 
@@ -37,7 +37,7 @@ Band = Annotated[tuple[Size, Size], AfterValidator(ordered)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-class Parameters(StrictModel):
+class GeneratorParameters(StrictModel):
     """Parameters that all generators have."""
 
     width: int = Field(220, ge=16, le=LARGEST_SIDE, description="Columns, px.")
@@ -45,7 +45,7 @@ class Parameters(StrictModel):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Draft:
+class WorldDraft:
     """A world that is not yet admitted.
 
     Attributes:
@@ -59,7 +59,7 @@ class Draft:
     places: Places
     touched: BoolGrid | None = None
 
-    def turned(self, quarters: int, mirrored: bool) -> Draft:
+    def turned(self, quarters: int, mirrored: bool) -> WorldDraft:
         """This draft mirrored at the vertical axis, then turned by `quarters` * 90°."""
         cells, places = self.cells, self.places
         if mirrored:
@@ -69,7 +69,7 @@ class Draft:
             # Turns anticlockwise on the screen, where y points down.
             places = np.column_stack([places[:, 1], cells.shape[1] - 1 - places[:, 0]])
             cells = np.rot90(cells)
-        return Draft(np.ascontiguousarray(cells), places)
+        return WorldDraft(np.ascontiguousarray(cells), places)
 
 
 def as_places(points: Sequence[tuple[int, int]]) -> Places:
@@ -77,33 +77,33 @@ def as_places(points: Sequence[tuple[int, int]]) -> Places:
     return np.array(points, np.int64).reshape(-1, 2)
 
 
-def free_places(words: Words, cells: BoolGrid, count: int) -> Places:
+def free_places(random: RandomStream, cells: BoolGrid, count: int) -> Places:
     """Random free pixels (x, y); none if there are none.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         cells: Shape (height, width), bool, True = occupied.
         count: Their number.
     """
     free = np.flatnonzero(~cells)
     count = count if len(free) else 0
     picked = free[
-        np.array([words.integer(0, len(free) - 1) for _ in range(count)], int)
+        np.array([random.integer(0, len(free) - 1) for _ in range(count)], int)
     ]
     rows, columns = np.divmod(picked.astype(np.int64), cells.shape[1])
     return np.column_stack([columns, rows])
 
 
-def pixels(words: Words, band: tuple[float, float], body: float) -> int:
+def pixels(random: RandomStream, band: tuple[float, float], body: float) -> int:
     """A length drawn from a band of body diameters, px, rounded up.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         band: Smallest and largest length, body diameters.
         body: Diameter of the body, px.
     """
     low, high = (whole_pixels(size, body) for size in band)
-    return words.integer(low, high)
+    return random.integer(low, high)
 
 
 def whole_pixels(size: float, body: float) -> int:

@@ -6,7 +6,7 @@ import numpy as np
 
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.generators.draft import fill_disc, whole_pixels
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 
 Box = tuple[int, int, int, int]
 """Columns x0 to x1 and rows y0 to y1, as (x0, y0, x1, y1), the ends excluded."""
@@ -16,7 +16,7 @@ _PIECES_AT_WALLS, _TABLES = 3, 2
 
 
 def furnish(
-    words: Words,
+    random: RandomStream,
     cells: BoolGrid,
     reserved: BoolGrid,
     room: Box,
@@ -27,7 +27,7 @@ def furnish(
     """Puts furniture into a room; a body passes everywhere beside it.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         cells: Shape (height, width), bool; is changed.
         reserved: Shape (height, width), bool: floor in front of doors, to be kept free.
         room: The room.
@@ -36,21 +36,26 @@ def furnish(
         body: Diameter of the body, px.
     """
     for _ in range(_PIECES_AT_WALLS):
-        if words.chance(chance):
-            _at_wall(words, cells, reserved, room, lane, body)
+        if random.chance(chance):
+            _at_wall(random, cells, reserved, room, lane, body)
     for _ in range(_TABLES):
-        if words.chance(chance):
-            _table(words, cells, reserved, room, lane, body)
+        if random.chance(chance):
+            _table(random, cells, reserved, room, lane, body)
 
 
 def _at_wall(
-    words: Words, cells: BoolGrid, reserved: BoolGrid, room: Box, lane: int, body: float
+    random: RandomStream,
+    cells: BoolGrid,
+    reserved: BoolGrid,
+    room: Box,
+    lane: int,
+    body: float,
 ) -> None:
     """A cupboard along a wall, a deep bed, or an L-shaped sofa in a corner."""
     for _ in range(_TRIES):
-        depth = whole_pixels(words.uniform(0.35, 0.9), body)
-        length = whole_pixels(words.uniform(0.8, 2.2), body)
-        in_corner, left, top, upright = (words.chance(0.5) for _ in range(4))
+        depth = whole_pixels(random.uniform(0.35, 0.9), body)
+        length = whole_pixels(random.uniform(0.8, 2.2), body)
+        in_corner, left, top, upright = (random.chance(0.5) for _ in range(4))
         size = (depth, length) if upright else (length, depth)
         x0, y0, x1, y1 = room
         spare_x, spare_y = x1 - x0 - size[0], y1 - y0 - size[1]
@@ -59,14 +64,14 @@ def _at_wall(
         x = x0 if left else x1 - size[0]
         y = y0 if top else y1 - size[1]
         if not in_corner and upright:
-            y = _within(words, y0, y1, size[1], lane)
+            y = _within(random, y0, y1, size[1], lane)
         elif not in_corner:
-            x = _within(words, x0, x1, size[0], lane)
+            x = _within(random, x0, x1, size[0], lane)
         box = (x, y, x + size[0], y + size[1])
         if not _is_free(cells, reserved, room, box, lane):
             continue
         _fill(cells, box)
-        if in_corner and words.chance(0.35):
+        if in_corner and random.chance(0.35):
             arm = (
                 (depth, depth + length // 2)
                 if not upright
@@ -80,27 +85,32 @@ def _at_wall(
         return
 
 
-def _within(words: Words, begin: int, end: int, size: int, lane: int) -> int:
+def _within(random: RandomStream, begin: int, end: int, size: int, lane: int) -> int:
     """Where a piece begins along its wall: with a lane at both ends, if possible."""
     low, high = begin + lane, end - lane - size
-    return words.integer(low, high) if low <= high else begin
+    return random.integer(low, high) if low <= high else begin
 
 
 def _table(
-    words: Words, cells: BoolGrid, reserved: BoolGrid, room: Box, lane: int, body: float
+    random: RandomStream,
+    cells: BoolGrid,
+    reserved: BoolGrid,
+    room: Box,
+    lane: int,
+    body: float,
 ) -> None:
     """A round or rectangular table with a lane on all sides."""
     for _ in range(_TRIES):
-        width, height = (whole_pixels(words.uniform(0.5, 1.6), body) for _ in range(2))
-        is_round = words.chance(0.4)
+        width, height = (whole_pixels(random.uniform(0.5, 1.6), body) for _ in range(2))
+        is_round = random.chance(0.4)
         if is_round:
             height = width
         x0, y0, x1, y1 = room
         spare_x, spare_y = x1 - x0 - width - 2 * lane, y1 - y0 - height - 2 * lane
         if spare_x < 0 or spare_y < 0:
             continue
-        x = x0 + lane + words.integer(0, spare_x)
-        y = y0 + lane + words.integer(0, spare_y)
+        x = x0 + lane + random.integer(0, spare_x)
+        y = y0 + lane + random.integer(0, spare_y)
         box = (x, y, x + width, y + height)
         if not _is_free(cells, reserved, room, box, lane):
             continue

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 
 Lane = tuple[int, int]
 """Begin and end of a lane, px, the end excluded."""
 
 
-def spread(words: Words, widths: list[int], spare: int) -> list[int]:
+def spread(random: RandomStream, widths: list[int], spare: int) -> list[int]:
     """The widths, some of them wider, so that together they fill `spare` px more."""
     wider = list(widths)
     for _ in range(spare if wider else 0):
-        wider[words.integer(0, len(wider) - 1)] += 1
+        wider[random.integer(0, len(wider) - 1)] += 1
     return wider
 
 

@@ -9,21 +9,21 @@ from pydantic import Field
 
 from tdac_envs.ladder.generators.draft import (
     Band,
-    Draft,
-    Parameters,
+    GeneratorParameters,
     Share,
+    WorldDraft,
     as_places,
     pixels,
     whole_pixels,
 )
 from tdac_envs.ladder.generators.lanes import Lane, lanes_from, spread
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 
 Cell = tuple[int, int]
 Wall = tuple[Cell, Cell]
 
 
-class Mazes(Parameters):
+class Mazes(GeneratorParameters):
     """Parameters of mazes."""
 
     name: Literal["mazes"] = "mazes"
@@ -38,61 +38,61 @@ class Mazes(Parameters):
     )
 
 
-def draw(words: Words, params: Mazes, body: float) -> Draft:
+def draw(random: RandomStream, params: Mazes, body: float) -> WorldDraft:
     """Draws a maze.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         params: Size and shape.
         body: Diameter of the body, px.
     """
-    columns = _lanes(words, params, params.width, body)
-    rows = _lanes(words, params, params.height, body)
+    columns = _lanes(random, params, params.width, body)
+    rows = _lanes(random, params, params.height, body)
     cells = np.ones((params.height, params.width), np.bool_)
     for x0, x1 in columns:
         for y0, y1 in rows:
             cells[y0:y1, x0:x1] = False
     narrowest = whole_pixels(params.corridors[0], body)
     for one, other in openings(
-        words, params.loops, params.winding, len(columns), len(rows)
+        random, params.loops, params.winding, len(columns), len(rows)
     ):
         (i, j), (k, m) = min(one, other), max(one, other)
         if i == k:
-            across = _opening(words, params.pinched, columns[i], narrowest)
+            across = _opening(random, params.pinched, columns[i], narrowest)
             cells[rows[j][1] : rows[m][0], slice(*across)] = False
         else:
-            across = _opening(words, params.pinched, rows[j], narrowest)
+            across = _opening(random, params.pinched, rows[j], narrowest)
             cells[slice(*across), columns[i][1] : columns[k][0]] = False
     centres = [
         ((x0 + x1) // 2, (y0 + y1) // 2) for x0, x1 in columns for y0, y1 in rows
     ]
-    return Draft(cells, as_places(centres))
+    return WorldDraft(cells, as_places(centres))
 
 
-def _lanes(words: Words, params: Mazes, extent: int, body: float) -> list[Lane]:
+def _lanes(random: RandomStream, params: Mazes, extent: int, body: float) -> list[Lane]:
     """Begin and end of each corridor along one axis, px, as many as fit."""
-    widest = words.uniform(*params.corridors)
-    wall = pixels(words, params.walls, body)
+    widest = random.uniform(*params.corridors)
+    wall = pixels(random, params.walls, body)
     widths: list[int] = []
     left = extent - wall
     while True:
-        width = pixels(words, (params.corridors[0], widest), body)
+        width = pixels(random, (params.corridors[0], widest), body)
         if width + wall > left:
             break
         widths.append(width)
         left -= width + wall
-    offset = words.integer(0, min(left, round(body / 2)))
-    widths = spread(words, widths, left - offset)
-    return lanes_from(wall + words.integer(0, offset), widths, wall)
+    offset = random.integer(0, min(left, round(body / 2)))
+    widths = spread(random, widths, left - offset)
+    return lanes_from(wall + random.integer(0, offset), widths, wall)
 
 
 def openings(
-    words: Words, loops: float, winding: float, columns: int, rows: int
+    random: RandomStream, loops: float, winding: float, columns: int, rows: int
 ) -> list[Wall]:
     """The walls to open: those of a spanning tree, and some more for loops.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         loops: Share of the other walls that are opened.
         winding: Chance that a corridor goes on instead of branching.
         columns: Number of columns of cells.
@@ -103,17 +103,17 @@ def openings(
     """
     if columns * rows == 0:
         return []
-    first = (words.integer(0, columns - 1), words.integer(0, rows - 1))
+    first = (random.integer(0, columns - 1), random.integer(0, rows - 1))
     seen, active, opened = {first}, [first], []
     while active:
-        newest = words.chance(winding)
-        at = len(active) - 1 if newest else words.integer(0, len(active) - 1)
+        newest = random.chance(winding)
+        at = len(active) - 1 if newest else random.integer(0, len(active) - 1)
         here = active[at]
         fresh = [cell for cell in _beside(here, columns, rows) if cell not in seen]
         if not fresh:
             active.pop(at)
             continue
-        chosen = words.choice(fresh)
+        chosen = random.choice(fresh)
         seen.add(chosen)
         active.append(chosen)
         opened.append((here, chosen))
@@ -123,7 +123,7 @@ def openings(
             for other in ((i + 1, j), (i, j + 1)):
                 inside = other[0] < columns and other[1] < rows
                 wall = frozenset(((i, j), other))
-                if inside and wall not in known and words.chance(loops):
+                if inside and wall not in known and random.chance(loops):
                     opened.append(((i, j), other))
     return opened
 
@@ -134,11 +134,11 @@ def _beside(cell: Cell, columns: int, rows: int) -> list[Cell]:
     return [(k, m) for k, m in around if 0 <= k < columns and 0 <= m < rows]
 
 
-def _opening(words: Words, pinched: float, lane: Lane, narrowest: int) -> Lane:
+def _opening(random: RandomStream, pinched: float, lane: Lane, narrowest: int) -> Lane:
     """Begin and end of an opening in the wall across a corridor."""
     begin, end = lane
-    if not words.chance(pinched) or end - begin <= narrowest:
+    if not random.chance(pinched) or end - begin <= narrowest:
         return lane
-    width = words.integer(narrowest, end - begin)
-    begin += words.integer(0, end - begin - width)
+    width = random.integer(narrowest, end - begin)
+    begin += random.integer(0, end - begin - width)
     return begin, begin + width

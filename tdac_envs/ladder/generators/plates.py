@@ -12,7 +12,7 @@ from tdac_envs.ladder.generators.blocks import PIXEL, Block, Box, Cylinder
 from tdac_envs.ladder.generators.draft import Places, Share, as_places, ordered
 from tdac_envs.ladder.generators.lanes import Lane, lanes_from
 from tdac_envs.ladder.generators.mazes import openings
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 
 Metres = Annotated[float, Field(ge=0.01, le=5.0)]
 MetreBand = Annotated[tuple[Metres, Metres], AfterValidator(ordered)]
@@ -61,18 +61,18 @@ _ROOM = 50
 """Least distance from the centre of a thing to the border of its cell, mm."""
 
 
-def draw(words: Words, params: Plates) -> PlatesDraft:
+def draw(random: RandomStream, params: Plates) -> PlatesDraft:
     """Draws a floor.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         params: Size and shape.
     """
-    thick = _pixels(words, params.thickness)
-    width, depth = _pixels(words, params.sides), _pixels(words, params.sides)
-    columns = _lanes(words, params, width, thick)
-    rows = _lanes(words, params, depth, thick)
-    opened = openings(words, params.loops, params.winding, len(columns), len(rows))
+    thick = _pixels(random, params.thickness)
+    width, depth = _pixels(random, params.sides), _pixels(random, params.sides)
+    columns = _lanes(random, params, width, thick)
+    rows = _lanes(random, params, depth, thick)
+    opened = openings(random, params.loops, params.winding, len(columns), len(rows))
     joined = {(min(wall), max(wall)) for wall in opened}
     plates = [
         _plate(columns[i], (rows[j][1], rows[j][1] + thick), width, depth, thick)
@@ -87,18 +87,18 @@ def draw(words: Words, params: Plates) -> PlatesDraft:
         if ((i, j), (i + 1, j)) not in joined
     ]
     things = [
-        _thing(words, x, y, width, depth)
+        _thing(random, x, y, width, depth)
         for x in columns
         for y in rows
-        if words.chance(params.things)
+        if random.chance(params.things)
     ]
     places = [((a + b) // 2 + 1, (c + d) // 2 + 1) for a, b in columns for c, d in rows]
     return PlatesDraft(width, depth, tuple(plates), tuple(things), as_places(places))
 
 
-def _pixels(words: Words, band: tuple[float, float]) -> int:
+def _pixels(random: RandomStream, band: tuple[float, float]) -> int:
     """A length drawn from a band, pixels."""
-    return words.integer(*_whole(band))
+    return random.integer(*_whole(band))
 
 
 def _whole(band: tuple[float, float]) -> tuple[int, int]:
@@ -107,7 +107,7 @@ def _whole(band: tuple[float, float]) -> tuple[int, int]:
     return low, high
 
 
-def _lanes(words: Words, params: Plates, extent: int, thick: int) -> list[Lane]:
+def _lanes(random: RandomStream, params: Plates, extent: int, thick: int) -> list[Lane]:
     """Begin and end of each passage along one axis, pixels; none if none can be."""
     low, high = _whole(params.passages)
     counts = [
@@ -117,13 +117,13 @@ def _lanes(words: Words, params: Plates, extent: int, thick: int) -> list[Lane]:
     ]
     if not counts:
         return []
-    count = words.choice(counts)
+    count = random.choice(counts)
     each, more = divmod(extent - (count - 1) * thick, count)
-    widths = words.shuffled([each + 1] * more + [each] * (count - more))
+    widths = random.shuffled([each + 1] * more + [each] * (count - more))
     for k in range(count - 1):
         one, other = widths[k], widths[k + 1]
         least = -min(one - low, high - other)
-        change = words.integer(least, min(high - one, other - low))
+        change = random.integer(least, min(high - one, other - low))
         widths[k], widths[k + 1] = one + change, other - change
     return lanes_from(0, widths, thick)
 
@@ -149,17 +149,17 @@ def _plate(
     return Box(*middle, *sides)
 
 
-def _thing(words: Words, x: Lane, y: Lane, width: int, depth: int) -> Block:
+def _thing(random: RandomStream, x: Lane, y: Lane, width: int, depth: int) -> Block:
     """A turned box or a cylinder in a cell."""
-    at = _within(words, x, width), _within(words, y, depth)
-    if words.chance(0.5):
-        return Cylinder(*at, words.integer(*_RADIUS))
-    sides = words.integer(*_BOX), words.integer(*_BOX)
-    return Box(*at, *sides, words.integer(0, 179))
+    at = _within(random, x, width), _within(random, y, depth)
+    if random.chance(0.5):
+        return Cylinder(*at, random.integer(*_RADIUS))
+    sides = random.integer(*_BOX), random.integer(*_BOX)
+    return Box(*at, *sides, random.integer(0, 179))
 
 
-def _within(words: Words, lane: Lane, extent: int) -> int:
+def _within(random: RandomStream, lane: Lane, extent: int) -> int:
     """A coordinate in a cell, from the centre of the floor, half mm."""
     begin, end = (2 * edge * PIXEL - extent * PIXEL for edge in lane)
     room = min(2 * _ROOM, (end - begin) // 2)
-    return words.integer(begin + room, end - room)
+    return random.integer(begin + room, end - room)

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from tdac_envs.ladder.generators import aisles, caves, clutter, mazes, rooms
-from tdac_envs.ladder.generators.draft import Draft, Parameters
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.generators.draft import GeneratorParameters, WorldDraft
+from tdac_envs.ladder.random_stream import RandomStream
 
 AnyParameters = Annotated[
     mazes.Mazes | rooms.Rooms | caves.Caves | clutter.Clutter | aisles.Aisles,
@@ -30,8 +30,8 @@ class Generator:
         min_detour: Least ratio of the shortest path to the straight line.
     """
 
-    parameters: type[Parameters]
-    draw: Callable[[Words, Any, float], Draft]
+    parameters: type[GeneratorParameters]
+    draw: Callable[[RandomStream, Any, float], WorldDraft]
     min_detour: float
 
 
@@ -46,17 +46,17 @@ GENERATORS: Mapping[str, Generator] = MappingProxyType(
 )
 
 
-def draw(words: Words, params: AnyParameters, body: float) -> Draft:
+def draw(random: RandomStream, params: AnyParameters, body: float) -> WorldDraft:
     """Draws a draft, mirrored and turned by a random multiple of 90°.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         params: Parameters of the generator.
         body: Diameter of the body, px.
     """
-    quarters, mirrored = words.integer(0, 3), words.chance(0.5)
+    quarters, mirrored = random.integer(0, 3), random.chance(0.5)
     if quarters % 2:
         sides = {"width": params.height, "height": params.width}
         params = params.model_copy(update=sides)
-    drawn = GENERATORS[params.name].draw(words, params, body)
+    drawn = GENERATORS[params.name].draw(random, params, body)
     return drawn.turned(quarters, mirrored)

@@ -10,18 +10,18 @@ from pydantic import Field
 from tdac_envs.grid.grid import BoolGrid
 from tdac_envs.ladder.generators.draft import (
     Band,
-    Draft,
-    Parameters,
+    GeneratorParameters,
     Share,
+    WorldDraft,
     as_places,
     pixels,
     whole_pixels,
 )
 from tdac_envs.ladder.generators.furniture import furnish
-from tdac_envs.ladder.words import Words
+from tdac_envs.ladder.random_stream import RandomStream
 
 
-class Rooms(Parameters):
+class Rooms(GeneratorParameters):
     """Parameters of rooms."""
 
     name: Literal["rooms"] = "rooms"
@@ -48,20 +48,20 @@ class Door(NamedTuple):
     rooms: tuple[int, int]
 
 
-def draw(words: Words, params: Rooms, body: float) -> Draft:
+def draw(random: RandomStream, params: Rooms, body: float) -> WorldDraft:
     """Draws a floor of rooms, all of which are connected by doors.
 
     Args:
-        words: Random numbers.
+        random: Random numbers.
         params: Size and shape.
         body: Diameter of the body, px.
     """
-    wall = pixels(words, params.walls, body)
+    wall = pixels(random, params.walls, body)
     # The walls outside differ, so that the same rooms do not lie at the same places.
-    outside = [wall + words.integer(0, round(body / 2)) for _ in range(4)]
+    outside = [wall + random.integer(0, round(body / 2)) for _ in range(4)]
     right, bottom = params.width - outside[2], params.height - outside[3]
     rooms = _rooms(
-        words, params, Room(outside[0], outside[1], right, bottom), wall, body
+        random, params, Room(outside[0], outside[1], right, bottom), wall, body
     )
     cells = np.ones((params.height, params.width), np.bool_)
     for x0, y0, x1, y1 in rooms:
@@ -69,17 +69,17 @@ def draw(words: Words, params: Rooms, body: float) -> Draft:
     reserved = np.zeros_like(cells)
     lane = whole_pixels(params.doors[0], body)
     for x0, y0, x1, y1 in (
-        door.hole for door in _doors(words, params, rooms, wall, body)
+        door.hole for door in _doors(random, params, rooms, wall, body)
     ):
         cells[y0:y1, x0:x1] = False
         reserved[max(y0 - lane, 0) : y1 + lane, max(x0 - lane, 0) : x1 + lane] = True
     for room in rooms:
-        furnish(words, cells, reserved, room, params.furniture, lane, body)
-    return Draft(cells, as_places(_places(words, cells, rooms, lane)))
+        furnish(random, cells, reserved, room, params.furniture, lane, body)
+    return WorldDraft(cells, as_places(_places(random, cells, rooms, lane)))
 
 
 def _rooms(
-    words: Words, params: Rooms, whole: Room, wall: int, body: float
+    random: RandomStream, params: Rooms, whole: Room, wall: int, body: float
 ) -> list[Room]:
     """Halves a rectangle again and again, until no part is too large."""
     least, most = (whole_pixels(side, body) for side in params.sides)
@@ -89,13 +89,13 @@ def _rooms(
         sides = room.x1 - room.x0, room.y1 - room.y0
         may = [axis for axis in (0, 1) if sides[axis] >= 2 * least + wall]
         must = [axis for axis in may if sides[axis] > most]
-        if not may or (not must and words.chance(0.5)):
+        if not may or (not must and random.chance(0.5)):
             rooms.append(room)
             continue
         axis = (
-            max(must or may, key=lambda k: sides[k]) if words.chance(0.8) else may[-1]
+            max(must or may, key=lambda k: sides[k]) if random.chance(0.8) else may[-1]
         )
-        begin = room[axis] + words.integer(least, sides[axis] - least - wall)
+        begin = room[axis] + random.integer(least, sides[axis] - least - wall)
         first, second = list(room), list(room)
         first[axis + 2], second[axis] = begin, begin + wall
         parts += [Room(*second), Room(*first)]
@@ -103,7 +103,7 @@ def _rooms(
 
 
 def _doors(
-    words: Words, params: Rooms, rooms: list[Room], wall: int, body: float
+    random: RandomStream, params: Rooms, rooms: list[Room], wall: int, body: float
 ) -> list[Door]:
     """A door per edge of a random spanning tree, and some more for loops."""
     least = whole_pixels(params.doors[0], body)
@@ -114,12 +114,12 @@ def _doors(
         if (hole := _shared_wall(rooms[a], rooms[b], wall, least)) is not None
     ]
     group, doors = list(range(len(rooms))), []
-    for hole, (a, b) in words.shuffled(found):
-        if group[a] != group[b] or words.chance(params.loops):
+    for hole, (a, b) in random.shuffled(found):
+        if group[a] != group[b] or random.chance(params.loops):
             old, new = group[b], group[a]
             group = [new if member == old else member for member in group]
-            width = pixels(words, params.doors, body)
-            doors.append(Door(_narrowed(words, hole, wall, width), (a, b)))
+            width = pixels(random, params.doors, body)
+            doors.append(Door(_narrowed(random, hole, wall, width), (a, b)))
     return doors
 
 
@@ -140,28 +140,28 @@ def _shared_wall(one: Room, other: Room, wall: int, least: int) -> Room | None:
     return None
 
 
-def _narrowed(words: Words, hole: Room, wall: int, width: int) -> Room:
+def _narrowed(random: RandomStream, hole: Room, wall: int, width: int) -> Room:
     """A piece of this width of a wall, at a random place."""
     x0, y0, x1, y1 = hole
     along_x = y1 - y0 == wall and (x1 - x0 != wall or x1 - x0 >= y1 - y0)
     begin, end = (x0, x1) if along_x else (y0, y1)
     width = min(width, end - begin)
-    begin += words.integer(0, end - begin - width)
+    begin += random.integer(0, end - begin - width)
     if along_x:
         return Room(begin, y0, begin + width, y1)
     return Room(x0, begin, x1, begin + width)
 
 
 def _places(
-    words: Words, cells: BoolGrid, rooms: list[Room], lane: int
+    random: RandomStream, cells: BoolGrid, rooms: list[Room], lane: int
 ) -> list[tuple[int, int]]:
     """Up to two free points per room, half a lane from its walls."""
     places = []
     for x0, y0, x1, y1 in rooms:
         for _ in range(6):
             half = lane // 2 + 1
-            x = words.integer(x0 + half, max(x1 - half, x0 + half))
-            y = words.integer(y0 + half, max(y1 - half, y0 + half))
+            x = random.integer(x0 + half, max(x1 - half, x0 + half))
+            y = random.integer(y0 + half, max(y1 - half, y0 + half))
             window = cells[
                 max(y - half, 0) : y + half + 1, max(x - half, 0) : x + half + 1
             ]

@@ -2,7 +2,7 @@
 
 The package is copied to the folder in which a controller runs, so it uses only the
 standard library and nothing else of tdac. It accesses the simulation only through the
-`World` given to `connect`, one step at a time. It handles invalid calls as Webots
+`Simulation` given to `connect`, one step at a time. It handles invalid calls as Webots
 does, where that is known.
 """
 

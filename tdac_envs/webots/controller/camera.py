@@ -2,17 +2,46 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
-from .messages import complain, once, unsupported
+from .calls import constants, getters, lacking
+from .messages import complain, once
 from .png import png
 from .viewing import ViewingSensor
 
 
+@getters("width", "height", "fov", "near")
+@constants(hasRecognition=False)
+@lacking(
+    setFov=None,
+    getMinFov=math.nan,
+    getMaxFov=math.nan,
+    getExposure=math.nan,
+    setExposure=None,
+    getFocalLength=0.0,
+    getFocalDistance=0.0,
+    setFocalDistance=None,
+    getMinFocalDistance=0.0,
+    getMaxFocalDistance=0.0,
+    recognitionEnable=None,
+    recognitionDisable=None,
+    getRecognitionSamplingPeriod=0,
+    hasRecognitionSegmentation=False,
+    enableRecognitionSegmentation=None,
+    disableRecognitionSegmentation=None,
+    isRecognitionSegmentationEnabled=False,
+    getRecognitionSegmentationImage=None,
+    getRecognitionSegmentationImageArray=None,
+    saveRecognitionSegmentationImage=-1,
+    getRecognitionObjects=(),
+    getRecognitionNumberOfObjects=0,
+)
 class Camera(ViewingSensor):
     """A colour camera."""
 
     _c_name = "camera"
+    setFov: Any
 
     def getImage(self) -> bytes | None:
         """The last image: blue, green, red and 255 of each pixel, row by row.
@@ -78,26 +107,6 @@ class Camera(ViewingSensor):
             return -1
         return 0
 
-    def getWidth(self) -> int:
-        """Image width, pixels."""
-        return self.width
-
-    def getHeight(self) -> int:
-        """Image height, pixels."""
-        return self.height
-
-    def getFov(self) -> float:
-        """Horizontal field of view, rad."""
-        return self.fov
-
-    def getNear(self) -> float:
-        """Distance of the near plane, m."""
-        return self.near
-
-    def hasRecognition(self) -> bool:
-        """Always False."""
-        return False
-
     @property
     def image(self) -> bytes | None:
         """See `getImage`."""
@@ -105,8 +114,8 @@ class Camera(ViewingSensor):
 
     @property
     def fov(self) -> float:
-        """See `getFov`; setting it has no effect."""
-        return float(self._facts.get("fov", float("nan")))
+        """Horizontal field of view, rad; setting it has no effect."""
+        return float(self._facts.get("fov", math.nan))
 
     @fov.setter
     def fov(self, angle: float) -> None:
@@ -114,46 +123,5 @@ class Camera(ViewingSensor):
 
     @property
     def near(self) -> float:
-        """See `getNear`."""
-        return float(self._facts.get("near", float("nan")))
-
-    setFov: Any = unsupported("Camera.setFov")
-    getMinFov: Any = unsupported("Camera.getMinFov", float("nan"))
-    getMaxFov: Any = unsupported("Camera.getMaxFov", float("nan"))
-    getExposure: Any = unsupported("Camera.getExposure", float("nan"))
-    setExposure: Any = unsupported("Camera.setExposure")
-    getFocalLength: Any = unsupported("Camera.getFocalLength", 0.0)
-    getFocalDistance: Any = unsupported("Camera.getFocalDistance", 0.0)
-    setFocalDistance: Any = unsupported("Camera.setFocalDistance")
-    getMinFocalDistance: Any = unsupported("Camera.getMinFocalDistance", 0.0)
-    getMaxFocalDistance: Any = unsupported("Camera.getMaxFocalDistance", 0.0)
-    recognitionEnable: Any = unsupported("Camera.recognitionEnable")
-    recognitionDisable: Any = unsupported("Camera.recognitionDisable")
-    getRecognitionSamplingPeriod: Any = unsupported(
-        "Camera.getRecognitionSamplingPeriod", 0
-    )
-    hasRecognitionSegmentation: Any = unsupported(
-        "Camera.hasRecognitionSegmentation", False
-    )
-    enableRecognitionSegmentation: Any = unsupported(
-        "Camera.enableRecognitionSegmentation"
-    )
-    disableRecognitionSegmentation: Any = unsupported(
-        "Camera.disableRecognitionSegmentation"
-    )
-    isRecognitionSegmentationEnabled: Any = unsupported(
-        "Camera.isRecognitionSegmentationEnabled", False
-    )
-    getRecognitionSegmentationImage: Any = unsupported(
-        "Camera.getRecognitionSegmentationImage"
-    )
-    getRecognitionSegmentationImageArray: Any = unsupported(
-        "Camera.getRecognitionSegmentationImageArray"
-    )
-    saveRecognitionSegmentationImage: Any = unsupported(
-        "Camera.saveRecognitionSegmentationImage", -1
-    )
-    getRecognitionObjects: Any = unsupported("Camera.getRecognitionObjects", ())
-    getRecognitionNumberOfObjects: Any = unsupported(
-        "Camera.getRecognitionNumberOfObjects", 0
-    )
+        """Distance of the near plane, m."""
+        return float(self._facts.get("near", math.nan))

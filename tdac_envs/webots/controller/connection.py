@@ -9,7 +9,7 @@ from . import libraries
 from .messages import complain
 
 
-class World(Protocol):
+class Simulation(Protocol):
     """Carries requests to the simulation."""
 
     def reset(self) -> Any:
@@ -40,12 +40,12 @@ class Connection:
         self.velocity: list[float] = [0.0] * 6
         self.places: dict[int, tuple[list[float], list[float]]] = {}
         self.motors: dict[str, object] = {}
-        self._world: World | None = None
+        self._world: Simulation | None = None
         self._commands: list[tuple[str, str, Any]] = []
         self._images: dict[str, bytes] = {}
         self._is_over = False
 
-    def open(self, world: World) -> None:
+    def open(self, world: Simulation) -> None:
         """Starts the simulation and keeps its facts."""
         self._world = world
         self.facts = world.reset()
@@ -105,7 +105,7 @@ connection = Connection()
 """The only connection of the process, as in Webots."""
 
 
-def connect(world: World) -> None:
+def connect(world: Simulation) -> None:
     """Connects to the simulation; called before the controller starts."""
     libraries.prepare()
     connection.open(world)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from .calls import getters, lacking
 from .connection import connection
-from .messages import complain, unsupported
+from .messages import complain
 
 _TYPES = (
     "SFBool", "SFInt32", "SFFloat", "SFVec2f", "SFVec3f", "SFRotation", "SFColor",
@@ -16,12 +17,24 @@ _KINDS: dict[int, type] = {1: bool, 2: int, 3: float, 8: str}
 _MF = 16
 
 
+@getters("name", "type", "type_name", "count")
+@lacking(
+    importMFNodeFromString=None,
+    importMFNode=None,
+    importSFNodeFromString=None,
+    importSFNode=None,
+    enableSFTracking=None,
+    disableSFTracking=None,
+)
 class Field:
     """A field of a node.
 
     Args:
         node: Number of the node.
         entry: Name, type and value in the scene; changes are written to it.
+
+    Attributes:
+        type: Type of the field, one of the constants.
     """
 
     SF_BOOL, SF_INT32, SF_FLOAT, SF_VEC2F, SF_VEC3F = 1, 2, 3, 4, 5
@@ -34,40 +47,24 @@ class Field:
         self._entry = entry
         self.type = int(entry[1])
 
-    def getName(self) -> str:
-        """Name of the field."""
-        return self.name
-
-    def getType(self) -> int:
-        """Type of the field, one of the constants."""
-        return self.type
-
-    def getTypeName(self) -> str:
-        """Type name, for instance `SFVec3f`."""
-        return self.type_name
-
-    def getCount(self) -> int:
-        """Number of values of a list; -1 for a single field."""
-        return self.count
-
     def getActualField(self) -> Field:
         """The field itself."""
         return self
 
     @property
     def name(self) -> str:
-        """See `getName`."""
+        """Name of the field."""
         return str(self._entry[0])
 
     @property
     def type_name(self) -> str:
-        """See `getTypeName`."""
+        """Type name, for instance `SFVec3f`."""
         name = _TYPES[(self.type & ~_MF) - 1]
         return name.replace("SF", "MF") if self.type & _MF else name
 
     @property
     def count(self) -> int:
-        """See `getCount`."""
+        """Number of values of a list; -1 for a single field."""
         if not self.type & _MF:
             complain(
                 "Error: wb_supervisor_field_get_count() can only be used with "
@@ -95,7 +92,8 @@ class Field:
         if not fits:
             complain("Error: new field value has wrong type or length.")
             return
-        self._write("value", value)
+        if self._is_allowed("value"):
+            self._entry[2] = list(value) if isinstance(value, list) else value
 
     def getSFBool(self) -> Any:
         """The value."""
@@ -104,21 +102,11 @@ class Field:
     getSFInt32 = getSFFloat = getSFString = getSFBool
     getSFVec2f = getSFVec3f = getSFRotation = getSFColor = getSFBool
 
-    def setSFBool(self, value: bool) -> None:
-        """Sets the value."""
+    def setSFBool(self, value: Any) -> None:
+        """Sets the value; one of another type is refused, an int for a float, too."""
         self.value = value
 
-    def setSFInt32(self, value: int) -> None:
-        """Sets the value."""
-        self.value = value
-
-    def setSFFloat(self, value: float) -> None:
-        """Sets the value; an int is refused."""
-        self.value = value
-
-    def setSFString(self, value: str) -> None:
-        """Sets the value."""
-        self.value = value
+    setSFInt32 = setSFFloat = setSFString = setSFBool
 
     def setSFVec2f(self, value: list[float]) -> None:
         """Sets the value; anything but a list is refused."""
@@ -176,22 +164,11 @@ class Field:
         if self.type == self.SF_NODE and self._is_allowed("removeSF"):
             self._entry[2] = -1
 
-    importMFNodeFromString: Any = unsupported("Field.importMFNodeFromString")
-    importMFNode: Any = unsupported("Field.importMFNode")
-    importSFNodeFromString: Any = unsupported("Field.importSFNodeFromString")
-    importSFNode: Any = unsupported("Field.importSFNode")
-    enableSFTracking: Any = unsupported("Field.enableSFTracking")
-    disableSFTracking: Any = unsupported("Field.disableSFTracking")
-
     def _set(self, call: str, value: list[float], length: int) -> None:
         if len(value) != length:
             complain(f"Error: {call}(): length of 'value' argument should be {length}.")
         else:
             self.value = value
-
-    def _write(self, call: str, value: Any) -> None:
-        if self._is_allowed(call):
-            self._entry[2] = list(value) if isinstance(value, list) else value
 
     def _is_allowed(self, call: str) -> bool:
         return connection.tell(call, self._node, self.name)

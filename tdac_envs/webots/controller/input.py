@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from .calls import getters, lacking
 from .connection import c_int
-from .messages import complain, once, unsupported
+from .messages import complain, once
 
 
+@getters("sampling_period", "key")
 class Keyboard:
     """A keyboard on which no key is ever pressed."""
 
@@ -29,11 +29,8 @@ class Keyboard:
         """Disables the device."""
         self.sampling_period = 0
 
-    def getSamplingPeriod(self) -> int:
-        """Sampling period given to `enable`, ms."""
-        return self.sampling_period
-
-    def getKey(self) -> int:
+    @property
+    def key(self) -> int:
         """Always -1: no key."""
         if self.sampling_period <= 0:
             complain(
@@ -41,11 +38,6 @@ class Keyboard:
                 "Please use: wb_keyboard_enable()."
             )
         return -1
-
-    @property
-    def key(self) -> int:
-        """See `getKey`."""
-        return self.getKey()
 
 
 class _NoInput:
@@ -60,17 +52,12 @@ class _NoInput:
     def disable(self) -> None:
         """Disables the device."""
 
-    getSamplingPeriod: Any = unsupported("getSamplingPeriod", 0)
 
-
+@lacking(getSamplingPeriod=0, getState=None)
 class Mouse(_NoInput):
     """A mouse that does not exist."""
 
-    getState: Any = unsupported("Mouse.getState")
 
-
+@lacking(getSamplingPeriod=0, isConnected=False, getPressedButton=-1)
 class Joystick(_NoInput):
     """A joystick that does not exist."""
-
-    isConnected: Any = unsupported("Joystick.isConnected", False)
-    getPressedButton: Any = unsupported("Joystick.getPressedButton", -1)

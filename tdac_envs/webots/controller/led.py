@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from .calls import getters
 from .connection import c_int
 from .device import Device
 
 
+@getters(get="value")
 class LED(Device):
     """An LED; its value has no effect."""
 
@@ -17,13 +19,9 @@ class LED(Device):
         """Sets the value; 0 is off."""
         self._value = c_int(value)
 
-    def get(self) -> int:
-        """The value that was set last."""
-        return self._value
-
     @property
     def value(self) -> int:
-        """See `get` and `set`."""
+        """The value that was set last."""
         return self._value
 
     @value.setter

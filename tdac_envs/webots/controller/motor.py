@@ -5,11 +5,32 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from .calls import constants, getters, lacking
 from .connection import c_double, connection
 from .device import Device
-from .messages import complain, unsupported
+from .messages import complain
 
 
+@getters(
+    "target_position",
+    "max_velocity",
+    "max_torque",
+    "position_sensor",
+    getVelocity="target_velocity",
+    getAcceleration="target_acceleration",
+    getAvailableTorque="_torque",
+    getAvailableForce="_torque",
+    getMaxForce="max_torque",
+)
+@constants(getMinPosition=0.0, getMaxPosition=0.0, getMultiplier=1.0, getType=0)
+@lacking(
+    setTorque=None,
+    setForce=None,
+    enableTorqueFeedback=None,
+    enableForceFeedback=None,
+    getTorqueFeedback=math.nan,
+    getForceFeedback=math.nan,
+)
 class Motor(Device):
     """A wheel motor; it holds position 0 until `setPosition` is called.
 
@@ -49,7 +70,11 @@ class Motor(Device):
 
     def setAvailableTorque(self, torque: float) -> None:
         """Stores the torque, N m; no effect: the motor always reaches its speed."""
-        self._set_torque(torque)
+        wanted = c_double(torque)
+        if wanted >= 0.0:
+            self._torque = min(wanted, self.max_torque)
+        else:
+            _refuse("set_available_torque", "negative 'torque' argument.")
 
     setAvailableForce = setAvailableTorque
 
@@ -60,123 +85,61 @@ class Motor(Device):
             gains, "pid", ("negative or zero", "negative", "negative"), strict=True
         ):
             if gain < 0.0 or (name == "p" and gain == 0.0):
-                complain(
-                    f"Error: wb_motor_set_control_pid() called with {words} '{name}' "
-                    "argument."
-                )
+                _refuse("set_control_pid", f"{words} '{name}' argument.")
                 return
         connection.command(self.name, "pid", gains)
 
-    def getTargetPosition(self) -> float:
-        """Angle given to `setPosition`, rad."""
-        return self.target_position
+    def getBrake(self) -> None:
+        """Always None: there is no brake."""
 
-    def getMinPosition(self) -> float:
-        """Always 0: no limit."""
-        return 0.0
-
-    def getMaxPosition(self) -> float:
-        """Always 0: no limit."""
-        return 0.0
-
-    def getVelocity(self) -> float:
-        """Velocity given to `setVelocity`, not the actual velocity, rad/s."""
-        return self.target_velocity
-
-    def getMaxVelocity(self) -> float:
+    @property
+    def max_velocity(self) -> float:
         """Maximum velocity, rad/s."""
-        return self.max_velocity
+        return float(self._facts.get("max_velocity", math.nan))
 
-    def getAcceleration(self) -> float:
-        """Acceleration given to `setAcceleration`, rad/s²."""
-        return self.target_acceleration
-
-    def getAvailableTorque(self) -> float:
-        """Torque given to `setAvailableTorque`, N m."""
-        return self._torque
-
-    def getMaxTorque(self) -> float:
+    @property
+    def max_torque(self) -> float:
         """Maximum torque, N m."""
-        return self.max_torque
+        return 10.0
 
-    getAvailableForce = getAvailableTorque
-    getMaxForce = getMaxTorque
-
-    def getMultiplier(self) -> float:
-        """Always 1."""
-        return 1.0
-
-    def getType(self) -> int:
-        """Always ROTATIONAL."""
-        return self.ROTATIONAL
-
-    def getPositionSensor(self) -> Any:
+    @property
+    def position_sensor(self) -> Any:
         """The wheel's position sensor."""
         from .robot import Robot
 
         name = self._facts.get("sensor", "")
         return getattr(Robot.created, "devices", {}).get(name)
 
-    def getBrake(self) -> None:
-        """Always None: there is no brake."""
-
-    setTorque: Any = unsupported("Motor.setTorque")
-    setForce: Any = unsupported("Motor.setForce")
-    enableTorqueFeedback: Any = unsupported("Motor.enableTorqueFeedback")
-    enableForceFeedback: Any = unsupported("Motor.enableForceFeedback")
-    getTorqueFeedback: Any = unsupported("Motor.getTorqueFeedback", math.nan)
-    getForceFeedback: Any = unsupported("Motor.getForceFeedback", math.nan)
-
-    @property
-    def max_velocity(self) -> float:
-        """See `getMaxVelocity`."""
-        return float(self._facts.get("max_velocity", math.nan))
-
-    @property
-    def max_torque(self) -> float:
-        """See `getMaxTorque`."""
-        return 10.0
-
-    @property
-    def position_sensor(self) -> Any:
-        """See `getPositionSensor`."""
-        return self.getPositionSensor()
-
     @property
     def target_position(self) -> float:
-        """See `setPosition`."""
+        """Angle given to `setPosition`, rad."""
         return self._position
 
     @target_position.setter
     def target_position(self, position: float) -> None:
         wanted = c_double(position)
         if math.isnan(wanted):
-            complain(
-                "Error: wb_motor_set_position() called with an invalid 'position' "
-                "argument (NaN)."
-            )
+            _refuse("set_position", "an invalid 'position' argument (NaN).")
             return
         self._position = wanted
         self._send("position", wanted)
 
     @property
     def target_velocity(self) -> float:
-        """See `setVelocity`."""
+        """Velocity given to `setVelocity`, not the actual velocity, rad/s."""
         return self._velocity
 
     @target_velocity.setter
     def target_velocity(self, velocity: float) -> None:
         wanted = c_double(velocity)
         if math.isnan(wanted):
-            complain(
-                "Error: wb_motor_set_velocity() called with an invalid 'velocity' "
-                "argument (NaN)."
-            )
+            _refuse("set_velocity", "an invalid 'velocity' argument (NaN).")
             return
         if wanted < 0.0 and not math.isinf(self._position):
-            complain(
-                "Error: wb_motor_set_velocity() called with negative 'velocity' "
-                f"argument in position control mode ({self._position:g})."
+            _refuse(
+                "set_velocity",
+                "negative 'velocity' argument in position control mode "
+                f"({self._position:g}).",
             )
             return
         self._velocity = wanted
@@ -184,7 +147,7 @@ class Motor(Device):
 
     @property
     def target_acceleration(self) -> float:
-        """See `setAcceleration`."""
+        """Acceleration given to `setAcceleration`, rad/s²."""
         return self._acceleration
 
     @target_acceleration.setter
@@ -192,24 +155,15 @@ class Motor(Device):
         wanted = c_double(acceleration)
         if math.isnan(wanted) or (wanted < 0.0 and wanted != -1.0):
             what = "an invalid" if math.isnan(wanted) else "negative"
-            complain(
-                f"Error: wb_motor_set_acceleration() called with {what} "
-                "'acceleration' argument."
-            )
+            _refuse("set_acceleration", f"{what} 'acceleration' argument.")
             return
         self._acceleration = wanted
         self._send("acceleration", wanted)
 
-    def _set_torque(self, torque: float) -> None:
-        wanted = c_double(torque)
-        if not wanted >= 0.0:
-            complain(
-                "Error: wb_motor_set_available_torque() called with negative 'torque' "
-                "argument."
-            )
-            return
-        self._torque = min(wanted, self.max_torque)
-
     def _send(self, what: str, value: float) -> None:
         if self._facts:
             connection.command(self.name, what, value)
+
+
+def _refuse(call: str, what: str) -> None:
+    complain(f"Error: wb_motor_{call}() called with {what}")

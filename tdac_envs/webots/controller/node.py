@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+from .calls import getters, lacking
 from .connection import connection
 from .field import Field
-from .messages import complain, unsupported
+from .messages import complain
 from .pose import absolute, moved, product, transposed
 
 _NAMES = (
@@ -31,11 +33,32 @@ _NAMES = (
 _NUMBERS = {name.replace("_", ""): number for number, name in enumerate(_NAMES)}
 
 
+@getters("id", "type", "type_name", "base_type_name", "number_of_fields", getDef="DEF")
+@lacking(
+    saveState=None,
+    restartController=None,
+    moveViewpoint=None,
+    setVisibility=None,
+    getContactPoints=(),
+    enableContactPointsTracking=None,
+    disableContactPointsTracking=None,
+    enablePoseTracking=None,
+    disablePoseTracking=None,
+    getCenterOfMass=None,
+    getStaticBalance=True,
+    exportString="",
+    getFromProtoDef=None,
+    getBaseNodeField=None,
+    getProtoField=None,
+)
 class Node:
     """A node.
 
     Args:
         number: Number of the node in the scene.
+
+    Attributes:
+        id: Number of the node.
     """
 
     NO_NODE, GROUP, ROBOT, COMPASS, DISTANCE_SENSOR, GPS = 0, 14, 34, 39, 42, 44
@@ -51,44 +74,24 @@ class Node:
     def __hash__(self) -> int:
         return hash(self.id)
 
-    def getId(self) -> int:
-        """Number of the node."""
-        return self.id
-
-    def getDef(self) -> str:
-        """DEF name, or empty."""
-        return self.DEF
-
-    def getType(self) -> int:
-        """Base type, one of the constants."""
-        return self.type
-
-    def getTypeName(self) -> str:
-        """Node type or name of the PROTO."""
-        return self.type_name
-
-    def getBaseTypeName(self) -> str:
-        """Node type; for a PROTO, its base type."""
-        return self.base_type_name
-
     @property
     def DEF(self) -> str:
-        """See `getDef`."""
+        """DEF name, or empty."""
         return str(self._data["def"])
 
     @property
     def type(self) -> int:
-        """See `getType`."""
+        """Base type, one of the constants."""
         return _NUMBERS.get(self.base_type_name.upper(), self.NO_NODE)
 
     @property
     def type_name(self) -> str:
-        """See `getTypeName`."""
+        """Node type or name of the PROTO."""
         return str(self._data["type"])
 
     @property
     def base_type_name(self) -> str:
-        """See `getBaseTypeName`."""
+        """Node type; for a PROTO, its base type."""
         return str(self._data["base"])
 
     def isProto(self) -> bool:
@@ -112,13 +115,9 @@ class Node:
         fields = self._data["fields"]
         return Field(self.id, fields[index]) if 0 <= index < len(fields) else None
 
-    def getNumberOfFields(self) -> int:
-        """Number of fields."""
-        return self.number_of_fields
-
     @property
     def number_of_fields(self) -> int:
-        """See `getNumberOfFields`."""
+        """Number of fields."""
         return len(self._data["fields"])
 
     def getPosition(self) -> list[float]:
@@ -145,71 +144,25 @@ class Node:
         own = self.id == connection.facts["self"]
         return list(connection.velocity) if own else [0.0] * 6
 
-    def setVelocity(self, velocity: list[float]) -> None:
-        """Forbidden in a judged run: ends it as a failure."""
-        del velocity
-        self._change("setVelocity")
-
-    def resetPhysics(self) -> None:
-        """Forbidden in a judged run: ends it as a failure."""
-        self._change("resetPhysics")
-
-    def remove(self) -> None:
-        """Forbidden in a judged run: ends it as a failure."""
-        self._change("remove")
-
-    def loadState(self, stateName: str) -> None:
-        """Forbidden in a judged run: ends it as a failure."""
-        del stateName
-        self._change("loadState")
-
-    def addForce(self, force: list[float], relative: bool) -> None:
-        """Forbidden in a judged run: ends it as a failure."""
-        del force, relative
-        self._change("addForce")
-
-    def addForceWithOffset(
-        self, force: list[float], offset: list[float], relative: bool
-    ) -> None:
-        """Forbidden in a judged run: ends it as a failure."""
-        del force, offset, relative
-        self._change("addForceWithOffset")
-
-    def addTorque(self, torque: list[float], relative: bool) -> None:
-        """Forbidden in a judged run: ends it as a failure."""
-        del torque, relative
-        self._change("addTorque")
-
-    def setJointPosition(self, position: float, index: int = 1) -> None:
-        """Forbidden in a judged run: ends it as a failure."""
-        del position, index
-        self._change("setJointPosition")
-
-    saveState: Any = unsupported("Node.saveState")
-    restartController: Any = unsupported("Node.restartController")
-    moveViewpoint: Any = unsupported("Node.moveViewpoint")
-    setVisibility: Any = unsupported("Node.setVisibility")
-    getContactPoints: Any = unsupported("Node.getContactPoints", ())
-    enableContactPointsTracking: Any = unsupported("Node.enableContactPointsTracking")
-    disableContactPointsTracking: Any = unsupported("Node.disableContactPointsTracking")
-    enablePoseTracking: Any = unsupported("Node.enablePoseTracking")
-    disablePoseTracking: Any = unsupported("Node.disablePoseTracking")
-    getCenterOfMass: Any = unsupported("Node.getCenterOfMass")
-    getStaticBalance: Any = unsupported("Node.getStaticBalance", True)
-    exportString: Any = unsupported("Node.exportString", "")
-    getFromProtoDef: Any = unsupported("Node.getFromProtoDef")
-    getBaseNodeField: Any = unsupported("Node.getBaseNodeField")
-    getProtoField: Any = unsupported("Node.getProtoField")
-
     def _place(self) -> tuple[list[float], list[list[float]]]:
         return absolute(connection.facts["scene"], connection.places, self.id)
 
-    def _change(self, call: str) -> None:
-        connection.tell(call, self.id)
+
+def _forbidden(call: str) -> Callable[..., None]:
+    def change(node: Node, *_: Any, **__: Any) -> None:
+        """Forbidden in a judged run: ends it as a failure."""
+        connection.tell(call, node.id)
+
+    return change
 
 
 for _number, _name in enumerate(_NAMES):
     setattr(Node, _name, _number)
+for _name in (
+    "setVelocity", "resetPhysics", "remove", "loadState", "addForce",
+    "addForceWithOffset", "addTorque", "setJointPosition",
+):  # fmt: skip
+    setattr(Node, _name, _forbidden(_name))
 
 
 def node_of(number: int) -> Node:

@@ -7,8 +7,9 @@ import struct
 from array import array
 from typing import Any
 
+from .calls import getters, lacking
 from .connection import c_double, connection
-from .messages import complain, unsupported
+from .messages import complain
 from .viewing import ViewingSensor
 
 _POINT = struct.Struct("=fffif")
@@ -40,27 +41,16 @@ class LidarPoint:
         return int(self.layer)
 
 
+@getters("fov", "min_range", "max_range")
 class _Ranging(ViewingSensor):
-    def getFov(self) -> float:
-        """Horizontal field of view, rad."""
-        return self.fov
-
-    def getMinRange(self) -> float:
-        """Smallest range, m."""
-        return self.min_range
-
-    def getMaxRange(self) -> float:
-        """Largest range, m."""
-        return self.max_range
-
     @property
     def min_range(self) -> float:
-        """See `getMinRange`."""
+        """Smallest range, m."""
         return float(self._facts.get("min_range", math.nan))
 
     @property
     def max_range(self) -> float:
-        """See `getMaxRange`."""
+        """Largest range, m."""
         return float(self._facts.get("max_range", math.nan))
 
     @property
@@ -79,6 +69,16 @@ class _Ranging(ViewingSensor):
         return [ranges[k : k + width] for k in range(0, len(ranges), width)]
 
 
+@getters(
+    "horizontal_resolution",
+    "number_of_layers",
+    "number_of_points",
+    "vertical_fov",
+    "frequency",
+    "min_frequency",
+    "max_frequency",
+    isPointCloudEnabled="_has_cloud",
+)
 class Lidar(_Ranging):
     """Measures distances along rays in one or more layers."""
 
@@ -120,10 +120,6 @@ class Lidar(_Ranging):
         """Disables `getPointCloud`."""
         self._has_cloud = False
 
-    def isPointCloudEnabled(self) -> bool:
-        """Whether `getPointCloud` is enabled."""
-        return self._has_cloud
-
     def getPointCloud(self, data_type: str = "list") -> Any:
         """The points in the lidar's axes, in the order of the range image.
 
@@ -142,78 +138,51 @@ class Lidar(_Ranging):
         layers = range(layer, layer + 1) if self._is_layer(getter, layer) else range(0)
         return self._cloud(getter, layers, data_type)
 
-    def getNumberOfPoints(self) -> int:
-        """Number of points; 0, with an error, if the point cloud is disabled."""
-        return self.number_of_points
-
-    def getHorizontalResolution(self) -> int:
-        """Number of rays in a layer."""
-        return self.horizontal_resolution
-
-    def getNumberOfLayers(self) -> int:
-        """Number of layers."""
-        return self.number_of_layers
-
-    def getVerticalFov(self) -> float:
-        """Angle between the first and the last layer, rad."""
-        return self.vertical_fov
-
-    def getFrequency(self) -> float:
-        """Frequency of a rotating head, Hz."""
-        return self.frequency
-
     def setFrequency(self, frequency: float) -> None:
         """Stores the frequency; no effect: each sample is a full turn."""
         self.frequency = frequency
 
-    def getMinFrequency(self) -> float:
-        """Smallest frequency, Hz."""
-        return self.min_frequency
-
-    def getMaxFrequency(self) -> float:
-        """Largest frequency, Hz."""
-        return self.max_frequency
-
     @property
     def horizontal_resolution(self) -> int:
-        """See `getHorizontalResolution`."""
+        """Number of rays in a layer."""
         return self.width
 
     @property
     def number_of_layers(self) -> int:
-        """See `getNumberOfLayers`."""
+        """Number of layers."""
         return self.height
 
     @property
     def number_of_points(self) -> int:
-        """See `getNumberOfPoints`."""
+        """Number of points; 0, with an error, if the point cloud is disabled."""
         if not self._gives_cloud("get_number_of_points"):
             return 0
         return self.width * self.height
 
     @property
     def vertical_fov(self) -> float:
-        """See `getVerticalFov`."""
+        """Angle between the first and the last layer, rad."""
         return float(self._facts.get("vertical_fov", math.nan))
 
     @property
     def min_frequency(self) -> float:
-        """See `getMinFrequency`."""
+        """Smallest frequency, Hz."""
         return float(self._min_frequency)
 
     @property
     def max_frequency(self) -> float:
-        """See `getMaxFrequency`."""
+        """Largest frequency, Hz."""
         return float(self._max_frequency)
 
     @property
     def frequency(self) -> float:
-        """See `getFrequency` and `setFrequency`."""
+        """Frequency of a rotating head, Hz; see `setFrequency`."""
         return float(self._frequency)
 
     @frequency.setter
     def frequency(self, frequency: float) -> None:
-        frequency, least, most = c_double(frequency), *self._limits()
+        frequency = c_double(frequency)
+        least, most = self.min_frequency, self.max_frequency
         if least <= frequency <= most:
             self._frequency = frequency
         else:
@@ -221,9 +190,6 @@ class Lidar(_Ranging):
                 f"Error: wb_lidar_set_frequency() out of frequency range [{least:f}, "
                 f"{most:f}]."
             )
-
-    def _limits(self) -> tuple[float, float]:
-        return self.min_frequency, self.max_frequency
 
     def _is_layer(self, getter: str, layer: int) -> bool:
         if 0 <= layer < self.height:
@@ -247,7 +213,7 @@ class Lidar(_Ranging):
 
     def _cloud(self, getter: str, layers: range, data_type: str) -> Any:
         ranges = self._ranges(getter) if self._gives_cloud(getter) else None
-        data = bytearray()
+        data, y_up = bytearray(), self._facts.get("y_up", False)
         for layer in layers if ranges is not None else ():
             elevation = self._facts["elevations"][layer]
             for column, azimuth in enumerate(self._facts["azimuths"]):
@@ -255,16 +221,15 @@ class Lidar(_Ranging):
                 flat = distance * math.cos(elevation)
                 forward, left = flat * math.cos(azimuth), flat * math.sin(azimuth)
                 up = distance * math.sin(elevation) if elevation else 0.0
-                axes = (-left, up, -forward) if self._y_up() else (forward, left, up)
+                axes = (-left, up, -forward) if y_up else (forward, left, up)
                 data += _POINT.pack(*axes, layer, connection.time)
         if data_type == "buffer":
             return data
         return [LidarPoint(data, k) for k in range(len(data) // _POINT.size)]
 
-    def _y_up(self) -> bool:
-        return bool(self._facts.get("y_up", False))
 
-
+@getters("width", "height")
+@lacking(saveImage=-1)
 class RangeFinder(_Ranging):
     """A depth camera."""
 
@@ -292,13 +257,3 @@ class RangeFinder(_Ranging):
     def rangeImageGetDepth(image: list[float], width: int, x: int, y: int) -> float:
         """Depth of a pixel of a range image."""
         return image[y * width + x]
-
-    def getWidth(self) -> int:
-        """Image width, pixels."""
-        return self.width
-
-    def getHeight(self) -> int:
-        """Image height, pixels."""
-        return self.height
-
-    saveImage: Any = unsupported("RangeFinder.saveImage", -1)

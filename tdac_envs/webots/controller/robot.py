@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 from . import camera, led, motor, ranges, sensors, unmodelled
+from .calls import getters, lacking
 from .connection import c_int, connection
 from .device import Device
 from .input import Joystick, Keyboard, Mouse
-from .messages import complain, unsupported
+from .messages import complain
 
 _KINDS: dict[str, type[Device]] = {
     "Motor": motor.Motor,
@@ -46,11 +48,43 @@ def _deprecated(getter: str) -> Callable[[Any, str], Device | None]:
     return get
 
 
+@getters(
+    "basic_time_step",
+    "custom_data",
+    "joystick",
+    "keyboard",
+    "mode",
+    "model",
+    "mouse",
+    "name",
+    "number_of_devices",
+    "project_path",
+    "supervisor",
+    "synchronization",
+    "time",
+    "world_path",
+)
+@lacking(
+    setMode=None,
+    getUrdf="",
+    getData="",
+    setData=None,
+    batterySensorEnable=None,
+    batterySensorDisable=None,
+    batterySensorGetSamplingPeriod=0,
+    batterySensorGetValue=math.nan,
+    wwiSendText=None,
+    wwiReceiveText=None,
+    waitForUserInputEvent=0,
+)
 class Robot:
     """The robot. A second instance prints an error and has no devices.
 
     Attributes:
         created: The first instance.
+        keyboard: The keyboard, on which no key is ever pressed.
+        mouse: The mouse, which gives no input.
+        joystick: The joystick, which gives no input.
     """
 
     MODE_SIMULATION, MODE_CROSS_COMPILATION, MODE_REMOTE_CONTROL = 0, 1, 2
@@ -95,129 +129,37 @@ class Robot:
         """The device at an index, from 0."""
         return list(self.devices.values())[index]
 
-    def getNumberOfDevices(self) -> int:
-        """Number of devices."""
-        return self.number_of_devices
-
-    def getBasicTimeStep(self) -> float:
-        """Basic time step of the world, ms."""
-        return self.basic_time_step
-
-    def getTime(self) -> float:
-        """Simulated time, s."""
-        return self.time
-
-    def getName(self) -> str:
-        """Name of the robot."""
-        return self.name
-
-    def getModel(self) -> str:
-        """Model of the robot."""
-        return self.model
-
-    def getCustomData(self) -> str:
-        """The robot's `customData` field."""
-        return self.custom_data
-
     def setCustomData(self, data: str) -> None:
         """Sets the robot's `customData` field."""
         self.custom_data = data
-
-    def getSupervisor(self) -> bool:
-        """Whether the robot is a supervisor."""
-        return self.supervisor
-
-    def getSynchronization(self) -> bool:
-        """The robot's `synchronization` field; the simulation always waits."""
-        return self.synchronization
-
-    def getMode(self) -> int:
-        """Always MODE_SIMULATION."""
-        return self.MODE_SIMULATION
 
     def getType(self) -> int:
         """Always `Node.ROBOT`."""
         return int(connection.facts["node_type"])
 
-    def getWorldPath(self) -> str:
-        """Path of the world file."""
-        return self.world_path
-
-    def getProjectPath(self) -> str:
-        """Path of the controller's folder."""
-        return self.project_path
-
-    def getKeyboard(self) -> Keyboard:
-        """The keyboard, on which no key is ever pressed."""
-        return self.keyboard
-
-    def getMouse(self) -> Mouse:
-        """The mouse, which gives no input."""
-        return self.mouse
-
-    def getJoystick(self) -> Joystick:
-        """The joystick, which gives no input."""
-        return self.joystick
-
-    getAccelerometer = _deprecated("getAccelerometer")
-    getCamera = _deprecated("getCamera")
-    getCompass = _deprecated("getCompass")
-    getDisplay = _deprecated("getDisplay")
-    getDistanceSensor = _deprecated("getDistanceSensor")
-    getEmitter = _deprecated("getEmitter")
-    getGPS = _deprecated("getGPS")
-    getGyro = _deprecated("getGyro")
-    getInertialUnit = _deprecated("getInertialUnit")
-    getLED = _deprecated("getLED")
-    getLidar = _deprecated("getLidar")
-    getLightSensor = _deprecated("getLightSensor")
-    getMotor = _deprecated("getMotor")
-    getPen = _deprecated("getPen")
-    getPositionSensor = _deprecated("getPositionSensor")
-    getRangeFinder = _deprecated("getRangeFinder")
-    getReceiver = _deprecated("getReceiver")
-    getSpeaker = _deprecated("getSpeaker")
-    getTouchSensor = _deprecated("getTouchSensor")
-
-    setMode: Any = unsupported("Robot.setMode")
-    getUrdf: Any = unsupported("Robot.getUrdf", "")
-    getData: Any = unsupported("Robot.getData", "")
-    setData: Any = unsupported("Robot.setData")
-    batterySensorEnable: Any = unsupported("Robot.batterySensorEnable")
-    batterySensorDisable: Any = unsupported("Robot.batterySensorDisable")
-    batterySensorGetSamplingPeriod: Any = unsupported(
-        "Robot.batterySensorGetSamplingPeriod", 0
-    )
-    batterySensorGetValue: Any = unsupported(
-        "Robot.batterySensorGetValue", float("nan")
-    )
-    wwiSendText: Any = unsupported("Robot.wwiSendText")
-    wwiReceiveText: Any = unsupported("Robot.wwiReceiveText")
-    waitForUserInputEvent: Any = unsupported("Robot.waitForUserInputEvent", 0)
-
     @property
     def basic_time_step(self) -> float:
-        """See `getBasicTimeStep`."""
+        """Basic time step of the world, ms."""
         return float(connection.facts["basic_time_step"])
 
     @property
     def time(self) -> float:
-        """See `getTime`."""
+        """Simulated time, s."""
         return connection.time
 
     @property
     def name(self) -> str:
-        """See `getName`."""
+        """Name of the robot."""
         return str(connection.facts["name"])
 
     @property
     def model(self) -> str:
-        """See `getModel`."""
+        """Model of the robot."""
         return str(connection.facts["model"])
 
     @property
     def custom_data(self) -> str:
-        """See `getCustomData`."""
+        """The robot's `customData` field."""
         return str(connection.facts["custom_data"])
 
     @custom_data.setter
@@ -226,30 +168,38 @@ class Robot:
 
     @property
     def supervisor(self) -> bool:
-        """See `getSupervisor`."""
+        """Whether the robot is a supervisor."""
         return bool(connection.facts["supervisor"])
 
     @property
     def synchronization(self) -> bool:
-        """See `getSynchronization`."""
+        """The robot's `synchronization` field; the simulation always waits."""
         return bool(connection.facts["synchronization"])
 
     @property
     def mode(self) -> int:
-        """See `getMode`."""
-        return self.getMode()
+        """Always MODE_SIMULATION."""
+        return self.MODE_SIMULATION
 
     @property
     def number_of_devices(self) -> int:
-        """See `getNumberOfDevices`."""
+        """Number of devices."""
         return len(connection.devices)
 
     @property
     def world_path(self) -> str:
-        """See `getWorldPath`."""
+        """Path of the world file."""
         return str(connection.facts["world_path"])
 
     @property
     def project_path(self) -> str:
-        """See `getProjectPath`."""
+        """Path of the controller's folder."""
         return str(connection.facts["project_path"])
+
+
+for _kind in (
+    "Accelerometer", "Camera", "Compass", "Display", "DistanceSensor", "Emitter", "GPS",
+    "Gyro", "InertialUnit", "LED", "Lidar", "LightSensor", "Motor", "Pen",
+    "PositionSensor", "RangeFinder", "Receiver", "Speaker", "TouchSensor",
+):  # fmt: skip
+    setattr(Robot, f"get{_kind}", _deprecated(f"get{_kind}"))

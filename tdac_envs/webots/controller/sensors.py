@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from .calls import constants, getters
 from .connection import c_int, connection
 from .device import Device
 from .messages import complain
 
 
+@getters("sampling_period")
 class Sensor(Device):
     """A sensor that samples periodically once it is enabled.
 
@@ -45,13 +47,9 @@ class Sensor(Device):
         """Stops sampling."""
         self.enable(0)
 
-    def getSamplingPeriod(self) -> int:
-        """Sampling period given to `enable`, ms."""
-        return self._period
-
     @property
     def sampling_period(self) -> int:
-        """See `getSamplingPeriod` and `enable`."""
+        """Sampling period given to `enable`, ms."""
         return self._period
 
     @sampling_period.setter
@@ -70,70 +68,49 @@ class Sensor(Device):
         return list(sample) if isinstance(sample, list) else sample
 
 
+@getters("value")
 class _Scalar(Sensor):
-    def getValue(self) -> float:
-        """The last sample, or NaN."""
-        return self.value
-
     @property
     def value(self) -> float:
-        """See `getValue`."""
+        """The last sample, or NaN."""
         return float(self._sample("get_value", math.nan))
 
 
+@getters("lookup_table")
 class _Table(_Scalar):
     """A sensor with a lookup table."""
 
-    def getLookupTable(self) -> list[float]:
-        """Rows of input, reading and relative noise, as a flat list."""
-        return self.lookup_table
-
     @property
     def lookup_table(self) -> list[float]:
-        """See `getLookupTable`."""
+        """Rows of input, reading and relative noise, as a flat list."""
         return list(self._facts.get("table", ()))
 
 
+@getters("max_value", "min_value", "aperture", "type")
 class DistanceSensor(_Table):
     """Measures the distance along one ray."""
 
     GENERIC, INFRA_RED, SONAR, LASER = 0, 1, 2, 3
     _c_name = "distance_sensor"
 
-    def getMaxValue(self) -> float:
-        """Highest reading."""
-        return self.max_value
-
-    def getMinValue(self) -> float:
-        """Lowest reading."""
-        return self.min_value
-
-    def getAperture(self) -> float:
-        """Aperture of the sensor's cone, rad."""
-        return self.aperture
-
-    def getType(self) -> int:
-        """Type: GENERIC, INFRA_RED, SONAR or LASER."""
-        return self.type
-
     @property
     def max_value(self) -> float:
-        """See `getMaxValue`."""
+        """Highest reading."""
         return max(self.lookup_table[1::3], default=math.nan)
 
     @property
     def min_value(self) -> float:
-        """See `getMinValue`."""
+        """Lowest reading."""
         return min(self.lookup_table[1::3], default=math.nan)
 
     @property
     def aperture(self) -> float:
-        """See `getAperture`."""
+        """Aperture of the sensor's cone, rad."""
         return float(self._facts.get("aperture", math.nan))
 
     @property
     def type(self) -> int:
-        """See `getType`."""
+        """Type: GENERIC, INFRA_RED, SONAR or LASER."""
         return int(self._facts.get("type", self.INFRA_RED))
 
 
@@ -143,80 +120,58 @@ class LightSensor(_Table):
     _c_name = "light_sensor"
 
 
+@getters("motor")
+@constants(getType=0)
 class PositionSensor(_Scalar):
     """Measures the angle by which a wheel has turned, rad."""
 
     ROTATIONAL, LINEAR = 0, 1
     _c_name = "position_sensor"
 
-    def getType(self) -> int:
-        """Always ROTATIONAL."""
-        return self.ROTATIONAL
-
-    def getMotor(self) -> Any:
-        """The wheel's motor."""
-        from .motor import Motor
-
-        return Motor(self._facts["motor"]) if self._facts else None
-
     def getBrake(self) -> None:
         """Always None: there is no brake."""
 
     @property
     def motor(self) -> Any:
-        """See `getMotor`."""
-        return self.getMotor()
+        """The wheel's motor."""
+        from .motor import Motor
+
+        return Motor(self._facts["motor"]) if self._facts else None
 
 
+@getters("values")
 class _Vector(Sensor):
-    def getValues(self) -> list[float]:
-        """The last sample, or NaNs."""
-        return self.values
-
     @property
     def values(self) -> list[float]:
-        """See `getValues`."""
+        """The last sample, or NaNs."""
         return list(self._sample("get_values", [math.nan] * 3))
 
 
+@getters("speed", "speed_vector")
+@constants(getCoordinateSystem=0)
 class GPS(_Vector):
     """Measures its position in the file's coordinates, m."""
 
     LOCAL, WGS84 = 0, 1
     _c_name = "gps"
 
-    def getSpeed(self) -> float:
-        """Speed of the robot, m/s; NaN before the first sample."""
-        return self.speed
-
-    def getSpeedVector(self) -> list[float]:
-        """Velocity of the robot, m/s; NaNs before the first sample."""
-        return self.speed_vector
-
-    def getCoordinateSystem(self) -> int:
-        """Always LOCAL."""
-        return self.LOCAL
-
     @property
     def speed(self) -> float:
-        """See `getSpeed`."""
+        """Speed of the robot, m/s; NaN before the first sample."""
         return math.hypot(*self.speed_vector)
 
     @property
     def speed_vector(self) -> list[float]:
-        """See `getSpeedVector`."""
+        """Velocity of the robot, m/s; NaNs before the first sample."""
         sampled = self.name in connection.values and self._period > 0
         return connection.velocity[:3] if sampled else [math.nan] * 3
 
 
+@getters("lookup_table")
 class Accelerometer(_Vector):
     """Measures the proper acceleration, m/s²; at rest 9.81 upwards."""
 
     _c_name = "accelerometer"
-
-    def getLookupTable(self) -> list[float]:
-        """See `lookup_table`."""
-        return self.lookup_table
 
     @property
     def lookup_table(self) -> list[float]:
@@ -240,29 +195,19 @@ class Compass(_Vector):
         return []
 
 
+@getters("roll_pitch_yaw", "quaternion")
+@constants(getNoise=0.0)
 class InertialUnit(Sensor):
     """Measures the orientation of the robot."""
 
     _c_name = "inertial_unit"
 
-    def getRollPitchYaw(self) -> list[float]:
-        """Roll, pitch and yaw, rad, or NaNs."""
-        return self.roll_pitch_yaw
-
-    def getQuaternion(self) -> list[float]:
-        """Quaternion (x, y, z, w), or NaNs."""
-        return self.quaternion
-
-    def getNoise(self) -> float:
-        """Always 0."""
-        return 0.0
-
     @property
     def roll_pitch_yaw(self) -> list[float]:
-        """See `getRollPitchYaw`."""
+        """Roll, pitch and yaw, rad, or NaNs."""
         return list(self._sample("get_roll_pitch_yaw", [math.nan] * 7))[:3]
 
     @property
     def quaternion(self) -> list[float]:
-        """See `getQuaternion`."""
+        """Quaternion (x, y, z, w), or NaNs."""
         return list(self._sample("get_quaternion", [math.nan] * 7))[3:]

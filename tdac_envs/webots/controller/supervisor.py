@@ -4,13 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
+from .calls import getters, lacking
 from .connection import c_int, connection
 from .device import Device
-from .messages import unsupported
 from .node import Node, may_supervise, node_of
 from .robot import Robot
 
 
+@getters(simulationGetMode="simulation_mode")
+@lacking(
+    setLabel=None,
+    worldSave=False,
+    exportImage=None,
+    movieStartRecording=None,
+    movieStopRecording=None,
+    movieIsReady=True,
+    movieFailed=False,
+    animationStartRecording=False,
+    animationStopRecording=False,
+    virtualRealityHeadsetIsUsed=False,
+)
 class Supervisor(Robot):
     """A robot with `supervisor TRUE`; without it, supervisor calls are refused.
 
@@ -58,10 +71,6 @@ class Supervisor(Robot):
         """Always None: nothing is selected."""
         may_supervise("wb_supervisor_node_get_selected")
 
-    def simulationGetMode(self) -> int:
-        """Mode given to `simulationSetMode`; initially SIMULATION_MODE_FAST."""
-        return self._mode
-
     def simulationSetMode(self, mode: int) -> None:
         """Stores the mode, without effect."""
         if may_supervise("wb_supervisor_simulation_set_mode"):
@@ -69,8 +78,8 @@ class Supervisor(Robot):
 
     @property
     def simulation_mode(self) -> int:
-        """See `simulationGetMode` and `simulationSetMode`."""
-        return self.simulationGetMode()
+        """Mode given to `simulationSetMode`; initially SIMULATION_MODE_FAST."""
+        return self._mode
 
     @simulation_mode.setter
     def simulation_mode(self, mode: int) -> None:
@@ -102,23 +111,6 @@ class Supervisor(Robot):
         del filename
         if may_supervise("wb_supervisor_world_load"):
             connection.tell("worldLoad")
-
-    setLabel: Any = unsupported("Supervisor.setLabel")
-    worldSave: Any = unsupported("Supervisor.worldSave", False)
-    exportImage: Any = unsupported("Supervisor.exportImage")
-    movieStartRecording: Any = unsupported("Supervisor.movieStartRecording")
-    movieStopRecording: Any = unsupported("Supervisor.movieStopRecording")
-    movieIsReady: Any = unsupported("Supervisor.movieIsReady", True)
-    movieFailed: Any = unsupported("Supervisor.movieFailed", False)
-    animationStartRecording: Any = unsupported(
-        "Supervisor.animationStartRecording", False
-    )
-    animationStopRecording: Any = unsupported(
-        "Supervisor.animationStopRecording", False
-    )
-    virtualRealityHeadsetIsUsed: Any = unsupported(
-        "Supervisor.virtualRealityHeadsetIsUsed", False
-    )
 
 
 def _scene() -> list[dict[str, Any]]:

@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from .calls import constants, getters, lacking
 from .connection import c_int
 from .device import Device
 from .messages import once, unsupported
 
 
+@getters(getSamplingPeriod="_period")
 class _Mute(Device):
     """A device that never returns data."""
 
@@ -29,10 +31,6 @@ class _Mute(Device):
     def disable(self) -> None:
         """Disables the device."""
         self._period = 0
-
-    def getSamplingPeriod(self) -> int:
-        """Sampling period given to `enable`, ms."""
-        return self._period
 
 
 class Unknown(_Mute):
@@ -58,70 +56,51 @@ class Unknown(_Mute):
         return results.get(call)
 
 
-class Emitter(_Mute):
+@getters(getChannel="_channel")
+class _Radio(_Mute):
+    CHANNEL_BROADCAST = -1
+    _channel = 1
+
+    def setChannel(self, channel: int) -> None:
+        """Sets the channel."""
+        self._channel = c_int(channel)
+
+
+@lacking(send=1, setRange=None, getRange=-1.0, getBufferSize=-1)
+class Emitter(_Radio):
     """An emitter without receivers."""
 
-    CHANNEL_BROADCAST = -1
-    _channel = 1
 
-    def getChannel(self) -> int:
-        """Channel given to `setChannel`."""
-        return self._channel
-
-    def setChannel(self, channel: int) -> None:
-        """Sets the channel."""
-        self._channel = c_int(channel)
-
-    send: Any = unsupported("Emitter.send", 1)
-    setRange: Any = unsupported("Emitter.setRange")
-    getRange: Any = unsupported("Emitter.getRange", -1.0)
-    getBufferSize: Any = unsupported("Emitter.getBufferSize", -1)
-
-
-class Receiver(_Mute):
+@constants(getQueueLength=0)
+@lacking(
+    nextPacket=None,
+    getString=None,
+    getBytes=None,
+    getData=None,
+    getFloats=None,
+    getInts=None,
+    getBools=None,
+    getDataSize=-1,
+    getSignalStrength=math.nan,
+    getEmitterDirection=(math.nan,) * 3,
+)
+class Receiver(_Radio):
     """A receiver whose queue is always empty."""
 
-    CHANNEL_BROADCAST = -1
-    _channel = 1
 
-    def getQueueLength(self) -> int:
-        """Always 0."""
-        return 0
-
-    def getChannel(self) -> int:
-        """Channel given to `setChannel`."""
-        return self._channel
-
-    def setChannel(self, channel: int) -> None:
-        """Sets the channel."""
-        self._channel = c_int(channel)
-
-    nextPacket: Any = unsupported("Receiver.nextPacket")
-    getString: Any = unsupported("Receiver.getString")
-    getBytes: Any = unsupported("Receiver.getBytes")
-    getData: Any = unsupported("Receiver.getData")
-    getFloats: Any = unsupported("Receiver.getFloats")
-    getInts: Any = unsupported("Receiver.getInts")
-    getBools: Any = unsupported("Receiver.getBools")
-    getDataSize: Any = unsupported("Receiver.getDataSize", -1)
-    getSignalStrength: Any = unsupported("Receiver.getSignalStrength", math.nan)
-    getEmitterDirection: Any = unsupported(
-        "Receiver.getEmitterDirection", (math.nan,) * 3
-    )
-
-
+@lacking(
+    playSound=None,
+    stop=None,
+    speak=None,
+    getEngine="",
+    setEngine=False,
+    getLanguage="",
+    setLanguage=False,
+    isSoundPlaying=False,
+    isSpeaking=False,
+)
 class Speaker(Device):
     """A speaker that makes no sound."""
-
-    playSound: Any = unsupported("Speaker.playSound")
-    stop: Any = unsupported("Speaker.stop")
-    speak: Any = unsupported("Speaker.speak")
-    getEngine: Any = unsupported("Speaker.getEngine", "")
-    setEngine: Any = unsupported("Speaker.setEngine", False)
-    getLanguage: Any = unsupported("Speaker.getLanguage", "")
-    setLanguage: Any = unsupported("Speaker.setLanguage", False)
-    isSoundPlaying: Any = unsupported("Speaker.isSoundPlaying", False)
-    isSpeaking: Any = unsupported("Speaker.isSpeaking", False)
 
 
 class Altimeter(Unknown):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from .connection import connection
@@ -39,7 +40,7 @@ class ViewingSensor(Sensor):
     @property
     def fov(self) -> float:
         """Horizontal field of view, rad."""
-        return float(self._facts.get("fov", float("nan")))
+        return float(self._facts.get("fov", math.nan))
 
     def _last(self, getter: str) -> bytes | None:
         """The last view, 4 bytes for each value, requested once for each sample.

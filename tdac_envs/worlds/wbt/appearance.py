@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from tdac_envs.worlds.wbt.fields import child, number, numbers
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 DARKEST = 0.2
 _MAPS = ("baseColorMap", "roughnessMap", "occlusionMap")
 
 
-def reflectance(shape: Node) -> float:
+def reflectance(shape: WbtNode) -> float:
     """The factor `f` of a Shape: a sensor measures its distance divided by `f`.
 
     f = 0.2 + 0.8 red (1 - transparency) (1 - roughness / 2); only a PBRAppearance has

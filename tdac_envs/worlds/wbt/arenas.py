@@ -6,10 +6,10 @@ import numpy as np
 
 from tdac_envs.worlds.footprint import THINNEST, Disc, Rectangle
 from tdac_envs.worlds.wbt.colours import floor_look, wall_look
-from tdac_envs.worlds.wbt.fields import number, numbers
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.fields import number, numbers, positive
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.placing import placed
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import Arena
 
 ARENAS = {"CircleArena", "RectangleArena", "Floor"}
@@ -17,7 +17,7 @@ _LEVEL = 0.02
 """Largest tilt at which a floor counts as level, rad."""
 
 
-def arena(node: Node, frame: Frame) -> Arena | str:
+def arena(node: WbtNode, frame: NodeFrame) -> Arena | str:
     """Reads a CircleArena, RectangleArena or Floor.
 
     Returns:
@@ -32,7 +32,7 @@ def arena(node: Node, frame: Frame) -> Arena | str:
     x, y, z = own.origin.tolist()
     stretch = np.linalg.norm(own.matrix, axis=0).tolist()
     if node.kind == "CircleArena":
-        radius = _positive(node, "radius", 1.0) * stretch[0]
+        radius = positive(node, "radius", 1.0) * stretch[0]
         inside: Disc | Rectangle = Disc(x, y, max(radius, THINNEST))
     else:
         name, default = ("size", 10.0) if node.kind == "Floor" else ("floorSize", 1.0)
@@ -46,16 +46,10 @@ def arena(node: Node, frame: Frame) -> Arena | str:
         )
     if node.kind == "Floor":
         return Arena(inside, z=z, floor_look=floor_look(node))
-    thickness = _positive(node, "wallThickness", 0.01) * stretch[0]
-    height = _positive(node, "wallHeight", 0.1) * stretch[2]
+    thickness = positive(node, "wallThickness", 0.01) * stretch[0]
+    height = positive(node, "wallHeight", 0.1) * stretch[2]
     facets = int(min(max(number(node, "subdivision", 48.0), 8.0), 200.0))
     return Arena(
         inside, max(thickness, THINNEST), max(height, THINNEST), z, facets,
         floor_look(node), wall_look(node),
     )  # fmt: skip
-
-
-def _positive(node: Node, name: str, default: float) -> float:
-    """A length; the default if it is not above 0, as in the PROTOs."""
-    length = number(node, name, default)
-    return length if length > 0.0 else default

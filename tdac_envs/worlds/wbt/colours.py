@@ -22,7 +22,7 @@ from tdac_envs.worlds.looks import (
     look_of_kind,
 )
 from tdac_envs.worlds.wbt.fields import child, number, numbers, text
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 Sky = tuple[Colour, Colour, Colour]
 """Colours of the sky above, at the horizon, and below it."""
@@ -69,7 +69,7 @@ _SURFACES: dict[str, Colour] = {
 _OWN_COLOURS = ("baseColor", "colorOverride", "color")
 
 
-def look(node: Node, field: str = "appearance") -> Look:
+def look(node: WbtNode, field: str = "appearance") -> Look:
     """The look that the appearance in a field gives; white if there is none."""
     with suppress(WorldError):
         found = child(node, field)
@@ -77,7 +77,7 @@ def look(node: Node, field: str = "appearance") -> Look:
     return GREY
 
 
-def proto_look(node: Node) -> Look:
+def proto_look(node: WbtNode) -> Look:
     """The look of a PROTO from its `appearance` or `color`, or the look of its type."""
     if "appearance" in node.fields:
         return look(node)
@@ -85,7 +85,7 @@ def proto_look(node: Node) -> Look:
     return Look(_colour(node, "color", usual.colour))
 
 
-def floor_look(node: Node) -> Look:
+def floor_look(node: WbtNode) -> Look:
     """The look of the floor of an arena or Floor."""
     names = ("appearance", "tileSize")
     if node.kind != "Floor":
@@ -109,13 +109,13 @@ def floor_look(node: Node) -> Look:
     return look(node, names[0])
 
 
-def wall_look(node: Node) -> Look:
+def wall_look(node: WbtNode) -> Look:
     """The look of the wall of an arena."""
     named = "wallAppearance" in node.fields
     return look(node, "wallAppearance") if named else ALUMINIUM
 
 
-def sky_of(nodes: Iterable[Node]) -> Sky:
+def sky_of(nodes: Iterable[WbtNode]) -> Sky:
     """The sky of a file; without a background it is black, as in Webots.
 
     Args:
@@ -129,7 +129,7 @@ def sky_of(nodes: Iterable[Node]) -> Sky:
     return BLACK_SKY
 
 
-def _look(appearance: Node) -> Look:
+def _look(appearance: WbtNode) -> Look:
     """The look that an appearance node gives."""
     if appearance.kind == "PBRAppearance":
         own, textured = appearance, "baseColorMap" in appearance.fields
@@ -150,14 +150,14 @@ def _look(appearance: Node) -> Look:
     return Look((red, green, blue), is_clear=number(own, "transparency", 0.0) > _CLEAR)
 
 
-def _is_chequered(appearance: Node) -> bool:
+def _is_chequered(appearance: WbtNode) -> bool:
     kind = appearance.kind
     return kind == "ChequeredParquetry" or (
         kind == "Parquetry" and text(appearance, "type") == "chequered"
     )
 
 
-def _tint(appearance: Node) -> Colour:
+def _tint(appearance: WbtNode) -> Colour:
     """The colour by which an appearance PROTO multiplies its texture."""
     for name in _OWN_COLOURS:
         if name in appearance.fields:
@@ -165,7 +165,7 @@ def _tint(appearance: Node) -> Colour:
     return 1.0, 1.0, 1.0
 
 
-def _colour(node: Node, name: str, default: Colour) -> Colour:
+def _colour(node: WbtNode, name: str, default: Colour) -> Colour:
     with suppress(WorldError):
         red, green, blue = (min(max(x, 0.0), 1.0) for x in numbers(node, name, default))
         return red, green, blue

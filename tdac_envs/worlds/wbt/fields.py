@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tdac_envs.core.errors import WorldFileError
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 LARGEST = 1e6
 """Largest absolute value of a number; real worlds span only a few metres."""
@@ -13,7 +13,7 @@ class StrayError(WorldFileError):
     """A number beyond `LARGEST`."""
 
 
-def numbers(node: Node, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+def numbers(node: WbtNode, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
     """The numbers of a field; `default` also sets their count.
 
     Raises:
@@ -32,18 +32,38 @@ def numbers(node: Node, name: str, default: tuple[float, ...]) -> tuple[float, .
     return found
 
 
-def number(node: Node, name: str, default: float) -> float:
+def number(node: WbtNode, name: str, default: float) -> float:
     """The number of a field; raises as `numbers` does."""
     return numbers(node, name, (default,))[0]
 
 
-def number_list(node: Node, name: str) -> tuple[float, ...]:
+def positive(
+    node: WbtNode, name: str, default: float, instead: float | None = None
+) -> float:
+    """A number above 0.
+
+    Args:
+        node: The node.
+        name: The field.
+        default: Value of a missing field.
+        instead: Value instead of one that is not above 0; by default the default.
+
+    Raises:
+        WorldError: As by `numbers`.
+    """
+    found = number(node, name, default)
+    if found > 0.0:
+        return found
+    return default if instead is None else instead
+
+
+def number_list(node: WbtNode, name: str) -> tuple[float, ...]:
     """All numbers of a field; raises as `numbers` does."""
     count = len(node.fields[name].items) if name in node.fields else 0
     return numbers(node, name, (0.0,) * count)
 
 
-def text(node: Node, name: str, default: str = "") -> str:
+def text(node: WbtNode, name: str, default: str = "") -> str:
     """The string of a field.
 
     Raises:
@@ -57,7 +77,7 @@ def text(node: Node, name: str, default: str = "") -> str:
     return items[0]
 
 
-def flag(node: Node, name: str, default: bool) -> bool:
+def flag(node: WbtNode, name: str, default: bool) -> bool:
     """The boolean of a field.
 
     Raises:
@@ -71,7 +91,7 @@ def flag(node: Node, name: str, default: bool) -> bool:
     return items[0]
 
 
-def child(node: Node, name: str) -> Node | None:
+def child(node: WbtNode, name: str) -> WbtNode | None:
     """The node of a field; None if it is NULL or the field is missing.
 
     Raises:
@@ -83,7 +103,7 @@ def child(node: Node, name: str) -> Node | None:
     return found[0] if found else None
 
 
-def children(node: Node, name: str = "children") -> tuple[Node, ...]:
+def children(node: WbtNode, name: str = "children") -> tuple[WbtNode, ...]:
     """The nodes of a field, without NULLs.
 
     Raises:
@@ -92,7 +112,7 @@ def children(node: Node, name: str = "children") -> tuple[Node, ...]:
     if name not in node.fields:
         return ()
     items = [item for item in node.fields[name].items if item is not None]
-    found = tuple(item for item in items if isinstance(item, Node))
+    found = tuple(item for item in items if isinstance(item, WbtNode))
     if len(found) != len(items):
         raise node.error(f"expected nodes for {name} of {node.kind}", name)
     return found

@@ -21,7 +21,7 @@ Y_UP_TO_Z_UP: Matrix = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
+class NodeFrame:
     """An affine map from a node's coordinates to the world's (ENU).
 
     Attributes:
@@ -39,21 +39,21 @@ class Frame:
         translation: ArrayLike = (0.0, 0.0, 0.0),
         rotation: tuple[float, ...] = (0.0, 0.0, 1.0, 0.0),
         scale: ArrayLike = (1.0, 1.0, 1.0),
-    ) -> Frame:
+    ) -> NodeFrame:
         """The frame of a child."""
         turn = axis_angle(*rotation) * np.asarray(scale, np.float64)
-        return Frame(self.matrix @ turn, self.at(translation), self.y_up)
+        return NodeFrame(self.matrix @ turn, self.at(translation), self.y_up)
 
     def at(self, point: ArrayLike) -> Vector:
         """World coordinates of points, shape (..., 3)."""
         at = np.asarray(point, np.float64)
         return np.asarray(at @ self.matrix.T + self.origin)
 
-    def flu(self) -> Frame:
+    def flu(self) -> NodeFrame:
         """The same frame with the axes forward, left, up."""
         if not self.y_up:
             return self
-        return Frame(self.matrix @ Y_UP_TO_Z_UP.T, self.origin, False)
+        return NodeFrame(self.matrix @ Y_UP_TO_Z_UP.T, self.origin, False)
 
     @property
     def heading(self) -> float:
@@ -67,10 +67,10 @@ class Frame:
         return math.atan2(math.hypot(x, y), z)
 
 
-def world_frame(z_up: bool, y_up_objects: bool) -> Frame:
+def world_frame(z_up: bool, y_up_objects: bool) -> NodeFrame:
     """The frame of the top-level nodes of a file."""
     matrix = np.eye(3) if z_up else Y_UP_TO_Z_UP
-    return Frame(matrix, np.zeros(3), y_up_objects)
+    return NodeFrame(matrix, np.zeros(3), y_up_objects)
 
 
 def flu_size(size: tuple[float, ...], y_up: bool) -> tuple[float, float, float]:

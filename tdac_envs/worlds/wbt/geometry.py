@@ -8,12 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tdac_envs.worlds.wbt.fields import child, children, number, number_list, numbers
-from tdac_envs.worlds.wbt.frames import Frame, flu_size
+from tdac_envs.worlds.wbt.fields import (
+    child,
+    children,
+    number_list,
+    numbers,
+    positive,
+)
+from tdac_envs.worlds.wbt.frames import NodeFrame, flu_size
 from tdac_envs.worlds.wbt.meshes import mesh
 from tdac_envs.worlds.wbt.placing import placed
 from tdac_envs.worlds.wbt.prisms import box, capsule, cone, cylinder, plane, sphere
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import Part
 
 GROUPS = {"Group", "Transform", "Pose"}
@@ -44,7 +50,7 @@ class Pieces:
         )
 
 
-def bounds(node: Node, frame: Frame) -> Pieces:
+def bounds(node: WbtNode, frame: NodeFrame) -> Pieces:
     """Converts a boundingObject: a geometry, or a Shape, Group, Transform or Pose.
 
     Args:
@@ -66,14 +72,14 @@ def bounds(node: Node, frame: Frame) -> Pieces:
     return Pieces(missing=() if level else ("a Plane that is not the ground",))
 
 
-def _is_plane(node: Node) -> bool:
+def _is_plane(node: WbtNode) -> bool:
     """Whether the geometry is a Plane, or an ElevationGrid of one height."""
     if node.kind == "ElevationGrid":
         return len(set(number_list(node, "height"))) <= 1
     return node.kind == "Plane"
 
 
-def geometry(node: Node, frame: Frame) -> Pieces:
+def geometry(node: WbtNode, frame: NodeFrame) -> Pieces:
     """Converts a geometry node.
 
     Args:
@@ -99,42 +105,53 @@ def geometry(node: Node, frame: Frame) -> Pieces:
 _Made = tuple[tuple[Part, ...], float]
 
 
-def _box(node: Node, frame: Frame, y_up: bool) -> _Made:
+def _box(node: WbtNode, frame: NodeFrame, y_up: bool) -> _Made:
     size = flu_size(numbers(node, "size", (2.0, 2.0, 2.0)), y_up)
     if min(size) <= 0.0:
         size = (1.0, 1.0, 1.0)  # as Webots does
     return box(frame, size), math.prod(size)
 
 
-def _sphere(node: Node, frame: Frame, _: bool) -> _Made:
-    radius = _positive(node, "radius", 1.0)
+def _sphere(node: WbtNode, frame: NodeFrame, _: bool) -> _Made:
+    radius = positive(node, "radius", 1.0, 1.0)
     return sphere(frame, radius), 4.0 / 3.0 * math.pi * radius**3
 
 
-def _cylinder(node: Node, frame: Frame, _: bool) -> _Made:
-    radius, height = _positive(node, "radius", 1.0), _positive(node, "height", 2.0)
+def _cylinder(node: WbtNode, frame: NodeFrame, _: bool) -> _Made:
+    radius, height = (
+        positive(node, "radius", 1.0, 1.0),
+        positive(node, "height", 2.0, 1.0),
+    )
     return cylinder(frame, radius, height), math.pi * radius**2 * height
 
 
-def _capsule(node: Node, frame: Frame, _: bool) -> _Made:
-    radius, height = _positive(node, "radius", 1.0), _positive(node, "height", 2.0)
+def _capsule(node: WbtNode, frame: NodeFrame, _: bool) -> _Made:
+    radius, height = (
+        positive(node, "radius", 1.0, 1.0),
+        positive(node, "height", 2.0, 1.0),
+    )
     volume = math.pi * radius**2 * (height + 4.0 / 3.0 * radius)
     return capsule(frame, radius, height), volume
 
 
-def _cone(node: Node, frame: Frame, _: bool) -> _Made:
-    radius = _positive(node, "bottomRadius", 1.0)
-    height = _positive(node, "height", 2.0)
+def _sizes(node: WbtNode) -> tuple[float, float]:
+    """Radius and height; 1 if one is not above 0, as in Webots."""
+    return positive(node, "radius", 1.0, 1.0), positive(node, "height", 2.0, 1.0)
+
+
+def _cone(node: WbtNode, frame: NodeFrame, _: bool) -> _Made:
+    radius = positive(node, "bottomRadius", 1.0, 1.0)
+    height = positive(node, "height", 2.0, 1.0)
     return cone(frame, radius, height), math.pi * radius**2 * height / 3.0
 
 
-def _plane(node: Node, frame: Frame, y_up: bool) -> _Made:
+def _plane(node: WbtNode, frame: NodeFrame, y_up: bool) -> _Made:
     size = numbers(node, "size", (1.0, 1.0))
     length, width = size[::-1] if y_up else size
     return plane(frame, abs(length), abs(width)), 0.0
 
 
-_PRIMITIVES: dict[str, Callable[[Node, Frame, bool], _Made]] = {
+_PRIMITIVES: dict[str, Callable[[WbtNode, NodeFrame, bool], _Made]] = {
     "Box": _box,
     "Capsule": _capsule,
     "Cone": _cone,
@@ -142,9 +159,3 @@ _PRIMITIVES: dict[str, Callable[[Node, Frame, bool], _Made]] = {
     "Plane": _plane,
     "Sphere": _sphere,
 }
-
-
-def _positive(node: Node, name: str, default: float) -> float:
-    """A length; 1 if it is not above 0, as in Webots."""
-    length = number(node, name, default)
-    return length if length > 0.0 else 1.0

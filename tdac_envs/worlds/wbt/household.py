@@ -9,24 +9,41 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from tdac_envs.worlds.wbt.appearance import factor_of_red
-from tdac_envs.worlds.wbt.body import Body
-from tdac_envs.worlds.wbt.fields import number, numbers
-from tdac_envs.worlds.wbt.frames import Frame, flu_size
+from tdac_envs.worlds.wbt.fields import number, numbers, positive
+from tdac_envs.worlds.wbt.frames import NodeFrame, flu_size
 from tdac_envs.worlds.wbt.placing import Point, placed
 from tdac_envs.worlds.wbt.prisms import box, capsule, cylinder, sphere
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import Part
-
-Reader = Callable[[Node, Frame], Body]
 
 _LYING: tuple[float, float, float, float] = (0.0, 1.0, 0.0, math.pi / 2)
 
 
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A PROTO converted to prisms.
+
+    Attributes:
+        frame: Frame of the PROTO.
+        solid: Parts for collisions.
+        visible: Parts that sensors see.
+        mass: Mass, kg; None if the body is fixed.
+        reflectance: Reflectance of all parts.
+    """
+
+    frame: NodeFrame
+    solid: tuple[Part, ...]
+    visible: tuple[Part, ...]
+    mass: float | None = None
+    reflectance: float = 1.0
+
+
 def _body(
-    node: Node,
-    own: Frame,
+    node: WbtNode,
+    own: NodeFrame,
     parts: tuple[Part, ...],
     mass: float | None,
     reflectance: float = 1.0,
@@ -35,11 +52,14 @@ def _body(
     return Body(own, parts, parts, mass if mass else None, reflectance)
 
 
+Reader = Callable[[WbtNode, NodeFrame], Body]
+
+
 def _ball(radius: float, mass: float, default: Point = (0.0, 0.0, 0.0)) -> Reader:
-    def read(node: Node, frame: Frame) -> Body:
+    def read(node: WbtNode, frame: NodeFrame) -> Body:
         own = placed(node, frame, default)
-        size = number(node, "radius", radius)
-        return _body(node, own, sphere(own.flu(), size if size > 0.0 else radius), mass)
+        parts = sphere(own.flu(), positive(node, "radius", radius))
+        return _body(node, own, parts, mass)
 
     return read
 
@@ -55,7 +75,7 @@ def _columns(
         default: Translation if the file gives none, m.
     """
 
-    def read(node: Node, frame: Frame) -> Body:
+    def read(node: WbtNode, frame: NodeFrame) -> Body:
         own = placed(node, frame, default)
         local = own.flu()
         parts: tuple[Part, ...] = ()
@@ -67,21 +87,21 @@ def _columns(
     return read
 
 
-def _obstacle(node: Node, frame: Frame) -> Body:
+def _obstacle(node: WbtNode, frame: NodeFrame) -> Body:
     own = placed(node, frame, (0.0, 0.0, 0.025))
     red = numbers(node, "color", (1.0, 0.501961, 0.25098))[0]
     parts = cylinder(own.flu(), 0.04, 0.05)
     return _body(node, own, parts, None, factor_of_red(0.8 * red))
 
 
-def _maze_block(node: Node, frame: Frame) -> Body:
+def _maze_block(node: WbtNode, frame: NodeFrame) -> Body:
     own = placed(node, frame)
     size = (0.015, number(node, "length", 0.1), 0.065)
     parts = box(own.flu().inside((0.0, 0.0, size[2] / 2)), size)
     return Body(own, parts, parts, 200.0 * math.prod(size))
 
 
-def _cereal_box(node: Node, frame: Frame) -> Body:
+def _cereal_box(node: WbtNode, frame: NodeFrame) -> Body:
     usual = (0.08, 0.3, 0.2) if frame.y_up else (0.2, 0.08, 0.3)
     size = flu_size(numbers(node, "size", usual), frame.y_up)
     own = placed(node, frame)
@@ -89,7 +109,7 @@ def _cereal_box(node: Node, frame: Frame) -> Body:
     return _body(node, own, parts, 1.0)
 
 
-def _flag(node: Node, frame: Frame) -> Body:
+def _flag(node: WbtNode, frame: NodeFrame) -> Body:
     own = placed(node, frame)
     local = own.flu()
     parts = cylinder(local.inside((0.0, 0.0, 0.015)), 0.1, 0.03)
@@ -97,7 +117,7 @@ def _flag(node: Node, frame: Frame) -> Body:
     return Body(own, parts, parts)
 
 
-def _cat(node: Node, frame: Frame) -> Body:
+def _cat(node: WbtNode, frame: NodeFrame) -> Body:
     own, scale = placed(node, frame), scale_of(node)
     local = own.flu().inside(scale=(scale, scale, scale))
     parts: tuple[Part, ...] = ()
@@ -109,7 +129,7 @@ def _cat(node: Node, frame: Frame) -> Body:
     return _body(node, own, parts + capsule(body, 0.055, 0.2), 2.5)
 
 
-def _dog(node: Node, frame: Frame) -> Body:
+def _dog(node: WbtNode, frame: NodeFrame) -> Body:
     own, scale = placed(node, frame), scale_of(node)
     local = own.flu().inside(scale=(scale, scale, scale))
     parts: tuple[Part, ...] = ()
@@ -121,10 +141,9 @@ def _dog(node: Node, frame: Frame) -> Body:
     return Body(own, parts, parts)
 
 
-def scale_of(node: Node) -> float:
+def scale_of(node: WbtNode) -> float:
     """The field `scale` of a PROTO, if it is above 0; else 1."""
-    scale = number(node, "scale", 1.0)
-    return scale if scale > 0.0 else 1.0
+    return positive(node, "scale", 1.0)
 
 
 HOUSEHOLD: dict[str, Reader] = {

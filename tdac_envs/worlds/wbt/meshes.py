@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from tdac_envs.worlds.footprint import THINNEST
 from tdac_envs.worlds.wbt.fields import child, number_list
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.prisms import hull
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import Part
 
 MOST_FACES = 1000
@@ -21,7 +21,7 @@ Points = NDArray[np.float64]
 Face = NDArray[np.int64]
 
 
-def mesh(node: Node, frame: Frame) -> tuple[Part, ...] | str:
+def mesh(node: WbtNode, frame: NodeFrame) -> tuple[Part, ...] | str:
     """The prisms of an IndexedFaceSet.
 
     A convex mesh becomes one prism. Any other mesh becomes one prism per face, each as
@@ -65,7 +65,7 @@ def _over_faces(
     return parts or hull(used)
 
 
-def _points(node: Node) -> Points:
+def _points(node: WbtNode) -> Points:
     coordinate = child(node, "coord")
     flat = () if coordinate is None else number_list(coordinate, "point")
     if coordinate is not None and len(flat) % 3:
@@ -73,7 +73,7 @@ def _points(node: Node) -> Points:
     return np.array(flat, np.float64).reshape(-1, 3)
 
 
-def _faces(node: Node, count: int) -> list[Face]:
+def _faces(node: WbtNode, count: int) -> list[Face]:
     """Point indices of each face; faces of fewer than three points are dropped."""
     flat = np.array(number_list(node, "coordIndex"), np.float64)
     index = flat.astype(np.int64)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from tdac_envs.worlds.wbt.fields import child, number
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 _LIGHTEST = 1e-6
 _DENSITY = 1000.0
 
 
-def mass_of(node: Node, volume: float) -> float | None:
+def mass_of(node: WbtNode, volume: float) -> float | None:
     """The mass of a Solid, kg, from its `physics` field; None if it is fixed.
 
     Args:

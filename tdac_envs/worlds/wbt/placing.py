@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tdac_envs.worlds.wbt.fields import LARGEST, StrayError, numbers
-from tdac_envs.worlds.wbt.frames import Frame, own_axes
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.frames import NodeFrame, own_axes
+from tdac_envs.worlds.wbt.tree import WbtNode
 
 Point = tuple[float, float, float]
 
@@ -16,8 +16,8 @@ _NO_SCALE = (1.0, 1.0, 1.0)
 
 
 def placed(
-    node: Node, frame: Frame, default: Point = _ORIGIN, *, scaled: bool = False
-) -> Frame:
+    node: WbtNode, frame: NodeFrame, default: Point = _ORIGIN, *, scaled: bool = False
+) -> NodeFrame:
     """The frame of a node.
 
     Args:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from tdac_envs.core.errors import WorldError
 from tdac_envs.worlds.footprint import THINNEST, Disc, Footprint, Polygon, Rectangle
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.world import Part
 
 CLOSE = 1e-5
@@ -30,14 +30,14 @@ _OUT = math.sqrt(2.0 * math.pi / (_ROUND * math.sin(2.0 * math.pi / _ROUND)))
 _CIRCLE: Vectors = _OUT * np.column_stack([np.cos(_TURNS), np.sin(_TURNS)])
 
 
-def box(frame: Frame, size: ArrayLike) -> tuple[Part, ...]:
+def box(frame: NodeFrame, size: ArrayLike) -> tuple[Part, ...]:
     """A box centred on the frame's origin."""
     halves = (frame.matrix * (np.asarray(size, np.float64) / 2)).T
     low, high = _heights(frame, float(np.abs(halves[:, 2]).sum()))
     return (Part(_zonotope(frame.origin[:2], halves[:, :2]), low, high),)
 
 
-def sphere(frame: Frame, radius: float) -> tuple[Part, ...]:
+def sphere(frame: NodeFrame, radius: float) -> tuple[Part, ...]:
     """A sphere centred on the frame's origin; an ellipsoid if the frame scales."""
     rows = frame.matrix * radius
     low, high = _heights(frame, float(np.linalg.norm(rows[2])))
@@ -48,7 +48,7 @@ def sphere(frame: Frame, radius: float) -> tuple[Part, ...]:
     return (Part(_around(frame.origin[:2] + _CIRCLE @ axes.T), low, high),)
 
 
-def cylinder(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
+def cylinder(frame: NodeFrame, radius: float, height: float) -> tuple[Part, ...]:
     """A cylinder centred on the frame's origin, along its z."""
     axis = frame.matrix[:, 2] * (height / 2)
     rim = frame.matrix[:, :2] * radius
@@ -65,7 +65,7 @@ def cylinder(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
     return (Part(_around(np.vstack([ends - axis[:2], ends + axis[:2]])), low, high),)
 
 
-def capsule(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
+def capsule(frame: NodeFrame, radius: float, height: float) -> tuple[Part, ...]:
     """A cylinder with a hemisphere on each end; `height` excludes these."""
     axis = frame.matrix[:, 2] * (height / 2)
     if math.hypot(*axis[:2]) <= CLOSE:
@@ -73,7 +73,7 @@ def capsule(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
         low, high = ball.bottom - abs(axis[2]), ball.top + abs(axis[2])
         return (Part(ball.shape, low, high),)
     balls = [
-        sphere(Frame(frame.matrix, frame.origin + side * axis, False), radius)[0]
+        sphere(NodeFrame(frame.matrix, frame.origin + side * axis, False), radius)[0]
         for side in (-1.0, 1.0)
     ]
     discs = [ball.shape for ball in balls]
@@ -82,7 +82,7 @@ def capsule(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
     return (*balls, Part(between, low, high))
 
 
-def cone(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
+def cone(frame: NodeFrame, radius: float, height: float) -> tuple[Part, ...]:
     """A cone centred on the frame's origin, its apex towards +z."""
     axis = frame.matrix[:, 2] * (height / 2)
     rim = frame.matrix[:, :2] * radius
@@ -93,7 +93,7 @@ def cone(frame: Frame, radius: float, height: float) -> tuple[Part, ...]:
     return hull(np.vstack([base, frame.at((0.0, 0.0, height / 2))]))
 
 
-def plane(frame: Frame, length: float, width: float) -> tuple[Part, ...]:
+def plane(frame: NodeFrame, length: float, width: float) -> tuple[Part, ...]:
     """A flat rectangle perpendicular to the frame's z."""
     return box(frame, (length, width, 0.0))
 
@@ -104,7 +104,7 @@ def hull(points: Vectors) -> tuple[Part, ...]:
     return (Part(_around(points[:, :2]), low, high),)
 
 
-def _heights(frame: Frame, reach: float) -> tuple[float, float]:
+def _heights(frame: NodeFrame, reach: float) -> tuple[float, float]:
     z = float(frame.origin[2])
     return z - reach, z + reach
 

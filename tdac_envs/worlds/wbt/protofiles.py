@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from tdac_envs.core.errors import WorldError
@@ -17,7 +18,15 @@ from tdac_envs.core.intake import read_file
 from tdac_envs.worlds.wbt.arenas import ARENAS
 from tdac_envs.worlds.wbt.protos import PROTOS
 from tdac_envs.worlds.wbt.robots import ROBOTS, is_epuck
-from tdac_envs.worlds.wbt.tree import Document, Field, Item, Node, parse
+from tdac_envs.worlds.wbt.tree import (
+    Document,
+    Item,
+    WbtField,
+    WbtNode,
+    parse,
+    rebuilt,
+    with_fields,
+)
 
 LARGEST_PROTO = 2_000_000
 """Maximum size of a PROTO file, bytes."""
@@ -44,8 +53,8 @@ class Proto:
         body: The node of which it consists, with marks where it uses a field.
     """
 
-    defaults: dict[str, Field]
-    body: Node
+    defaults: dict[str, WbtField]
+    body: WbtNode
 
 
 @dataclass(slots=True)
@@ -70,7 +79,7 @@ class ProtoFolder:
         """Names of the fields of each PROTO that was expanded."""
         return {kind: proto.defaults for kind, proto in self._known.items() if proto}
 
-    def _expand(self, node: Node, depth: int) -> Node:
+    def _expand(self, node: WbtNode, depth: int) -> WbtNode:
         if node.kind in ROBOTS or is_epuck(node):
             return node
         if node.kind not in PROTOS and node.kind not in ARENAS and depth < DEEPEST:
@@ -79,19 +88,7 @@ class ProtoFolder:
                 made = _filled(proto.body, {**proto.defaults, **node.fields})
                 define = node.define or made.define
                 return self._expand(replace(made, define=define), depth + 1)
-        fields = {name: self._inside(own, depth) for name, own in node.fields.items()}
-        if all(fields[name] is own for name, own in node.fields.items()):
-            return node
-        return _with(node, fields)
-
-    def _inside(self, own: Field, depth: int) -> Field:
-        items = tuple(
-            self._expand(item, depth) if isinstance(item, Node) else item
-            for item in own.items
-        )
-        if all(new is old for new, old in zip(items, own.items, strict=True)):
-            return own
-        return Field(items, own.offset)
+        return rebuilt(node, partial(self._expand, depth=depth))
 
     def _proto(self, kind: str) -> Proto | None:
         if kind not in self._known:
@@ -150,27 +147,21 @@ def _closing(text: str, start: int) -> int:
     return -1
 
 
-def _filled(node: Node, values: dict[str, Field]) -> Node:
+def _filled(node: WbtNode, values: dict[str, WbtField]) -> WbtNode:
     """The node with values instead of marks; fields without a value are left out."""
-    fields: dict[str, Field] = {}
+    fields: dict[str, WbtField] = {}
     for name, own in node.fields.items():
         items = tuple(_items(own.items, values))
         if items or not own.items:
-            fields[name] = Field(items, own.offset)
-    return _with(node, fields)
+            fields[name] = WbtField(items, own.offset)
+    return with_fields(node, fields)
 
 
-def _items(items: Iterable[Item], values: dict[str, Field]) -> Iterable[Item]:
+def _items(items: Iterable[Item], values: dict[str, WbtField]) -> Iterable[Item]:
     for item in items:
-        if not isinstance(item, Node):
+        if not isinstance(item, WbtNode):
             yield item
         elif item.kind == _MARK:
             yield from values[item.define].items if item.define in values else ()
         else:
             yield _filled(item, values)
-
-
-def _with(node: Node, fields: dict[str, Field]) -> Node:
-    parts = (item for own in fields.values() for item in own.items)
-    size = 1 + sum(part.size for part in parts if isinstance(part, Node))
-    return replace(node, fields=fields, size=size)

@@ -13,14 +13,13 @@ import numpy as np
 
 from tdac_envs.worlds.footprint import THINNEST, ring
 from tdac_envs.worlds.wbt.appearance import reflectance
-from tdac_envs.worlds.wbt.body import Body
-from tdac_envs.worlds.wbt.fields import flag, number, numbers, text
-from tdac_envs.worlds.wbt.frames import Frame, flu_size, own_axes
-from tdac_envs.worlds.wbt.household import HOUSEHOLD, scale_of
+from tdac_envs.worlds.wbt.fields import flag, number, numbers, positive, text
+from tdac_envs.worlds.wbt.frames import NodeFrame, flu_size, own_axes
+from tdac_envs.worlds.wbt.household import HOUSEHOLD, Body, scale_of
 from tdac_envs.worlds.wbt.physics import mass_of
 from tdac_envs.worlds.wbt.placing import Point, placed
 from tdac_envs.worlds.wbt.prisms import Vectors, box, capsule, cone, cylinder, hull
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import Part
 
 Size = tuple[float, float, float]
@@ -57,14 +56,14 @@ _ROCKS: dict[str, tuple[list[tuple[float, float]], float, float]] = {
 }  # fmt: skip
 
 
-def _wooden_box(node: Node, frame: Frame) -> Body:
+def _wooden_box(node: WbtNode, frame: NodeFrame) -> Body:
     size = _clamped(_size(node, frame, (0.6, 0.6, 0.6)), 0.01, 3.0)
     own = placed(node, frame, (0.0, 0.0, 0.3))
     parts = box(own.flu(), size)
     return Body(own, parts, parts, _box_mass(node, size, 1000.0), _WOOD)
 
 
-def _cardboard_box(node: Node, frame: Frame) -> Body:
+def _cardboard_box(node: WbtNode, frame: NodeFrame) -> Body:
     size = _size(node, frame, (0.6, 0.6, 0.6))
     if not 1e-6 <= math.prod(size) <= 1.0:
         size = (0.6, 0.6, 0.6)
@@ -74,7 +73,7 @@ def _cardboard_box(node: Node, frame: Frame) -> Body:
     return Body(own, parts, parts, _box_mass(node, size, 100.0))
 
 
-def _solid_box(node: Node, frame: Frame) -> Body:
+def _solid_box(node: WbtNode, frame: NodeFrame) -> Body:
     size = _size(node, frame, (2.0, 2.0, 2.0))
     own = placed(node, frame, (0.0, 0.0, 1.0))
     parts = box(own.flu(), size)
@@ -82,24 +81,24 @@ def _solid_box(node: Node, frame: Frame) -> Body:
     return Body(own, solid, parts, mass_of(node, math.prod(size)), reflectance(node))
 
 
-def _plastic_crate(node: Node, frame: Frame) -> Body:
-    own, parts = _standing(node, frame, (0.6, 0.6, 0.6))
+def _plastic_crate(node: WbtNode, frame: NodeFrame) -> Body:
+    own, parts = _on_floor(node, frame, (0.6, 0.6, 0.6))
     mass = number(node, "mass", 0.0)
     return Body(own, parts, parts, mass if mass > 1e-6 else None)
 
 
-def _wooden_pallet(node: Node, frame: Frame) -> Body:
-    own, parts = _standing(node, frame, (1.2, 0.8, 0.14))
+def _wooden_pallet(node: WbtNode, frame: NodeFrame) -> Body:
+    own, parts = _on_floor(node, frame, (1.2, 0.8, 0.14))
     # Older versions lack this field and always have a boundingObject.
     return Body(own, parts if flag(node, "boundingObject", True) else (), parts)
 
 
-def _wall(node: Node, frame: Frame) -> Body:
-    own, parts = _standing(node, frame, (0.2, 1.0, 2.4))
+def _wall(node: WbtNode, frame: NodeFrame) -> Body:
+    own, parts = _on_floor(node, frame, (0.2, 1.0, 2.4))
     return Body(own, parts, parts, reflectance=reflectance(node))
 
 
-def _rock(node: Node, frame: Frame) -> Body:
+def _rock(node: WbtNode, frame: NodeFrame) -> Body:
     kind = text(node, "type", "regular")
     if kind not in _ROCKS:
         raise node.error(
@@ -115,15 +114,15 @@ def _rock(node: Node, frame: Frame) -> Body:
     return Body(own, parts, parts, mass_of(node, volume))
 
 
-def _oil_barrel(node: Node, frame: Frame) -> Body:
-    radius = _positive(node, "radius", 0.305)
-    height = _positive(node, "height", 0.88)
+def _oil_barrel(node: WbtNode, frame: NodeFrame) -> Body:
+    radius = positive(node, "radius", 0.305)
+    height = positive(node, "height", 0.88)
     own = placed(node, frame, (0.0, 0.0, 0.44))
     parts = cylinder(own.flu(), radius, height)
     return Body(own, parts, parts, mass_of(node, math.pi * radius**2 * height))
 
 
-def _traffic_cone(node: Node, frame: Frame) -> Body:
+def _traffic_cone(node: WbtNode, frame: NodeFrame) -> Body:
     own, scale = placed(node, frame), scale_of(node)
     local = own.flu().inside(scale=(scale, scale, scale))
     base = box(local.inside((0.0, 0.0, 0.01125)), (0.5, 0.5, 0.0225))
@@ -138,9 +137,9 @@ def _traffic_cone(node: Node, frame: Frame) -> Body:
     return Body(own, solid, visible, mass_of(node, 0.03 * scale**3))
 
 
-def _solid_pipe(node: Node, frame: Frame) -> Body:
-    radius = max(_positive(node, "radius", 1.0), _NARROWEST)
-    height = _positive(node, "height", 2.0)
+def _solid_pipe(node: WbtNode, frame: NodeFrame) -> Body:
+    radius = max(positive(node, "radius", 1.0), _NARROWEST)
+    height = positive(node, "height", 2.0)
     thickness = number(node, "thickness", 0.1)
     if not 0.0 < thickness < radius:
         thickness = radius / 2  # as Webots does
@@ -157,14 +156,14 @@ def _solid_pipe(node: Node, frame: Frame) -> Body:
     return Body(own, solid, parts, mass_of(node, volume), reflectance(node))
 
 
-def _facets(node: Node, radius: float, thickness: float) -> int:
+def _facets(node: WbtNode, radius: float, thickness: float) -> int:
     """Webots' number of facets; more if that deviates too much from a round pipe."""
     own = number(node, "subdivision", 24.0)
     smooth = math.pi / math.sqrt(2.0 * _ROUNDNESS * thickness / radius)
     return math.ceil(min(max(own, smooth, 8.0), 200.0))
 
 
-PROTOS: dict[str, Callable[[Node, Frame], Body]] = {
+PROTOS: dict[str, Callable[[WbtNode, NodeFrame], Body]] = {
     "CardboardBox": _cardboard_box,
     "OilBarrel": _oil_barrel,
     "PlasticCrate": _plastic_crate,
@@ -180,23 +179,23 @@ PROTOS: dict[str, Callable[[Node, Frame], Body]] = {
 """The reader of each type."""
 
 
-def _standing(
-    node: Node, frame: Frame, default: Size
-) -> tuple[Frame, tuple[Part, ...]]:
+def _on_floor(
+    node: WbtNode, frame: NodeFrame, default: Size
+) -> tuple[NodeFrame, tuple[Part, ...]]:
     """A box whose origin is the centre of its bottom face."""
     size, own = _size(node, frame, default), placed(node, frame)
     return own, box(own.flu().inside((0.0, 0.0, size[2] / 2)), size)
 
 
 def _column(
-    frame: Frame, outline: Vectors, low: float, high: float
+    frame: NodeFrame, outline: Vectors, low: float, high: float
 ) -> tuple[Part, ...]:
     """A convex outline, extruded along z."""
     ends = [np.column_stack([outline, np.full(len(outline), z)]) for z in (low, high)]
     return hull(frame.at(np.vstack(ends)))
 
 
-def _size(node: Node, frame: Frame, default: Size) -> Size:
+def _size(node: WbtNode, frame: NodeFrame, default: Size) -> Size:
     """Size (forward, left, up), m; the default if any is not above 0, as in Webots."""
     own: Point = default
     if frame.y_up:
@@ -211,12 +210,7 @@ def _clamped(size: Size, least: float, most: float) -> Size:
     return x, y, z
 
 
-def _box_mass(node: Node, size: Size, heaviest: float) -> float | None:
+def _box_mass(node: WbtNode, size: Size, heaviest: float) -> float | None:
     """The mass of a box, kg, clamped to limits set by its size; None if it is fixed."""
     mass, least = number(node, "mass", 0.0), math.prod(size) ** (2.0 / 3.0)
     return min(max(mass, least), heaviest * least) if mass > 0.0 else None
-
-
-def _positive(node: Node, name: str, default: float) -> float:
-    length = number(node, name, default)
-    return length if length > 0.0 else default

@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from tdac_envs.core.arguments import finite_point
-from tdac_envs.core.errors import WorldError, WorldFileError
+from tdac_envs.core.errors import WorldError, WorldFileError, file_hint
 from tdac_envs.core.intake import printable, read_file
 from tdac_envs.worlds.bodies import bodies, floor_under
+from tdac_envs.worlds.wbt.content import WorldContent
 from tdac_envs.worlds.wbt.fields import children, number, number_list, numbers, text
-from tdac_envs.worlds.wbt.found import WorldContent
-from tdac_envs.worlds.wbt.frames import Frame, world_frame
+from tdac_envs.worlds.wbt.frames import NodeFrame, world_frame
 from tdac_envs.worlds.wbt.protofiles import ProtoFolder
-from tdac_envs.worlds.wbt.tree import Document, Node, parse
+from tdac_envs.worlds.wbt.tree import Document, WbtNode, parse
 from tdac_envs.worlds.wbt.unknown import unknown_fields, without_odd_scales
 from tdac_envs.worlds.wbt.walk import walk
 from tdac_envs.worlds.world import INFINITE_FRICTION, EPuck, World
@@ -122,7 +122,9 @@ def read_text(path: Path) -> str:
     try:
         data = read_file(path, LARGEST_FILE)
     except FileNotFoundError:
-        raise WorldError(f"{path}: no such file; check the path") from None
+        raise WorldError(
+            f"{path}: no such file{file_hint(path)}; check the path"
+        ) from None
     except IsADirectoryError:
         raise WorldError(f"{path}: is a folder; give the .wbt file in it") from None
     except OSError as error:
@@ -133,7 +135,7 @@ def read_text(path: Path) -> str:
         return data.decode("latin-1")  # old files may have Latin-1 comments
 
 
-def frame_of(document: Document) -> Frame:
+def frame_of(document: Document) -> NodeFrame:
     """The frame of the top-level nodes of a file.
 
     Raises:
@@ -156,15 +158,15 @@ def frame_of(document: Document) -> Frame:
     return world_frame(z_up, y_up_objects=document.release < _FLU_SINCE)
 
 
-def _world_info(document: Document) -> Node | None:
+def _world_info(document: Document) -> WbtNode | None:
     return next((node for node in document.nodes if node.kind == "WorldInfo"), None)
 
 
-def _items(node: Node, name: str) -> tuple[object, ...]:
+def _items(node: WbtNode, name: str) -> tuple[object, ...]:
     return node.fields[name].items if name in node.fields else ()
 
 
-def _time_step(info: Node | None, found: WorldContent) -> float:
+def _time_step(info: WbtNode | None, found: WorldContent) -> float:
     step = _STEP if info is None else number(info, "basicTimeStep", _STEP)
     if step >= 0.001:
         return step
@@ -172,7 +174,7 @@ def _time_step(info: Node | None, found: WorldContent) -> float:
     return _STEP
 
 
-def _friction(info: Node | None) -> float:
+def _friction(info: WbtNode | None) -> float:
     """The friction between two default materials: those of e-pucks and most solids."""
     pairs = () if info is None else children(info, "contactProperties")
     for pair in pairs:

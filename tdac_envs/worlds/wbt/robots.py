@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from tdac_envs.worlds.wbt.fields import child, children, numbers, text
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.placing import placed
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import EPuck
 
 ROBOTS = {"Robot", "Supervisor", "DifferentialWheels", "CustomRobot"}
@@ -19,7 +19,7 @@ _WITHIN = ("children", "endPoint", "device", "boundingObject")
 _EPUCK = re.compile(r"e[-_ ]?puck", re.IGNORECASE)
 
 
-def is_epuck(node: Node) -> bool:
+def is_epuck(node: WbtNode) -> bool:
     """Whether a node is an e-puck: the PROTO, or a Robot with its model or sensors."""
     if node.kind not in ROBOTS:
         return _EPUCK.fullmatch(node.kind) is not None
@@ -29,7 +29,7 @@ def is_epuck(node: Node) -> bool:
     return {f"ps{k}" for k in range(8)} <= names
 
 
-def epuck(node: Node, frame: Frame) -> EPuck:
+def epuck(node: WbtNode, frame: NodeFrame) -> EPuck:
     """Reads an e-puck.
 
     Raises:
@@ -49,7 +49,7 @@ def epuck(node: Node, frame: Frame) -> EPuck:
     )
 
 
-def inside(node: Node) -> Iterator[Node]:
+def inside(node: WbtNode) -> Iterator[WbtNode]:
     """The node and all nodes in its children, joints, devices and boundingObject."""
     stack, seen = [node], set()
     while stack:
@@ -61,7 +61,7 @@ def inside(node: Node) -> Iterator[Node]:
                 stack.extend(children(part, name))
 
 
-def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
+def _ahead(node: WbtNode, frame: NodeFrame) -> tuple[float, float] | None:
     """Direction of the robot's axis that points to its front sensors, ps0 and ps7.
 
     A Robot node keeps the axes of the Webots version that it was written for, which may
@@ -80,7 +80,7 @@ def _ahead(node: Node, frame: Frame) -> tuple[float, float] | None:
     return (x, y) if math.hypot(x, y) > 0.5 else None
 
 
-def has_body(node: Node) -> bool:
+def has_body(node: WbtNode) -> bool:
     """Whether a robot can be hit: it or a part of it has a boundingObject."""
     return any(
         "boundingObject" in part.fields and child(part, "boundingObject") is not None

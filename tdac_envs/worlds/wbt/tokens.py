@@ -40,7 +40,7 @@ class Token(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Source:
+class SourceText:
     """The text of a file, which converts offsets to lines and columns.
 
     Attributes:
@@ -62,7 +62,7 @@ class Source:
         return WorldFileError(f"{where}: {message}")
 
 
-def tokens(source: Source, start: int = 0) -> Iterator[Token]:
+def tokens(source: SourceText, start: int = 0) -> Iterator[Token]:
     """Yields the tokens from `start` on, then an `end` token.
 
     Raises:
@@ -87,7 +87,7 @@ def _unescaped(match: re.Match[str]) -> str:
     return "\n" if match[1] == "n" else match[1]
 
 
-def _checked(source: Source, text: str, offset: int) -> str:
+def _checked(source: SourceText, text: str, offset: int) -> str:
     try:
         good = isfinite(float(text)) and "_" not in text
     except ValueError:

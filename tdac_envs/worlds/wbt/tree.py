@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, replace
 
 from tdac_envs.core.errors import WorldFileError
-from tdac_envs.worlds.wbt.tokens import Kind, Source, Token, tokens
+from tdac_envs.worlds.wbt.tokens import Kind, SourceText, Token, tokens
 
 DEEPEST = 100
 """Maximum depth of nested nodes, so that no file exhausts the stack."""
@@ -21,7 +21,7 @@ _CONSTANTS = {"TRUE": True, "FALSE": False, "NULL": None}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Field:
+class WbtField:
     """The value of a field.
 
     Attributes:
@@ -34,7 +34,7 @@ class Field:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Node:
+class WbtNode:
     """A node.
 
     Attributes:
@@ -48,8 +48,8 @@ class Node:
 
     kind: str
     define: str
-    fields: dict[str, Field]
-    source: Source
+    fields: dict[str, WbtField]
+    source: SourceText
     offset: int
     size: int
 
@@ -74,7 +74,7 @@ class Document:
         release: The version as comparable numbers, e.g. (2025, 1) or (8, 6).
     """
 
-    nodes: tuple[Node, ...]
+    nodes: tuple[WbtNode, ...]
     version: str
     release: tuple[int, int]
 
@@ -90,7 +90,7 @@ def parse(text: str, name: str) -> Document:
         WorldFileError: The text is not a Webots world; the message gives the position.
     """
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    source = Source(name, text)
+    source = SourceText(name, text)
     header = _HEADER.match(text)
     found = _VERSION.match(header[1]) if header else None
     if header is None or found is None:
@@ -102,19 +102,47 @@ def parse(text: str, name: str) -> Document:
     return Document(nodes, header[1], (int(found[1]), minor))
 
 
-Item = float | str | bool | Node | None
+Item = float | str | bool | WbtNode | None
+
+
+def rebuilt(
+    node: WbtNode, change: Callable[[WbtNode], WbtNode], without: Collection[str] = ()
+) -> WbtNode:
+    """The node with changed inner nodes; the same if nothing changes.
+
+    Args:
+        node: The node.
+        change: Returns the node that takes the place of an inner one.
+        without: Names of fields that are left out.
+    """
+    fields: dict[str, WbtField] = {}
+    for name, own in node.fields.items():
+        if name not in without:
+            items = tuple(change(i) if isinstance(i, WbtNode) else i for i in own.items)
+            same = all(new is old for new, old in zip(items, own.items, strict=True))
+            fields[name] = own if same else WbtField(items, own.offset)
+    if all(fields.get(name) is own for name, own in node.fields.items()):
+        return node
+    return with_fields(node, fields)
+
+
+def with_fields(node: WbtNode, fields: dict[str, WbtField]) -> WbtNode:
+    """The node with other fields."""
+    parts = (item for own in fields.values() for item in own.items)
+    size = 1 + sum(part.size for part in parts if isinstance(part, WbtNode))
+    return replace(node, fields=fields, size=size)
 
 
 class _Parser:
     """Recursive-descent parser; keeps the next token and the DEF names so far."""
 
-    def __init__(self, source: Source, stream: Iterator[Token]) -> None:
+    def __init__(self, source: SourceText, stream: Iterator[Token]) -> None:
         self._source, self._stream = source, stream
         self._next = next(stream)
-        self._defined: dict[str, Node] = {}
+        self._defined: dict[str, WbtNode] = {}
 
-    def world(self) -> tuple[Node, ...]:
-        nodes, size = list[Node](), 0
+    def world(self) -> tuple[WbtNode, ...]:
+        nodes, size = list[WbtNode](), 0
         while self._next.kind != "end":
             if self._next.text in {"EXTERNPROTO", "IMPORTABLE"}:
                 self._extern()
@@ -135,7 +163,7 @@ class _Parser:
             raise self._unexpected("the URL of a PROTO in quotes")
         self._take()
 
-    def _node(self, depth: int) -> Node | None:
+    def _node(self, depth: int) -> WbtNode | None:
         """Parses a node, the USE of a node, or NULL."""
         begin = self._next
         if depth > DEEPEST:
@@ -154,30 +182,30 @@ class _Parser:
             item.size
             for field in fields.values()
             for item in field.items
-            if isinstance(item, Node)
+            if isinstance(item, WbtNode)
         )
-        node = Node(kind, define, fields, self._source, begin.offset, size)
+        node = WbtNode(kind, define, fields, self._source, begin.offset, size)
         self._bounded(size, node)
         # A nested node of the same DEF name takes precedence.
         if define and self._defined.get(define) is before:
             self._defined[define] = node
         return node
 
-    def _bounded(self, size: int, node: Node) -> None:
+    def _bounded(self, size: int, node: WbtNode) -> None:
         if size > MOST_NODES:
             raise node.error(f"expected at most {MOST_NODES} nodes, got {size}")
 
-    def _used(self, name: Token) -> Node:
+    def _used(self, name: Token) -> WbtNode:
         if name.text not in self._defined:
             raise self._source.error(
                 name.offset, f"USE {name.text}: there is no DEF {name.text} before it"
             )
         return self._defined[name.text]
 
-    def _body(self, kind: str, depth: int) -> dict[str, Field]:
+    def _body(self, kind: str, depth: int) -> dict[str, WbtField]:
         if not self._skip("mark", "{"):
             raise self._unexpected(f"'{{' after {kind}")
-        fields: dict[str, Field] = {}
+        fields: dict[str, WbtField] = {}
         while self._next.kind == "word":
             name = self._take()
             if name.text in _KEYWORDS or name.text in _CONSTANTS:
@@ -193,7 +221,7 @@ class _Parser:
             raise self._unexpected(f"a field of {kind} or '}}'")
         return fields
 
-    def _field(self, name: str, depth: int) -> Field:
+    def _field(self, name: str, depth: int) -> WbtField:
         offset, items = self._next.offset, []
         if self._skip("mark", "["):
             while not self._skip("mark", "]"):
@@ -203,7 +231,7 @@ class _Parser:
                 items.append(self._item("a number", depth))
         else:
             items.append(self._item(f"a value of {name}", depth))
-        return Field(tuple(items), offset)
+        return WbtField(tuple(items), offset)
 
     def _item(self, wanted: str, depth: int) -> Item:
         token = self._next

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 
 from tdac_envs.core.errors import hint
 from tdac_envs.core.intake import printable
 from tdac_envs.worlds.wbt.known_fields import GAINED_SCALE, KNOWN, LOST_SCALE
-from tdac_envs.worlds.wbt.tokens import Source
-from tdac_envs.worlds.wbt.tree import Document, Field, Node
+from tdac_envs.worlds.wbt.tokens import SourceText
+from tdac_envs.worlds.wbt.tree import Document, WbtNode, rebuilt
 
 MOST_NOTES = 20
 _SCALES_CHANGED_IN = (2023, 2)
 _OWN = "Webots'"
 Own = Mapping[str, Iterable[str]]
-Place = tuple[int, Source]
+Place = tuple[int, SourceText]
 
 
 def without_odd_scales(document: Document) -> Document:
@@ -33,21 +34,9 @@ def _without_scale(document: Document) -> frozenset[str]:
     return LOST_SCALE if is_new else GAINED_SCALE
 
 
-def _without(node: Node, kinds: frozenset[str]) -> Node:
-    lost = node.kind in kinds
-    fields = {
-        name: _field_without(own, kinds)
-        for name, own in node.fields.items()
-        if not (lost and name == "scale")
-    }
-    same = all(fields.get(name) is own for name, own in node.fields.items())
-    return node if same else replace(node, fields=fields)
-
-
-def _field_without(own: Field, kinds: frozenset[str]) -> Field:
-    items = tuple(_without(i, kinds) if isinstance(i, Node) else i for i in own.items)
-    same = all(new is old for new, old in zip(items, own.items, strict=True))
-    return own if same else Field(items, own.offset)
+def _without(node: WbtNode, kinds: frozenset[str]) -> WbtNode:
+    dropped = ("scale",) if node.kind in kinds else ()
+    return rebuilt(node, partial(_without, kinds=kinds), dropped)
 
 
 def unknown_fields(document: Document, own: Own) -> list[str]:
@@ -93,7 +82,7 @@ def _note(
     )
 
 
-def _nodes(nodes: Iterable[Node]) -> Iterable[Node]:
+def _nodes(nodes: Iterable[WbtNode]) -> Iterable[WbtNode]:
     """All nodes in the order of the file, each once although it may be used often."""
     stack, seen = list(nodes)[::-1], set[int]()
     while stack:
@@ -103,4 +92,4 @@ def _nodes(nodes: Iterable[Node]) -> Iterable[Node]:
         seen.add(id(node))
         yield node
         inner = (item for own in node.fields.values() for item in own.items)
-        stack.extend([item for item in inner if isinstance(item, Node)][::-1])
+        stack.extend([item for item in inner if isinstance(item, WbtNode)][::-1])

@@ -9,15 +9,15 @@ from tdac_envs.worlds.looks import Look
 from tdac_envs.worlds.wbt.appearance import reflectance
 from tdac_envs.worlds.wbt.arenas import ARENAS, arena
 from tdac_envs.worlds.wbt.colours import look, proto_look
+from tdac_envs.worlds.wbt.content import WorldContent, is_goal, name_of
 from tdac_envs.worlds.wbt.fields import StrayError, child, children
-from tdac_envs.worlds.wbt.found import WorldContent, is_goal, name_of
-from tdac_envs.worlds.wbt.frames import Frame
+from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.geometry import GROUPS, Pieces, bounds, geometry
 from tdac_envs.worlds.wbt.physics import mass_of
 from tdac_envs.worlds.wbt.placing import placed
 from tdac_envs.worlds.wbt.protos import PROTOS
 from tdac_envs.worlds.wbt.robots import ROBOTS, epuck, has_body, is_epuck
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import Obstacle
 
 _NEVER_SOLID = {
@@ -36,7 +36,7 @@ _DEVICES = {
 _Shown = tuple[Pieces, float, Look]
 
 
-def walk(node: Node, frame: Frame, found: WorldContent) -> None:
+def walk(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     """Adds a node and its content to `found`.
 
     Args:
@@ -57,7 +57,7 @@ def walk(node: Node, frame: Frame, found: WorldContent) -> None:
         found.left_out(node, frame, str(error))
 
 
-def _walk(node: Node, frame: Frame, found: WorldContent) -> None:
+def _walk(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     if is_epuck(node):
         found.robots.append(epuck(node, frame))
     elif node.kind in ROBOTS:
@@ -78,7 +78,7 @@ def _walk(node: Node, frame: Frame, found: WorldContent) -> None:
         _unknown(node, frame, found)
 
 
-def _other_robot(node: Node, frame: Frame, found: WorldContent) -> None:
+def _other_robot(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     own = placed(node, frame, scaled=True)
     if is_goal(node):
         found.goal(own)
@@ -87,7 +87,7 @@ def _other_robot(node: Node, frame: Frame, found: WorldContent) -> None:
     found.left_out(node, own, why, solid=body)
 
 
-def _arena(node: Node, frame: Frame, found: WorldContent) -> None:
+def _arena(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     made = arena(node, frame)
     if isinstance(made, str):
         found.left_out(node, placed(node, frame), made)
@@ -95,7 +95,7 @@ def _arena(node: Node, frame: Frame, found: WorldContent) -> None:
         found.arenas.append(made)
 
 
-def _proto(node: Node, frame: Frame, found: WorldContent) -> None:
+def _proto(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     body = PROTOS[node.kind](node, frame)
     if is_goal(node):
         found.goal(body.frame)
@@ -107,7 +107,7 @@ def _proto(node: Node, frame: Frame, found: WorldContent) -> None:
     found.obstacle(node, obstacle)
 
 
-def _solid(node: Node, own: Frame, found: WorldContent) -> None:
+def _solid(node: WbtNode, own: NodeFrame, found: WorldContent) -> None:
     """Adds a Solid with its boundingObject and Shapes, then the Solids inside it."""
     if is_goal(node):
         found.goal(own)
@@ -135,7 +135,7 @@ def _solid(node: Node, own: Frame, found: WorldContent) -> None:
     found.obstacle(node, obstacle, place)
 
 
-def _kind(node: Node) -> str:
+def _kind(node: WbtNode) -> str:
     """The `model` field of a Solid if it has one, else the node type."""
     model = node.fields.get("model")
     if model is None or len(model.items) != 1 or not isinstance(model.items[0], str):
@@ -143,15 +143,17 @@ def _kind(node: Node) -> str:
     return model.items[0] or node.kind
 
 
-def _note_unseen(node: Node, looks: Pieces, instead: str, found: WorldContent) -> None:
+def _note_unseen(
+    node: WbtNode, looks: Pieces, instead: str, found: WorldContent
+) -> None:
     what = ", ".join(dict.fromkeys(looks.missing))
     where = f"line {node.line}: {name_of(node) or node.kind}"
     found.notes.append(f"{where}: {what} is not modelled; sensors see {instead}")
 
 
 def _collect_shapes(
-    nodes: tuple[Node, ...],
-    frame: Frame,
+    nodes: tuple[WbtNode, ...],
+    frame: NodeFrame,
     found: WorldContent,
     looks: list[_Shown],
 ) -> None:
@@ -167,11 +169,11 @@ def _collect_shapes(
             walk(node, frame, found)
 
 
-def _inside(node: Node, frame: Frame) -> Frame:
+def _inside(node: WbtNode, frame: NodeFrame) -> NodeFrame:
     return frame if node.kind == "Group" else placed(node, frame, scaled=True)
 
 
-def _group(node: Node, frame: Frame, found: WorldContent) -> None:
+def _group(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     own = _inside(node, frame)
     if is_goal(node):
         found.goal(own)
@@ -182,7 +184,9 @@ def _group(node: Node, frame: Frame, found: WorldContent) -> None:
             walk(part, own, found)
 
 
-def _shape(node: Node, frame: Frame, found: WorldContent, named: Node) -> None:
+def _shape(
+    node: WbtNode, frame: NodeFrame, found: WorldContent, named: WbtNode
+) -> None:
     """Adds a Shape outside of Solids: sensors see it, nothing hits it."""
     shape = child(node, "geometry")
     if shape is None:
@@ -202,7 +206,7 @@ def _shape(node: Node, frame: Frame, found: WorldContent, named: Node) -> None:
     found.obstacle(node, obstacle)
 
 
-def _joint(node: Node, frame: Frame, found: WorldContent) -> None:
+def _joint(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     end = child(node, "endPoint")
     if end is not None:
         walk(end, frame, found)
@@ -211,7 +215,7 @@ def _joint(node: Node, frame: Frame, found: WorldContent) -> None:
             found.notes.append(f"{name}: modelled as fixed, although on a {node.kind}")
 
 
-def _unknown(node: Node, frame: Frame, found: WorldContent) -> None:
+def _unknown(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     # These fields may have another meaning in an unknown node.
     with suppress(WorldError):
         frame = placed(node, frame)

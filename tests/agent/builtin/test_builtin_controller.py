@@ -11,7 +11,6 @@ from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.episodes.episode import Record
 from tdac_agent.verification.suite.oracle import Oracle
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.map2d.task import jittered_start
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.params import RobotParams
 
@@ -189,7 +188,7 @@ def test_drives_on_bundled_maps(name, tmp_path, monkeypatch):
     text = template_for(env.nominal.robot, env.nominal.dt).render(TUNED)
     module = import_controller(text, env, tmp_path, monkeypatch)
     random = np.random.default_rng(3)
-    for start in (None, jittered_start(env.nominal, random)):
+    for start in (None, env.nominal.jittered(random)):
         rollout = drive(env, steer(module), start)
         assert rollout.reached, rollout.outcome
         assert rollout.trajectory.steps <= 0.25 * env.nominal.horizon

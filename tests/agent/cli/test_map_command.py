@@ -60,9 +60,9 @@ def test_metres_in_and_out(tdac, ros):
         ),
         (
             ("5.35", "5.95"),
-            r"start \(5.35, 5.95\) lies in an obstacle; the nearest free place for a "
-            r"robot of 0.6 m radius from which the goal can be reached "
-            r"is \(\d+\.\d+, \d+\.\d+\)",
+            r"move the start to \(\d+\.\d+, \d+\.\d+\), the nearest free place for a "
+            r"robot of 0.6 m radius from which the goal can be reached: "
+            r"start \(5.35, 5.95\) lies in an obstacle",
         ),
     ],
 )

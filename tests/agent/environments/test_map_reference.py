@@ -10,7 +10,6 @@ from tdac_agent.environments.map2d.reference import oracle_path
 from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.verification.judge.drivers import ReferenceDriver
 from tdac_envs.map2d.env import Map2DEnv
-from tdac_envs.map2d.task import jittered_start
 from tdac_envs.mapping.bundled import bundled_maps
 
 
@@ -22,7 +21,7 @@ def solve(env, start):
 
 def assert_solves(env, random, jitters):
     task = env.nominal
-    starts = [task.start, *(jittered_start(task, random) for _ in range(jitters))]
+    starts = [task.start, *(task.jittered(random) for _ in range(jitters))]
     for start in starts:
         rollout = solve(env, start)
         radius = task.robot.radius

@@ -401,7 +401,7 @@ def test_the_last_step_of_a_run_is_in_words():
     passed = last_step("✔ k=1 j=0  all tests passed\n")
     assert passed == "✔ iteration 1: all tests passed"
     assert last_step("error: k=1 is too small\n") == ""
-    compiling = "compiling for this machine, cached for later runs: kernel 3 of 56"
+    compiling = "compiling the environment, 3 of 17 (cached for later runs)"
     assert last_step(f"{output}tdac: {compiling}\n") == compiling
 
 

@@ -11,13 +11,16 @@ from tdac_agent.tasks.start_frame import StartFrame
 from tdac_agent.tasks.units import METRES, PIXELS
 from tdac_envs import load_set
 from tdac_envs.drive.task import Pose
-from tdac_envs.ladder.observed import View
+from tdac_envs.ladder.observed import SetView
 
 
 @pytest.mark.parametrize("index", range(3))
 def test_places_and_headings_are_as_observed(index):
     tasks = load_set("unknown")
-    task, view = tasks.task("dev", index), View(tasks.file, tasks.largest_side, False)
+    task, view = (
+        tasks.task("dev", index),
+        SetView(tasks.file, tasks.largest_side, False),
+    )
     poses = np.array([[31.0, 47.0, 2.0], [80.5, 12.25, -3.0]])
     anchors = np.array([view.anchor(task)] * len(poses))
     none = {key: np.zeros((2, 1), np.float32) for key in tasks.file.observed}
@@ -35,7 +38,7 @@ def test_places_and_headings_are_as_observed(index):
 def test_places_in_worlds_are_as_observed():
     """In metres, with y to the left of the start."""
     tasks = load_set("epuck")
-    task, view = tasks.task("dev", 1), View(tasks.file, tasks.largest_side, False)
+    task, view = tasks.task("dev", 1), SetView(tasks.file, tasks.largest_side, False)
     frame = StartFrame.of(task.start, METRES)
     goal = METRES.on_screen([task.goal])[0].tolist()
     seen = view.anchor(task)[5:].tolist()

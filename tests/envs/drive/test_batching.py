@@ -1,14 +1,132 @@
-"""Promises of a batch to libraries: it has what Gymnasium's own vectors have."""
+"""Promises of both batches: they are many single ones, only faster.
+
+Libraries find in them what Gymnasium's own vectors have.
+"""
+
+import pickle
 
 import gymnasium as gym
 import numpy as np
 import pytest
+from batches import actions, assert_same
 from gymnasium.vector import VectorEnv
 
 import tdac_envs  # noqa: F401 - registers the envs
 
-IDS = ["TDAC-Map2D-v0", "TDAC-EPuck-v0"]
+MAP2D, EPUCK = "TDAC-Map2D-v0", "TDAC-EPuck-v0"
+IDS = [MAP2D, EPUCK]
 every_env = pytest.mark.parametrize("name", IDS)
+SLOPPY = {"wheel_slip": 0.1, "motor_lag": 0.1, "delay": 2}
+NOISY = {
+    MAP2D: {"range_noise": 0.1, **SLOPPY},
+    EPUCK: {"sensor_noise": 1.0, **SLOPPY},
+}
+RANDOM = {"variation": "random", "horizon": 40}
+JITTER = {"variation": "jitter", "horizon": 25}
+BLOCK = {"on_collision": "block", "horizon": 33}
+SENSORS = {"ground_sensors": True, "gps": True, "compass": True}
+CASES = {
+    "map": (MAP2D, {}),
+    "map noisy": (MAP2D, {"map": "office", **RANDOM, **NOISY[MAP2D]}),
+    "map block": (MAP2D, {"variation": "jitter", **BLOCK}),
+    "world": (EPUCK, {"horizon": 55}),
+    "world walls": (EPUCK, {"world": "maze"}),
+    "world noisy": (EPUCK, {"world": "maze", **RANDOM, **NOISY[EPUCK]}),
+    "world sensors": (EPUCK, {**JITTER, "sensor_noise": 0.5, **SENSORS}),
+    "world block": (EPUCK, {"world": "room", **BLOCK, **SENSORS}),
+}
+OWN = {
+    MAP2D: [
+        {"map": "maze", "reward_weights": {"time": 0.5}},
+        {"map": "cave", "dt": 0.02},
+        {"map": "office", "range_noise": 0.0},
+    ],
+    EPUCK: [{"world": "maze"}, {"world": "yard", "dt": 0.016}, {"world": "clutter"}],
+}
+SHARED = {
+    MAP2D: {"variation": "random", "range_noise": 0.1, **BLOCK},
+    EPUCK: {"horizon": 30},
+}
+
+
+@pytest.mark.slow_after(2)
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_it_does_what_single_environments_do(case, mode):
+    """Observations, rewards, ends and infos are Gymnasium's own, to the last bit."""
+    count, kwargs, (name, options) = 5, {"autoreset_mode": mode}, CASES[case]
+    many = gym.make_vec(name, count, "sync", vector_kwargs=kwargs, **options)
+    batch = gym.make_vec(name, count, "vector_entry_point", **kwargs, **options)
+    assert batch.single_observation_space == many.single_observation_space
+    assert batch.observation_space == many.observation_space
+    assert batch.action_space == many.action_space
+    for one, two in zip(many.reset(seed=3), batch.reset(seed=3), strict=True):
+        assert_same(one, two)
+    ends = 0
+    for action in actions(count, 120):
+        expected, result = many.step(action), batch.step(action)
+        for one, two in zip(expected, result, strict=True):
+            assert_same(one, two)
+        assert result[0] in batch.observation_space
+        over = result[2] | result[3]
+        ends += over.sum()
+        if mode == "Disabled" and over.any():
+            again = [env.reset(options={"reset_mask": over}) for env in (many, batch)]
+            for one, two in zip(*again, strict=True):
+                assert_same(one, two)
+    assert ends >= 2
+
+
+@every_env
+@pytest.mark.parametrize("threads", [2, 3])
+def test_threads_change_nothing(name, threads):
+    """Every robot is stepped by one thread, so no result depends on how many."""
+    one, many = (
+        gym.make_vec(name, 300, threads=k, variation="jitter") for k in (1, threads)
+    )
+    for a, b in zip(one.reset(seed=5), many.reset(seed=5), strict=True):
+        assert_same(a, b)
+    for action in actions(300, 40):
+        for a, b in zip(one.step(action), many.step(action), strict=True):
+            assert_same(a, b)
+    many.close()
+
+
+@every_env
+def test_each_robot_may_have_its_own_place_and_options(name):
+    """Robot i has the arguments of entry i, which begin anew after the last."""
+    each, more = OWN[name], SHARED[name]
+    batch = gym.make_vec(name, 4, each=each, **more).unwrapped
+    singles = [gym.make(name, **{**more, **each[i % 3]}).unwrapped for i in range(4)]
+    observations, _ = batch.reset(seed=[7, 8, 9, 10])
+    for i, env in enumerate(singles):
+        first, _ = env.reset(seed=7 + i)
+        assert_same(first, {key: value[i] for key, value in observations.items()})
+    for action in 0.2 * actions(4, 25):
+        observations, rewards, terminated, *_ = batch.step(action)
+        assert observations in batch.observation_space
+        assert not terminated.any()
+        for i, env in enumerate(singles):
+            single, reward, *_ = env.step(action[i])
+            assert_same(single, {key: value[i] for key, value in observations.items()})
+            assert rewards[i] == reward
+    assert len({id(setup.nominal.field) for setup in batch.setups}) == 3
+
+
+@every_env
+def test_a_pickle_goes_on_where_the_batch_was(name):
+    """Poses, tasks and random streams are kept."""
+    batch = gym.make_vec(name, 3, variation="jitter", **NOISY[name]).unwrapped
+    batch.reset(seed=2)
+    script = actions(3, 40)
+    for action in script[:20]:
+        batch.step(action)
+    twin = pickle.loads(pickle.dumps(batch))
+    for action in script[20:]:
+        for a, b in zip(batch.step(action), twin.step(action), strict=True):
+            assert_same(a, b)
+
+
 MASKS = {
     "list": [True, False, True],
     "none": None,

@@ -17,7 +17,7 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.gaps import nearest_gap
 from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.prisms import Prisms
-from tdac_envs.epuck.pushing import Drive, push
+from tdac_envs.epuck.pushing import CommandedArc, push
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.wbt.reader import read_world
@@ -287,7 +287,7 @@ class TestAmongSolids:
         for _ in range(60):
             push(
                 solid, solid, none, np.zeros(0), state, speed, np.zeros((0, 6)),
-                Drive(forward, 0.0, 0.032), friction,
+                CommandedArc(forward, 0.0, 0.032), friction,
             )  # fmt: skip
             ys.append(state[1])
         _, expected = slide_velocity(forward, heading, 0.0, friction, WALL)

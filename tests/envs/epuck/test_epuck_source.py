@@ -10,7 +10,7 @@ import pytest
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.vector import EPuckVectorEnv
 from tdac_envs.ladder.plate_worlds import PlatesSpec, make_plates
-from tdac_envs.ladder.words import world_key
+from tdac_envs.ladder.random_stream import world_key
 
 OPTIONS = {
     "goal_tolerance": 0.08,

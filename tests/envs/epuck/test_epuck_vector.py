@@ -1,88 +1,17 @@
-"""Promises of the batched TDAC-EPuck-v0: it is many single ones, only faster."""
+"""Promises of the batched TDAC-EPuck-v0 beyond those of every batch."""
 
 import math
-import pickle
 
-import gymnasium as gym
 import numpy as np
 import pymunk
 import pytest
-from batches import actions, assert_same
 from world_texts import text
 
 import tdac_envs
 from tdac_envs import read_world
-from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.vector import EPuckVectorEnv
 
-NAME = "TDAC-EPuck-v0"
-NOISY = {"sensor_noise": 1.0, "wheel_slip": 0.1, "motor_lag": 0.1, "delay": 2}
-SENSORS = {"ground_sensors": True, "gps": True, "compass": True}
-CASES = {
-    "defaults": {"horizon": 55},
-    "walls": {"world": "maze"},
-    "noisy": {"world": "maze", "variation": "random", "horizon": 40, **NOISY},
-    "sensors": {"variation": "jitter", "horizon": 25, "sensor_noise": 0.5, **SENSORS},
-    "block": {"world": "room", "on_collision": "block", "horizon": 33, **SENSORS},
-}
 STEP = 6.28 * 0.02 * 0.032
-
-
-@pytest.mark.slow_after(2)
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
-def test_it_does_what_single_environments_do(case, mode):
-    """Observations, rewards, ends and infos are Gymnasium's own, to the last bit."""
-    count, kwargs, options = 5, {"autoreset_mode": mode}, CASES[case]
-    many = gym.make_vec(NAME, count, "sync", vector_kwargs=kwargs, **options)
-    batch = gym.make_vec(NAME, count, "vector_entry_point", **kwargs, **options)
-    assert batch.single_observation_space == many.single_observation_space
-    assert batch.observation_space == many.observation_space
-    for one, two in zip(many.reset(seed=3), batch.reset(seed=3), strict=True):
-        assert_same(one, two)
-    ends = 0
-    for action in actions(count, 120):
-        expected, result = many.step(action), batch.step(action)
-        for one, two in zip(expected, result, strict=True):
-            assert_same(one, two)
-        assert result[0] in batch.observation_space
-        over = result[2] | result[3]
-        ends += over.sum()
-        if mode == "Disabled" and over.any():
-            again = [env.reset(options={"reset_mask": over}) for env in (many, batch)]
-            for one, two in zip(*again, strict=True):
-                assert_same(one, two)
-    assert ends >= 2
-
-
-def test_threads_change_nothing():
-    """Every robot is stepped by one thread, so no result depends on how many."""
-    one, two = (EPuckVectorEnv(300, threads=k, variation="jitter") for k in (1, 3))
-    for a, b in zip(one.reset(seed=5), two.reset(seed=5), strict=True):
-        assert_same(a, b)
-    for action in actions(300, 40):
-        for a, b in zip(one.step(action), two.step(action), strict=True):
-            assert_same(a, b)
-    two.close()
-
-
-def test_each_robot_may_have_its_own_world():
-    """Robot i has the arguments of entry i, which begin anew after the last."""
-    each = [{"world": "maze"}, {"world": "yard", "dt": 0.016}, {"world": "clutter"}]
-    batch = EPuckVectorEnv(4, each=each, horizon=30)
-    singles = [EPuckEnv(**each[i % 3], horizon=30) for i in range(4)]
-    batch.reset(seed=0)
-    for env in singles:
-        env.reset(seed=0)
-    for action in 0.2 * actions(4, 25):
-        observations, rewards, *_ = batch.step(action)
-        assert observations in batch.observation_space
-        for i, env in enumerate(singles):
-            single, reward, terminated, *_ = env.step(action[i])
-            assert_same(single, {key: value[i] for key, value in observations.items()})
-            assert rewards[i] == reward
-            assert not terminated
-    assert len({id(setup.nominal.ground) for setup in batch.setups}) == 3
 
 
 def engine_with(box):
@@ -179,19 +108,6 @@ def test_the_goal_ends_an_episode():
     assert terminated.tolist() == [True, False]
     assert infos["final_info"]["is_success"].tolist() == [True, False]
     assert rewards[0] > 9
-
-
-def test_a_pickle_goes_on_where_the_batch_was():
-    """Poses, tasks and random streams are kept."""
-    batch = EPuckVectorEnv(3, variation="jitter", **NOISY)
-    batch.reset(seed=2)
-    script = actions(3, 40)
-    for action in script[:20]:
-        batch.step(action)
-    twin = pickle.loads(pickle.dumps(batch))
-    for action in script[20:]:
-        for a, b in zip(batch.step(action), twin.step(action), strict=True):
-            assert_same(a, b)
 
 
 @pytest.mark.parametrize(

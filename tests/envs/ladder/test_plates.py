@@ -13,7 +13,7 @@ from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.paths import widest_body
 from tdac_envs.ladder.generators.blocks import Box, Cylinder, raster
 from tdac_envs.ladder.plate_worlds import PlatesSpec, make_plates
-from tdac_envs.ladder.words import world_key
+from tdac_envs.ladder.random_stream import world_key
 from tdac_envs.worlds.bodies import BODY_RADIUS
 from tdac_envs.worlds.footprint import Rectangle
 from tdac_envs.worlds.wbt.reader import read_world

@@ -6,8 +6,8 @@ import yaml
 
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.random_stream import world_key
 from tdac_envs.ladder.set_file import SetFile, set_names
-from tdac_envs.ladder.words import world_key
 from tdac_envs.map2d.task import make_task
 
 SALT = b"0123456789abcdef"

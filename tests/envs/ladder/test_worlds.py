@@ -15,10 +15,10 @@ from pydantic import ValidationError
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import Pose
 from tdac_envs.ladder.admission import Admitted, Rejection, admit
-from tdac_envs.ladder.dead_ends import Sensor, dead_ends
-from tdac_envs.ladder.generators.draft import Draft, as_places
+from tdac_envs.ladder.dead_ends import RangeSensor, dead_ends
+from tdac_envs.ladder.generators.draft import WorldDraft, as_places
 from tdac_envs.ladder.generators.registry import GENERATORS
-from tdac_envs.ladder.words import Words, world_key
+from tdac_envs.ladder.random_stream import RandomStream, world_key
 from tdac_envs.ladder.worlds import LadderWorld, WorldSpec, make_world
 from tdac_envs.map2d.task import make_task
 from tdac_envs.mapping.params import RobotParams
@@ -156,8 +156,8 @@ def drawn(cells, places, **conditions):
     """The result of admission for a draft by hand."""
     usual = {"radius": 4, "min_steps": 10, "min_detour": 1.1}
     spec = spec_of("clutter", **{**usual, **conditions})
-    draft = Draft(np.array(cells, bool), as_places(places))
-    return admit(draft, Words(bytes(32)), spec.conditions)
+    draft = WorldDraft(np.array(cells, bool), as_places(places))
+    return admit(draft, RandomStream(bytes(32)), spec.conditions)
 
 
 def walled(opening):
@@ -227,7 +227,7 @@ def test_a_draft_is_turned_with_its_places():
     """The same pixels are marked afterwards, for all eight positions."""
     cells = np.zeros((3, 5), bool)
     cells[0, 1] = cells[2, 4] = cells[1, 0] = True
-    draft = Draft(cells, as_places([(1, 0), (4, 2), (0, 1)]))
+    draft = WorldDraft(cells, as_places([(1, 0), (4, 2), (0, 1)]))
     seen = set()
     for quarters in range(4):
         for mirrored in (False, True):
@@ -245,7 +245,7 @@ def test_a_world_is_pickled():
     assert digest(pickle.loads(pickle.dumps(world))) == digest(world)
 
 
-SENSOR = Sensor(18, math.radians(110), 60.0)
+SENSOR = RangeSensor(18, math.radians(110), 60.0)
 
 
 def test_a_blind_alley_is_a_dead_end():
@@ -256,8 +256,8 @@ def test_a_blind_alley_is_a_dead_end():
     spec = spec_of("clutter", radius=6, tolerance=5, min_steps=1, min_detour=1.0)
     found = None
     for seed in range(20):
-        draft = Draft(cells, as_places([(20, 60), (180, 60)]))
-        found = admit(draft, Words(bytes([seed] * 32)), spec.conditions)
+        draft = WorldDraft(cells, as_places([(20, 60), (180, 60)]))
+        found = admit(draft, RandomStream(bytes([seed] * 32)), spec.conditions)
         if isinstance(found, Admitted) and found.start == (20, 60):
             break
     start, goal = Pose(20.0, 60.0, 0.0), (180.0, 60.0)
@@ -266,5 +266,5 @@ def test_a_blind_alley_is_a_dead_end():
     lured = dead_ends(world, spec.radius, SENSOR)
     assert 0.1 < lured.depth < 0.5
     assert lured.excess > lured.depth
-    all_seeing = dead_ends(world, spec.radius, Sensor(720, 2 * math.pi, 400.0))
+    all_seeing = dead_ends(world, spec.radius, RangeSensor(720, 2 * math.pi, 400.0))
     assert all_seeing.depth < lured.depth

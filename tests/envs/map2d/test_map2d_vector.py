@@ -1,6 +1,5 @@
-"""Promises of the batched TDAC-Map2D-v0: it is many single ones, only faster."""
+"""Promises of the batched TDAC-Map2D-v0 beyond those of every batch."""
 
-import pickle
 import warnings
 
 import gymnasium as gym
@@ -16,80 +15,6 @@ from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.vector import Map2DVectorEnv
 
 NAME = "TDAC-Map2D-v0"
-NOISY = {"range_noise": 0.1, "wheel_slip": 0.1, "motor_lag": 0.1, "delay": 2}
-CASES = {
-    "defaults": {},
-    "noisy": {"map": "office", "variation": "random", "horizon": 40, **NOISY},
-    "jitter": {"variation": "jitter", "on_collision": "block", "horizon": 33},
-}
-cases = pytest.mark.parametrize("case", CASES)
-modes = pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
-
-
-@pytest.mark.slow_after(2)
-@cases
-@modes
-def test_it_does_what_single_environments_do(case, mode):
-    """Observations, rewards, ends and infos are Gymnasium's own, to the last bit."""
-    count, steps = 5, 120
-    kwargs = {"autoreset_mode": mode}
-    options = CASES[case]
-    many = gym.make_vec(NAME, count, "sync", vector_kwargs=kwargs, **options)
-    batch = gym.make_vec(NAME, count, "vector_entry_point", **kwargs, **options)
-    assert batch.single_observation_space == many.single_observation_space
-    assert batch.observation_space == many.observation_space
-    assert batch.action_space == many.action_space
-    for one, two in zip(many.reset(seed=3), batch.reset(seed=3), strict=True):
-        assert_same(one, two)
-    ends = 0
-    for action in actions(count, steps):
-        expected, result = many.step(action), batch.step(action)
-        for one, two in zip(expected, result, strict=True):
-            assert_same(one, two)
-        assert result[0] in batch.observation_space
-        over = result[2] | result[3]
-        ends += over.sum()
-        if mode == "Disabled" and over.any():
-            again = [env.reset(options={"reset_mask": over}) for env in (many, batch)]
-            for one, two in zip(*again, strict=True):
-                assert_same(one, two)
-    assert ends > 2
-
-
-@pytest.mark.parametrize("threads", [1, 2, 3])
-def test_threads_change_nothing(threads):
-    """Every robot is stepped by one thread, so no result depends on how many."""
-    one = Map2DVectorEnv(300, threads=1, variation="jitter")
-    many = Map2DVectorEnv(300, threads=threads, variation="jitter")
-    for a, b in zip(one.reset(seed=5), many.reset(seed=5), strict=True):
-        assert_same(a, b)
-    for action in actions(300, 40):
-        for a, b in zip(one.step(action), many.step(action), strict=True):
-            assert_same(a, b)
-    many.close()
-
-
-def test_each_robot_may_have_its_own_map_and_options():
-    """Robot i has the arguments of entry i, which begin anew after the last."""
-    each = [{"map": "maze"}, {"map": "cave", "dt": 0.02}, {"map": "office"}]
-    each[0]["reward_weights"] = {"time": 0.5}
-    more = {"variation": "random", "on_collision": "block", "range_noise": 0.1}
-    each[2]["range_noise"] = 0.0
-    batch = Map2DVectorEnv(4, each=each, **more)
-    singles = [Map2DEnv(**{**more, **each[i % 3]}) for i in range(4)]
-    observations, _ = batch.reset(seed=[7, 8, 9, 10])
-    for i, env in enumerate(singles):
-        first, _ = env.reset(seed=7 + i)
-        assert_same(first, {key: value[i] for key, value in observations.items()})
-    for action in actions(4, 20):
-        observations, rewards, terminated, *_ = batch.step(action)
-        assert observations in batch.observation_space
-        assert not terminated.any()
-        for i, env in enumerate(singles):
-            single, reward, *_ = env.step(action[i])
-            assert_same(single, {k: v[i] for k, v in observations.items()})
-            assert rewards[i] == reward
-    assert len({id(setup.nominal.terrain) for setup in batch.setups}) == 3
 
 
 def test_options_of_reset_reach_all_robots():
@@ -132,19 +57,6 @@ def test_observations_are_the_callers_own():
     way = np.linalg.norm(third["pose"][:, :2] - kept["pose"][:, :2], axis=1)
     np.testing.assert_allclose(way, 2 * 75.59 * 0.05, rtol=1e-4)
     assert (third["goal"] == kept["goal"]).all()
-
-
-def test_a_pickle_goes_on_where_the_batch_was():
-    """Poses, tasks and random streams are kept."""
-    batch = Map2DVectorEnv(3, variation="jitter", **NOISY)
-    batch.reset(seed=2)
-    script = actions(3, 40)
-    for action in script[:20]:
-        batch.step(action)
-    twin = pickle.loads(pickle.dumps(batch))
-    for action in script[20:]:
-        for a, b in zip(batch.step(action), twin.step(action), strict=True):
-            assert_same(a, b)
 
 
 @pytest.mark.parametrize("lay", [np.asfortranarray, np.ndarray.tolist, np.float32])

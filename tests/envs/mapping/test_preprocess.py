@@ -203,9 +203,9 @@ def test_no_corner_cutting() -> None:
 @pytest.mark.parametrize(
     ("start", "goal", "radius", "message"),
     [
-        ((150, 50), GOAL, 12, r"start \(150, 50\) lies in an obstacle; the nearest .*"),
+        ((150, 50), GOAL, 12, r"move the start to \(\d+, \d+\), the nearest"),
         (START, (275, 40), 15, r"goal \(275, 40\) is \d+\.\d px from an obstacle"),
-        (START, GOAL, 40, r"the nearest free pixel for a robot of 40 px radius is"),
+        (START, GOAL, 40, r", the nearest free pixel for a robot of 40 px radius: "),
         ((60, 60), (240, 60), 40, r"the largest radius that gets through is 2\d\.\d"),
         (START, GOAL, 200, "a robot of 200 px radius fits nowhere on this map"),
         ((-1, 40), GOAL, 12, r"start \(-1, 40\) lies outside the map; expected 0 <= x"),
@@ -236,7 +236,7 @@ def test_the_advised_pixel_is_joined_with_the_other_end() -> None:
     """A nearer one, from which no way leads there, would be of no use."""
     cells = np.zeros((80, 160), np.bool_)
     cells[:, 30:34] = True
-    with pytest.raises(TaskError, match=r"can be reached is \(3[6-9], 40\)"):
+    with pytest.raises(TaskError, match=r"move the start to \(3[6-9], 40\), "):
         preprocess(cells, (30, 40), (140, 40), 3.0)
 
 
@@ -245,7 +245,7 @@ def test_snap_moves_the_ends_and_says_so() -> None:
     assert params.start != (150, 50)
     assert params.notes == (
         f"start moved from (150, 50) to {_ints(params.start)}, the nearest free pixel "
-        "from which the goal can be reached",
+        "from which the goal can be reached; (150, 50) lies in an obstacle",
     )
     x, y = _ints(params.start)
     assert body_free(clearance(grid.cells), 12.0)[y, x]

@@ -228,8 +228,8 @@ def test_an_end_outside_of_a_closed_wall_is_named(name, place):
     ends = {"start": INSIDE, "goal": INSIDE, name: place}
     other = "goal" if name == "start" else "start"
     error = refusal(plan(), ends["start"], ends["goal"])
-    text = f"{name} {place} lies outside of the closed wall around {other} {INSIDE}; "
-    assert text in str(error)
+    text = f": {name} {place} lies outside of the closed wall around {other} {INSIDE}"
+    assert str(error).endswith(text)
     found = fault(error)
     assert (found.label, found.at) == (f"{name} outside of the closed wall", place)
     assert found.better is not None

@@ -10,10 +10,10 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import OccupancyGrid, body_free, clearance
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.grid.pieces import nearest_free
+from tdac_envs.mapping.lettering import without_lettering
 from tdac_envs.mapping.preprocessing import preprocess
 from tdac_envs.mapping.score import connected
 from tdac_envs.mapping.snapping import body_fits, snap
-from tdac_envs.mapping.words import without_words
 
 GOAL, RADIUS = (350, 250), 8.0
 REACH = ", the nearest free pixel from which the goal can be reached"
@@ -59,8 +59,9 @@ def test_a_start_in_the_wall_of_a_closet_leaves_it():
     assert moved.goal == GOAL
     free = body_free(clearance(cells), RADIUS)
     assert connected(free, moved.start, GOAL)
-    note = f"start moved from (110, 84) to {moved.start}{REACH}; across a wall"
-    assert moved.notes == (f"{note}: check the preview",)
+    note = f"start moved from (110, 84) to {moved.start}{REACH}"
+    why = "(110, 84) lies in an obstacle; across a wall: check the preview"
+    assert moved.notes == (f"{note}; {why}",)
 
 
 def test_both_ends_move_to_one_part_of_the_map():
@@ -192,7 +193,7 @@ def test_a_word_goes_though_its_own_end_is_snapped():
 def test_words_elsewhere_stay():
     image = written("ROOM", (40, 90))
     cells = image < 128
-    assert without_words(cells, [(300, 100), (60, 200)]) is None
+    assert without_lettering(cells, [(300, 100), (60, 200)]) is None
 
 
 @pytest.mark.parametrize("shape", ["frame", "pillar", "bar", "wall"])
@@ -207,4 +208,4 @@ def test_what_is_no_word_stays(shape):
     elif shape == "bar":
         cells[80:100, 89:92] = True
     place = (198, 90) if shape == "wall" else (90, 90)
-    assert without_words(cells, [place]) is None
+    assert without_lettering(cells, [place]) is None

@@ -9,13 +9,13 @@ from world_texts import EVERYTHING, OLD, mutated, text
 
 from tdac_envs import write_world
 from tdac_envs.core.errors import WorldError
-from tdac_envs.worlds.wbt.found import MOST_PARTS
+from tdac_envs.worlds.wbt.content import MOST_PARTS
 from tdac_envs.worlds.wbt.reader import LARGEST_FILE, load_world, read_world
-from tdac_envs.worlds.wbt.tree import DEEPEST, MOST_NODES, Node, parse
+from tdac_envs.worlds.wbt.tree import DEEPEST, MOST_NODES, WbtNode, parse
 from tdac_envs.worlds.world import World
 
 
-def only(content: str) -> Node:
+def only(content: str) -> WbtNode:
     """The one node after the WorldInfo."""
     nodes = parse(text(content), "w.wbt").nodes
     assert len(nodes) == 2

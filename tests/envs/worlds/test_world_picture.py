@@ -7,7 +7,7 @@ from world_texts import EVERYTHING, text
 
 from tdac_envs import read_world
 from tdac_envs.drawing.canvas import FREE, GREEN, RED, TRAIL, WALL
-from tdac_envs.worlds.picture import SIDE, View, draw_world
+from tdac_envs.worlds.picture import SIDE, WorldCanvas, draw_world
 
 
 def share(image, colour):
@@ -42,7 +42,7 @@ def test_places_are_where_they_should_be():
         text("RectangleArena { floorSize 2 2 }",
              "WoodenBox { translation 0.5 0.25 0.05 size 0.4 0.2 0.1 }")
     )  # fmt: skip
-    image, view = draw_world(world), View((-1.01, -1.01, 1.01, 1.01))
+    image, view = draw_world(world), WorldCanvas((-1.01, -1.01, 1.01, 1.01))
     wood = (np.abs(image.astype(int) - (190, 146, 94)).max(axis=2) <= 8)[
         : -view.canvas.image.shape[0] + SIDE
     ]

@@ -21,7 +21,7 @@ _GAP = 0.6
 """Largest gap between the letters of a word, as a share of their height."""
 
 
-def without_words(
+def without_lettering(
     cells: BoolGrid, places: Sequence[tuple[int, int]]
 ) -> BoolGrid | None:
     """Removes the words that cover any of the places.

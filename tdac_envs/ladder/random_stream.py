@@ -53,7 +53,7 @@ def rounded(value: float) -> float:
     return round(value * FRACTIONS) / FRACTIONS
 
 
-class Words:
+class RandomStream:
     """Random numbers from the 64-bit words of a Philox counter.
 
     The first half of the key is Philox's key. The second half is the upper half of its

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,13 +9,14 @@ from functools import cached_property
 import cv2
 import numpy as np
 
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.grid.grid import BoolGrid, body_free, clearance
 
 Pixel = tuple[int, int]
 
 
 @dataclass(frozen=True, eq=False)
-class FoundWorld:
+class FileWorld:
     """A map with a task, as read from a file.
 
     Attributes:
@@ -53,14 +53,13 @@ class FoundWorld:
     @cached_property
     def content(self) -> str:
         """SHA-256 of the map."""
-        return hashlib.sha256(repr(self.shape).encode() + self.packed).hexdigest()
+        return sha256_of(repr(self.shape), self.packed)
 
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of everything that an episode or a result depends on."""
         task = (self.start, self.heading, self.goal, self.barn_seconds)
-        text = repr((self.name, self.kind, self.origin, self.content, task))
-        return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+        return sha256_of(repr((self.name, self.kind, self.origin, self.content, task)))
 
     def problem(self, radius: float, tolerance: float) -> str | None:
         """Why the task is not feasible, or None.

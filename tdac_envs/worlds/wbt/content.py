@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from tdac_envs.worlds.wbt.fields import text
-from tdac_envs.worlds.wbt.frames import Frame
-from tdac_envs.worlds.wbt.tree import Node
+from tdac_envs.worlds.wbt.frames import NodeFrame
+from tdac_envs.worlds.wbt.tree import WbtNode
 from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Unmodelled
 
 MOST_PARTS = 20_000
@@ -27,7 +27,7 @@ class WorldContent:
     parts: int = 0
 
     def obstacle(
-        self, node: Node, obstacle: Obstacle, place: int | None = None
+        self, node: WbtNode, obstacle: Obstacle, place: int | None = None
     ) -> None:
         """Inserts an obstacle at index `place`, by default at the end.
 
@@ -40,20 +40,22 @@ class WorldContent:
         at = len(self.obstacles) if place is None else place
         self.obstacles.insert(at, obstacle)
 
-    def left_out(self, node: Node, frame: Frame, why: str, solid: bool = True) -> None:
+    def left_out(
+        self, node: WbtNode, frame: NodeFrame, why: str, solid: bool = True
+    ) -> None:
         """Adds a node that is not modelled, with the reason."""
         x, y, _ = frame.origin.tolist()
         self.unmodelled.append(
             Unmodelled(name_of(node), node.kind, x, y, why, solid, node.line)
         )
 
-    def goal(self, frame: Frame) -> None:
+    def goal(self, frame: NodeFrame) -> None:
         """Adds the position of a node that is named as the goal."""
         x, y, _ = frame.origin.tolist()
         self.goals.append((x, y))
 
 
-def name_of(node: Node) -> str:
+def name_of(node: WbtNode) -> str:
     """The node's `name` field, else its DEF name, else an empty string.
 
     Raises:
@@ -62,6 +64,6 @@ def name_of(node: Node) -> str:
     return text(node, "name", node.define)
 
 
-def is_goal(node: Node) -> bool:
+def is_goal(node: WbtNode) -> bool:
     """Whether the node's name or DEF name is "goal", in any case."""
     return _GOAL in (node.define.lower(), name_of(node).lower())

@@ -15,11 +15,11 @@ from tdac_envs.grid.grid import OccupancyGrid, clearance
 from tdac_envs.grid.plan import distance_field
 from tdac_envs.movers.walls import Cells, cells_of, segments_of
 
-PLACES = 8
+DESTINATIONS = 8
 """Number of places on a map between which people walk."""
 
 
-class Places(NamedTuple):
+class Destinations(NamedTuple):
     """What people know of a map; read-only.
 
     Attributes:
@@ -39,7 +39,7 @@ class Places(NamedTuple):
     spacing: NDArray[np.float64]
 
     @classmethod
-    def none(cls) -> Places:
+    def none(cls) -> Destinations:
         """No places."""
         return cls(
             np.zeros((0, 7)), np.zeros((0, 0), np.int64), np.zeros(0, np.int64),
@@ -55,7 +55,7 @@ class Places(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def places_of(grid: OccupancyGrid, radius: float, reach: float) -> Places:
+def destinations_of(grid: OccupancyGrid, radius: float, reach: float) -> Destinations:
     """Places for people on a map, far from each other.
 
     Args:
@@ -80,7 +80,7 @@ def places_of(grid: OccupancyGrid, radius: float, reach: float) -> Places:
     fields = [spacing * distance_field(free, goal) for goal in goals]
     walls = segments_of(grid.cells)
     first, listed = cells_of(walls, grid.cells.shape, reach)
-    return Places(
+    return Destinations(
         read_only(walls), read_only(first), read_only(listed),
         read_only(np.array(fields), np.float32),
         read_only(np.array([float(spacing)])),
@@ -100,12 +100,12 @@ def _largest(free: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _goals(free: NDArray[np.bool_], wide: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Nodes (column, row) far from each other, with room for two if there are such."""
-    among = free & wide if (free & wide).sum() >= 4 * PLACES else free
+    among = free & wide if (free & wide).sum() >= 4 * DESTINATIONS else free
     if not among.any():
         return []
     row, column = (int(each[0]) for each in np.nonzero(among))
     nearest, goals = distance_field(free, (column, row)), []
-    for _ in range(PLACES):
+    for _ in range(DESTINATIONS):
         nearest[~among] = 0.0
         row, column = divmod(int(nearest.argmax()), free.shape[1])
         if nearest[row, column] <= 0.0:
