@@ -17,11 +17,13 @@ from tdac_agent.evaluation.evaluation_report import (
     PolicyRow,
     Timing,
 )
+from tdac_agent.evaluation.set_evaluation import SetEvaluation, SetRow
 from tdac_agent.tasks.units import Units
 
 NONE = "–"
-# Least width of long policy names, so that a table fits into 80 columns.
-WIDEST = 12
+# Least widths of long policy names, so that a table fits into 80 columns.
+WIDEST, WIDEST_ON_SET = 12, 16
+MOST_CAUSES = 6
 LEGEND = (
     "knows: what the policy may use; sensors include pose and goal, + map and + "
     "guidance come in addition to sensors, privileged is everything. 95 %: exact "
@@ -30,6 +32,14 @@ LEGEND = (
     "length of the speed (0 is smoothest); these are medians of the successes. gap: "
     "clearance beside the body, least / mean. ms/step: median / 99th percentile of a "
     "policy call, measured by the judge."
+)
+SET_LEGEND = (
+    "knows: what the policy may use; sensors include the goal, and the pose where the "
+    "set observes it. 95 %: exact interval of the rate (Clopper-Pearson); with several "
+    "runs on each world, worlds are resampled. SCT: success x OT / T (least possible "
+    "/ actual time); SPL: success x L / driven (shortest / actual path); BARN: at most "
+    "0.5 (docs/task-sets.md). hit: episodes with a contact; late: cut off at the "
+    "horizon; error: the policy's own, or too much CPU time."
 )
 PAIRED = (
     ">: reaches the goal more often; ~: no significant difference; by McNemar's exact "
@@ -157,3 +167,77 @@ def _counts(pair: PairedComparison) -> str:
 
 def _figure(value: float | None, decimals: int) -> str:
     return NONE if value is None else f"{value:.{decimals}f}"
+
+
+def show_set_evaluation(found: SetEvaluation, console: Console) -> None:
+    """Prints the scores, those by generator, failures, and pairs."""
+    worlds = f"worlds 0 to {found.worlds - 1} of {found.split}"
+    title = f"{found.set} {found.set_sha256[:8]}: {worlds}"
+    console.print(_scores(found, title))
+    console.print()
+    for row in found.rows:
+        _print_failures(row, console)
+    kinds = list(dict.fromkeys(kind for row in found.rows for kind in row.by_generator))
+    if len(kinds) > 1:
+        console.print(_by_generator(found, kinds))
+        console.print()
+    print_sentences(console, SET_LEGEND)
+    if found.comparisons:
+        console.print()
+        console.print(comparison_table(found.comparisons, several=False))
+        console.print(PAIRED, style="dim", highlight=False)
+
+
+def _policies(title: str, found: SetEvaluation) -> Table:
+    table = titled_table(title)
+    longest = max(len(row.policy) for row in found.rows)
+    table.add_column("policy", overflow="fold", min_width=min(longest, WIDEST_ON_SET))
+    return table
+
+
+def _scores(found: SetEvaluation, title: str) -> Table:
+    table = _policies(title, found)
+    table.add_column("knows", no_wrap=True)
+    for name in ("reached", "95 %", "SCT", "SPL", "BARN", "hit", "late", "error"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for policy, row in zip(found.policies, found.rows, strict=True):
+        cells = [NONE] * 5
+        if row.scores is not None and row.interval is not None:
+            colour = "green" if row.successes == row.worlds else "yellow"
+            colour = colour if row.successes else "red"
+            low, high = 100 * row.interval.low, 100 * row.interval.high
+            scores = row.scores.time, row.scores.path, row.scores.barn
+            cells = [
+                f"[{colour}]{row.successes}/{row.worlds}[/]",
+                f"{low:.0f}–{high:.0f}",
+                *(f"{score:.3f}" for score in scores),
+            ]
+        counts = (str(count) for count in (row.hit, row.timeouts, row.errors))
+        table.add_row(escape(policy.name), policy.knows, *cells, *counts)
+    return table
+
+
+def _by_generator(found: SetEvaluation, kinds: Sequence[str]) -> Table:
+    """Success and SCT of each policy in the worlds of each generator."""
+    table = _policies("by generator: reached, SCT", found)
+    for kind in kinds:
+        table.add_column(escape(kind), justify="right", no_wrap=True)
+    for row in found.rows:
+        own = [row.by_generator.get(kind) for kind in kinds]
+        cells = (
+            NONE if each is None else f"{100 * each.success:.0f} % {each.time:.2f}"
+            for each in own
+        )
+        table.add_row(escape(row.policy), *cells)
+    return table
+
+
+def _print_failures(row: SetRow, console: Console) -> None:
+    """The failures of a policy by cause; if nothing was driven, the reasons."""
+    if row.scores is None:
+        for text in row.told:
+            print_sentences(console, f"{row.policy}, not driven: {text}", indent=2)
+    elif row.causes:
+        causes = list(row.causes.items())[:MOST_CAUSES]
+        text = ", ".join(f"{count} {name}" for name, count in causes)
+        print_sentences(console, f"{row.policy}, failures: {text}", indent=2)

@@ -65,6 +65,7 @@ def prepare(
     robot_radius: float | None = None,
     snap: bool = False,
     said: ReadingOptions = DEFAULT_OPTIONS,
+    resolution: float | None = None,
     units: MapUnits = PIXELS,
 ) -> Prepared:
     """Reads a map and determines start, goal, heading and body radius.
@@ -79,6 +80,7 @@ def prepare(
         robot_radius: Body radius, px; from the params if None, else 15.
         snap: Whether to move start and goal to the nearest place where the body fits.
         said: Polarity and threshold of an image, where the user gave them.
+        resolution: Metres per pixel of an image that gives none.
         units: Units of messages and notes, from `units_of`.
 
     Raises:
@@ -87,9 +89,9 @@ def prepare(
     """
     if robot_radius is not None:
         robot_radius = positive("robot_radius", robot_radius)
-    given = _Given.of(start, goal, heading, robot_radius, snap, said, units)
+    given = _Given.of(start, goal, heading, robot_radius, snap, said, resolution, units)
     if not isinstance(source, str | Path):
-        _refuse(said, "a grid")
+        _refuse(given, "a grid")
         return _with_task(_from_cells(_as_cells(source), "array"), given)
     # To load a folder with the name of a bundled map, write `./maze`.
     if isinstance(source, str) and source in bundled_maps():
@@ -98,10 +100,10 @@ def prepare(
     path = Path(source)
     if path.is_dir():
         _check_is_map_folder(path)
-        _refuse(said, str(path))
+        _refuse(given, str(path))
         return _with_task(_from_folder(path), given)
     if path.suffix == ".npy":
-        _refuse(said, str(path))
+        _refuse(given, str(path))
         return _with_task(_from_npy(path), given)
     check_exists(path)
     return _from_image(path, given)
@@ -117,6 +119,7 @@ class _Given:
     robot_radius: float | None
     snap: bool
     said: ReadingOptions
+    resolution: float | None
     units: MapUnits = PIXELS
 
     @classmethod
@@ -128,6 +131,7 @@ class _Given:
         robot_radius: float | None,
         snap: bool,
         said: ReadingOptions,
+        resolution: float | None,
         units: MapUnits,
     ) -> _Given:
         at = end = None
@@ -140,7 +144,7 @@ class _Given:
             end = finite_point("goal", goal)
         if heading is not None:
             heading = finite("heading", heading)
-        return cls(at, end, heading, robot_radius, snap, said, units)
+        return cls(at, end, heading, robot_radius, snap, said, resolution, units)
 
     def or_else(self, bundled: BundledMap) -> _Given:
         """These options, with the values of a bundled map instead of None."""
@@ -151,6 +155,7 @@ class _Given:
             self.robot_radius or bundled.robot_radius,
             self.snap,
             self.said,
+            self.resolution,
             self.units,
         )
 
@@ -190,12 +195,15 @@ def _snapped(grid: OccupancyGrid, params: MapParams, units: MapUnits) -> MapPara
     return params.model_copy(update=changes)
 
 
-def units_of(source: MapSource, frame: str) -> MapUnits:
+def units_of(
+    source: MapSource, frame: str, resolution: float | None = None
+) -> MapUnits:
     """The units of places and lengths on a map: pixels, or metres in its frame.
 
     Args:
         source: As for `prepare`.
         frame: `"pixels"` or `"metres"`: what the user gives and reads.
+        resolution: As for `prepare`.
 
     Raises:
         TaskError: There is no such frame, or the map can have no metres.
@@ -213,7 +221,7 @@ def units_of(source: MapSource, frame: str) -> MapUnits:
     if path.is_dir():
         _check_is_map_folder(path)
         return MapUnits.metres(_from_folder(path).grid)
-    return MapUnits.metres(load_image(path))
+    return MapUnits.metres(load_image(path, resolution))
 
 
 def _from_image(image: Path, given: _Given) -> Prepared:
@@ -221,11 +229,11 @@ def _from_image(image: Path, given: _Given) -> Prepared:
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
     radius = given.robot_radius or RobotParams().radius
     ends = given.start, given.goal
-    how = given.snap, given.said, given.units
+    how = given.snap, given.said, given.resolution, given.units
     prepared = read(image, _digest(image), *ends, radius, *how)
     # Preprocessing has already snapped the points.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
-    rest = (given.heading, radius, False, DEFAULT_OPTIONS, given.units)
+    rest = (given.heading, radius, False, DEFAULT_OPTIONS, None, given.units)
     return _with_task(prepared, _Given(start, goal, *rest))
 
 
@@ -239,23 +247,27 @@ def _read_image(
     radius: float,
     snap: bool,
     said: ReadingOptions,
+    resolution: float | None,
     units: MapUnits,
 ) -> Prepared:
     # Imported late: grids need no preprocessing.
     from tdac_envs.mapping.preprocessing import preprocess
 
     how: Any = {"polarity": said.polarity, "threshold": said.threshold, "units": units}
-    grid, params = preprocess(image, start, goal, radius, snap=snap, **how)
+    picture = load_image(image, resolution)
+    grid, params = preprocess(picture, start, goal, radius, snap=snap, **how)
     return Prepared(grid, params, image)
 
 
-def _refuse(said: ReadingOptions, what: str) -> None:
+def _refuse(given: _Given, what: str) -> None:
     """Refuses image options for a map that is not an image."""
-    if said != DEFAULT_OPTIONS:
+    if given.said != DEFAULT_OPTIONS:
         raise TaskError(
             f"{what} already defines which cells are obstacles; leave out polarity and "
             "threshold"
         )
+    if given.resolution is not None:
+        raise TaskError(f"{what}: leave out the resolution, which is for images")
 
 
 def _digest(path: Path) -> str:

@@ -1,6 +1,6 @@
 """The command line: exit codes, one clear line for each mistake, clean JSON."""
 
-import inspect
+import dataclasses
 import json
 import os
 import re
@@ -17,9 +17,12 @@ import pytest
 import typer
 from small import SHORT, small_cells, write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.cli.main import PARTS, command_line
-from tdac_agent.cli.task_flags import task_flags
+from tdac_agent.cli.task_choice import changed_task
+from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, TaskFlags
 from tdac_agent.runs.resume import resume_arguments
+from tdac_agent.tasks.task import lay_out
 from tdac_envs.mapping.bundled import bundled_map
 
 COMMANDS = [
@@ -69,8 +72,9 @@ def test_help_and_version(tdac):
 
 def test_a_command_reads_no_flags_of_another():
     """Its own part of the command line alone is built; any other word gets them all."""
-    for words in (command.split() for command in COMMANDS):
-        assert len(command_line(words).registered_groups) == 1
+    for own in PARTS.values():
+        for word in own:
+            assert set(typer.main.get_command(command_line([word])).commands) == {*own}
     for words in ([], ["--help"], ["verfy"]):
         assert len(command_line(words).registered_groups) == len(PARTS)
 
@@ -91,20 +95,14 @@ def test_the_list_of_commands_is_made_without_their_flags():
 
 def test_a_task_is_named_by_the_same_flags_everywhere():
     """All commands on one task have them in one order; `synth` two more, for models."""
-    told_to_models = ["robot_image", "instructions"]
-    shared = [
-        name
-        for name in inspect.signature(task_flags).parameters
-        if name not in told_to_models
-    ]
-    for command in ("synth", "verify", "play", "check-suite"):
+    names = [field.name for field in dataclasses.fields(TaskFlags)]
+    shared = [each for each in names if each not in {*ONLY_FOR_SYNTH, "file"}]
+    for command in ("synth", "verify", "play", "mcp"):
         group = typer.main.get_command(command_line([command]))
-        names = [parameter.name for parameter in group.commands[command].params]
-        at = names.index("task")
-        flags = [name for name in names[at:] if name in {*shared, *told_to_models}]
-        assert [name for name in flags if name not in told_to_models] == shared
-        extra = [name for name in flags if name in told_to_models]
-        assert extra == (told_to_models if command == "synth" else [])
+        flags = [parameter.name for parameter in group.commands[command].params]
+        assert [each for each in flags if each in shared] == shared
+        extra = [each for each in flags if each in ONLY_FOR_SYNTH]
+        assert extra == ([*ONLY_FOR_SYNTH] if command == "synth" else [])
 
 
 def test_ctrl_c_while_the_command_line_is_loaded_is_one_line(tmp_path):
@@ -239,7 +237,7 @@ PLACES = {
     "unknown optimizer": ([*ENDS, "--optimizer", "gpt"], "unknown model 'gpt'"),
     "from a missing file": ([*ENDS, "--from", "no.py"], "'no.py'"),
     "no iterations": ([*ENDS, "-K", 0], "-K"),
-    "instructions": ([*ENDS, "--task", "maze"], "--task already defines the task"),
+    "two tasks": ([*ENDS, "--task", "maze"], "--task already defines the task"),
 }
 
 
@@ -506,11 +504,65 @@ def test_usage_names_arguments_without_braces(tdac):
 
 @pytest.mark.parametrize("command", [["verify"], ["play", "--video", "a.gif"]])
 @pytest.mark.parametrize("target", [".", "controller.py"])
-def test_a_folder_keeps_its_own_task(tdac, good, command, target):
-    """Flags that would change it are refused; another task can be named."""
-    code, _, errors = tdac(*command, good / target, "--start", "60", "35")
+def test_flags_change_the_task_of_a_folder(tdac, good, command, target):
+    """The note says that the verdict is not the folder's own."""
+    (good / "controller.py").write_text("def policy(obs):\n    return 0.0, 0.0\n")
+    words = (*command, good / target, "--start", "60", "35", "--robot-radius", "4")
+    code, out, _ = tdac(*words)
+    assert code == 1
+    assert out.startswith(
+        "judged as another task: start 60 35, robot-radius 4; this is not the verdict "
+        f"of {good}\n"
+    )
+
+
+def changed(folder, **flags):
+    """The task of a folder with these flags."""
+    return changed_task(load_task(folder), TaskFlags(**flags))
+
+
+def test_what_follows_from_start_and_goal_is_not_kept(good, tmp_path):
+    """The task file of a run has a horizon, which a longer way must not exceed."""
+    file, fixing = good / "task.yaml", "horizon: 400\n"
+    text = file.read_text()
+    file.write_text(text.replace(fixing, ""))
+    run = lay_out(load_task(good), tmp_path / "run")
+    fixed = load_task(run)
+    nearer = changed(run, goal=(100.0, 30.0), max_speed=0.5, rays=5)
+    assert nearer.nominal.horizon > 2 * fixed.nominal.horizon
+    assert nearer.nominal.robot.n_rays == 5
+    assert nearer.nominal.robot.radius == fixed.nominal.robot.radius
+    assert changed(run, tolerance=3.5).nominal.goal_tolerance == 3.5
+    wider = changed(run, robot_radius=7.0).nominal.robot
+    assert (wider.radius, wider.axle_length) == (7.0, 14.0)
+    assert changed(run).sha256() == fixed.sha256()
+    file.write_text(text)
+    assert changed(good, goal=(100.0, 30.0)).nominal.horizon == 400
+
+
+def test_changes_keep_whose_tests_may_run(good):
+    """A suite from elsewhere is not trusted because a flag changes the start."""
+    (good / "mine").mkdir()
+    (good / "mine" / "test_mine.py").write_text("def test_mine():\n    pass\n")
+    (good / "task.yaml").write_text((good / "task.yaml").read_text() + "suite: mine\n")
+    before, after = load_task(good), changed(good, goal=(100.0, 30.0))
+    assert not before.trusted
+    assert (after.trusted, after.suite, after.name) == (
+        False,
+        before.suite,
+        before.name,
+    )
+
+
+def test_a_run_that_is_not_there(tdac):
+    """The nearest one is named."""
+    Path("runs/maze-1").mkdir(parents=True)
+    code, _, err = tdac("play", "runs/nothing", "--video", "a.gif")
     assert code == 2
-    assert re.fullmatch(r"error: \S+ brings its own task: leave out --start\n", errors)
+    assert err == (
+        "error: there is no run or controller 'runs/nothing'; the nearest is "
+        "runs/maze-1\n"
+    )
 
 
 @pytest.mark.slow
@@ -599,9 +651,6 @@ def test_polarity_and_threshold_are_flags_and_keys(tdac, image, chessboard, tmp_
     code, _, err = tdac("synth", "--task", tmp_path / "task.yaml", "--dry-run")
     assert code == 2
     assert "lies in an obstacle" in err
-    code, _, err = tdac("synth", "--task", "maze", "--polarity", "dark")
-    assert code == 2
-    assert "leave out --polarity" in err
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif"])

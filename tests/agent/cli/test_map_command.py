@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,9 +12,11 @@ import pytest
 from small import small_cells
 
 from tdac_agent import load_task
-from tdac_agent.cli.flags import TaskFlags
-from tdac_agent.cli.places import with_places
-from tdac_envs.core.errors import RefusedError, TaskError
+from tdac_agent.cli.coordinates import with_coordinates
+from tdac_agent.cli.task_choice import chosen_task, kind_of_file
+from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.tasks.task import lay_out
+from tdac_envs.core.errors import MapError, RefusedError, TaskError
 
 # The small map is a ROS map of 0.1 m per px with its corner at (-2, -3) m.
 START, GOAL, RADIUS = ("1.05", "5.95"), ("11.05", "5.95"), ("--robot-radius", "0.6")
@@ -90,7 +93,8 @@ def test_a_task_in_metres_is_the_one_in_pixels(ros):
     """Start, heading, goal, radius and tolerance are converted; words stay metres."""
     flags = {"map_image": str(ros), "frame": "metres"}
     ends = {"start": (1.05, 5.95), "goal": (11.05, 5.95)}
-    task = TaskFlags(**flags, **ends, heading=math.pi / 2, robot_radius=0.6).load()
+    wanted = TaskFlags(**flags, **ends, heading=math.pi / 2, robot_radius=0.6)
+    task = chosen_task(wanted)
     assert task.nominal.start == pytest.approx((30, 30, -math.pi / 2))
     assert task.nominal.goal == pytest.approx((130, 30))
     assert task.nominal.body_radius == pytest.approx(6.0)
@@ -98,7 +102,7 @@ def test_a_task_in_metres_is_the_one_in_pixels(ros):
     assert task.setting.length_text(length) == f"{round(0.1 * length, 2):g} m"
     assert "metres" not in task.setting.portable()
     with pytest.raises(RefusedError, match=r"radius of \d\.\d+ m") as caught:
-        TaskFlags(**flags, **ends, robot_radius=4.0).load()
+        chosen_task(TaskFlags(**flags, **ends, robot_radius=4.0))
     assert " px" not in str(caught.value)
 
 
@@ -162,7 +166,7 @@ def test_a_numpy_grid(tdac, tmp_path):
     ],
 )
 def test_places_as_people_type_them(typed, understood):
-    assert with_places(typed.split()) == understood.split()
+    assert with_coordinates(typed.split()) == understood.split()
 
 
 @pytest.mark.parametrize(
@@ -188,7 +192,7 @@ def test_places_as_people_type_them(typed, understood):
 def test_places_that_are_none(typed, message):
     """Quoted as typed, with what is expected."""
     with pytest.raises(TaskError, match=f"^{re.escape(message)}"):
-        with_places(typed.split())
+        with_coordinates(typed.split())
 
 
 @pytest.mark.parametrize("start", ["30 30 --heading 90", "30 30 90", "30,30,90"])
@@ -213,7 +217,7 @@ def test_a_number_that_is_none(tdac):
 
 
 def test_a_place_in_one_word():
-    assert with_places(["--start", "90, 302", "c.py"]) == [
+    assert with_coordinates(["--start", "90, 302", "c.py"]) == [
         "--start",
         "90",
         "302",
@@ -222,34 +226,69 @@ def test_a_place_in_one_word():
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "message"),
     [
-        ["--snap"],
-        ["--polarity", "dark"],
-        ["--threshold", "3"],
-        ["--robot-radius", "3"],
-        ["--robot-image", "robot.png"],
-        ["--instructions", "Slowly."],
-        ["--map", "office"],
+        ("--map office", "--task already defines the task: leave out --map"),
+        ("--world maze", "--task already defines the task: leave out --world"),
+        ("--set known", "give --task or --set, not both"),
+        ("office", "give office or --task, not both"),
+        ("--ignore Tree", "--ignore: only valid with env: TDAC-EPuck-v0"),
+        ("--robot-image no.png", "no robot image"),
+        ("--rays 5000", "--rays: "),
+        ("--fov 400", "--fov: "),
+        ("--max-speed -1", "--max-speed: "),
+        ("--resolution 0.1 --map maze", "leave out --map"),
+        ("--heading 1", "--heading needs --start X Y"),
     ],
-    ids=" ".join,
 )
-def test_flags_beside_a_task_are_refused(tdac, words):
-    """One line names the flag, which would have no effect."""
-    code, out, err = tdac("synth", "--task", "maze", *words)
-    assert (code, out) == (2, "")
-    assert err == f"error: --task already defines the task: leave out {words[0]}\n"
+def test_flags_that_do_not_fit_a_task(tdac, words, message):
+    """One line names the flag."""
+    code, out, err = tdac("synth", "--task", "maze", *words.split())
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
 
 
-@pytest.mark.parametrize("words", [["--snap"], ["--polarity", "dark"]])
-def test_flags_beside_a_run_folder_are_refused(tdac, tmp_path, words):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "controller.py").write_text("x = 1\n")
-    (tmp_path / "run" / "task.yaml").write_text("map: maze\n")
-    code, _, err = tdac("verify", tmp_path / "run", *words)
-    assert code == 2
-    assert err.endswith(f"brings its own task: leave out {words[0]}\n")
-    assert err.count("\n") == 1
+@pytest.mark.parametrize(
+    ("file", "field"),
+    [
+        *(("plan.png", "map_image"), ("plan.yaml", "map_image"), ("a.wbt", "world")),
+        *(("task.yaml", "task"), ("set.yaml", "set_name"), ("run", "task")),
+        *(("set", "set_name"), ("office", "task"), ("unknown", "set_name")),
+        *(("a.py", None), ("nosuch", None), (".", None)),
+    ],
+)
+def test_a_file_is_what_it_looks_like(ros, monkeypatch, file, field):
+    """A map, a world, a task or a task set, also by name, needs no flag."""
+    monkeypatch.chdir(ros.parent)
+    for name, text in (("task", "map: plan.png\n"), ("set", "name: a\nworlds: []\n")):
+        Path(f"{name}.yaml").write_text(text)
+        folder = Path("run" if name == "task" else name)
+        folder.mkdir()
+        (folder / f"{name}.yaml").write_text(text)
+    (ros.parent / "empty").mkdir()
+    monkeypatch.chdir(ros.parent / "empty" if file == "." else ros.parent)
+    assert kind_of_file(file) == field
+
+
+def test_a_picture_with_a_resolution(ros):
+    """It is the ROS map with this resolution, but for its origin."""
+    ends = {"start": (3.05, 8.95), "goal": (13.05, 8.95), "robot_radius": 0.6}
+    flags = TaskFlags(map_image=str(ros.parent / "plan.png"), metres=True, **ends)
+    with pytest.raises(MapError, match="no resolution"):
+        chosen_task(flags)
+    task = chosen_task(replace(flags, resolution=0.1))
+    assert task.nominal.start[:2] == pytest.approx((30, 30))
+    assert task.nominal.body_radius == pytest.approx(6.0)
+    with pytest.raises(MapError, match=r"plan.yaml gives 0.1 m per px"):
+        chosen_task(replace(flags, map_image=str(ros), resolution=0.2))
+    file = ros.parent / "task.yaml"
+    file.write_text(
+        "map: plan.png\nresolution: 0.1\nframe: metres\nstart: [3.05, 8.95]\n"
+        "goal: [13.05, 8.95]\nrobot: {radius: 0.6}\n"
+    )
+    assert load_task(file).sha256() == task.sha256()
+    again = lay_out(task, ros.parent / "run")
+    assert load_task(again).sha256() == task.sha256()
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -276,7 +315,7 @@ def test_the_grid_as_a_ros_map(tdac, tmp_path):
     ("words", "message"),
     [
         (["office", "--yaml"], "gives no resolution; add --resolution METRES"),
-        (["office", "--resolution", 0.05], "--resolution needs --yaml"),
+        (["office", "--metres"], "metres"),
         (["office", "--yaml", "--resolution", 0], "expected metres per pixel, got 0"),
     ],
 )

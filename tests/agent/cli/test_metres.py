@@ -36,12 +36,11 @@ def folder(plan, tmp_path):
     """A folder like that of a run: a controller, and its task in pixels."""
     file = tmp_path / "task.yaml"
     file.write_text(
-        f"map: {plan}\nframe: metres\nstart: [1.05, 5.95]\ngoal: [11.05, 5.95]\n"
-        "robot: {radius: 0.6}\nprofile: policy\nhorizon: 300\n"
+        f"map: {plan}\nstart: [30, 30]\ngoal: [130, 30]\nrobot: {{radius: 6}}\n"
+        "profile: policy\nhorizon: 300\n"
     )
     lay_out(load_task(file), tmp_path / "run")
     (tmp_path / "run" / "controller.py").write_text(FORWARD)
-    assert "metres:" not in (tmp_path / "run" / "task.yaml").read_text()
     return tmp_path / "run"
 
 
@@ -130,7 +129,10 @@ def test_an_evaluation_in_metres(tdac, plan, folder):
         (("--task", "plan.yaml"), "plan.yaml is a map, not a task: give --map plan.ya"),
         (("--task", "a.wbt"), "a.wbt is a world, not a task: give --world a.wbt"),
         (("--map", "plan.yaml"), "needs --start X Y and --goal X Y"),
-        (("--start", "1", "2"), "--start needs --map or --world"),
+        (
+            ("--start", "1", "2", "--task", "maze", "--task", "office"),
+            "--start changes one task: give one --task",
+        ),
     ],
 )
 def test_a_map_is_no_task(tdac, plan, monkeypatch, words, message):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from tdac_agent.cli.progress import Progress
+from tdac_agent.cli.progress import SynthProgress
 from tdac_agent.cli.run_view import list_tests, show_run
 from tdac_agent.runs.run_record import Attempt, Run, Status
 
@@ -18,7 +18,7 @@ TESTS = tuple(f"test_end_to_end.py::test_number_{n}_of_many" for n in range(9))
 def shown(*records):
     """The lines that records leave on the screen, and all of their words."""
     console = Console(file=io.StringIO(), width=80)
-    with Progress(console, "task: what it is") as progress:
+    with SynthProgress(console, "task: what it is") as progress:
         for record in records:
             progress(record)
     return told(console)
