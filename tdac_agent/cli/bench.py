@@ -16,7 +16,7 @@ from tdac_agent.bench.page import PAGE
 from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, write_merged
 from tdac_agent.bench.shown import reveal as reveal_folder
-from tdac_agent.cli.bench_flags import BenchOptions, ShowOptions
+from tdac_agent.cli.bench_flags import BenchOptions, RevealOptions, ShowOptions
 from tdac_agent.cli.bench_view import show
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.driving_bar import DrivingBar
@@ -147,10 +147,9 @@ def show_folders(options: ShowOptions) -> int:
     return 0
 
 
-def reveal(folder: Path, salt_file: Path) -> int:
+def reveal(options: RevealOptions) -> int:
     """Publishes the hidden worlds of a bench; returns 0."""
-    reveal_folder(folder, salt_file)
-    print_plain(
-        Console(), f"wrote {WORLD_TABLE}, {SALT} to {folder}: its worlds are public now"
-    )
+    reveal_folder(options.folder, options.salt_file)
+    text = f"wrote {WORLD_TABLE}, {SALT} to {options.folder}"
+    print_plain(Console(), f"{text}: its worlds are public now")
     return 0

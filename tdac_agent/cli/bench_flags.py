@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import typer
 
@@ -75,8 +75,8 @@ class BenchOptions:
     epilog="Examples: `tdac bench builtin dwa mine.py --set unknown`; `tdac bench "
     "builtin ppo=a.zip,b.zip --set known,crowd --split hidden -n 400 --out arena`",
 )
-@typed_options()
-def run_command(options: BenchOptions) -> int:
+@typed_options("bench:run")
+def run_command(options: BenchOptions) -> None:
     """Drive entrants on the same worlds of task sets, and compare them.
 
     For a ranking to publish: several sets, hidden worlds, seeds of a training, figures.
@@ -84,9 +84,6 @@ def run_command(options: BenchOptions) -> int:
     `tdac bench show DIR...` shows results again, `tdac bench reveal DIR` publishes
     hidden worlds.
     """
-    from tdac_agent.cli import bench
-
-    return bench.run(options)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,24 +104,22 @@ class ShowOptions:
     epilog="Examples: `tdac bench show bench-1`; "
     "`tdac bench show mine theirs --out both`",
 )
-@typed_options()
-def show_command(options: ShowOptions) -> int:
+@typed_options("bench:show_folders")
+def show_command(options: ShowOptions) -> None:
     """Show results again, or those of several folders together."""
-    from tdac_agent.cli import bench
 
-    return bench.show_folders(options)
+
+@dataclass(frozen=True, slots=True)
+class RevealOptions:
+    """The flags of `tdac bench reveal`."""
+
+    folder: Path = option(..., "Folder with results.", argument=True, metavar="DIR")
+    salt_file: Path = option(..., "The salt of its hidden worlds.", metavar="FILE")
 
 
 @bench_app.command(
     "reveal", epilog="Example: `tdac bench reveal bench-1 --salt-file my.salt`"
 )
-def reveal_command(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with results.")],
-    salt_file: Annotated[
-        Path, typer.Option(metavar="FILE", help="The salt of its hidden worlds.")
-    ],
-) -> int:
+@typed_options("bench:reveal")
+def reveal_command(options: RevealOptions) -> None:
     """Publish the hidden worlds of a bench: their salt and all episodes."""
-    from tdac_agent.cli import bench
-
-    return bench.reveal(folder, salt_file)

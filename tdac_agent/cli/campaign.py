@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.markup import escape
 
-from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
+from tdac_agent.campaign.config import CampaignConfig
 from tdac_agent.campaign.drive import (
     campaign_folder,
     read_progress,
@@ -21,6 +21,7 @@ from tdac_agent.campaign.drive import (
 from tdac_agent.campaign.perform import Terms
 from tdac_agent.campaign.plan import Plan, PlannedRun, Shard, make_plan, models_of
 from tdac_agent.campaign.progress import Progress
+from tdac_agent.cli.campaign_dry_run import dry_run, read_campaign
 from tdac_agent.cli.campaign_flags import CampaignOptions
 from tdac_agent.cli.campaign_live import LiveView
 from tdac_agent.cli.campaign_table import make_console, progress_line
@@ -35,17 +36,6 @@ from tdac_agent.models.ready import check_ready, check_servers
 from tdac_agent.models.tariff import bounds_of, tariffs_of
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
-FOLDER = Path("campaigns")
-
-
-def read_campaign(options: CampaignOptions) -> tuple[Path, CampaignConfig, Path]:
-    """The campaign file, its contents with the typed limits, and the folder."""
-    file = find_config(options.config)
-    limits = {"max_cost": options.max_cost, "max_tokens": options.max_tokens}
-    typed = {name: value for name, value in limits.items() if value is not None}
-    config = read_config(file).model_copy(update=typed)
-    return file, config, options.out or FOLDER / config.name
-
 
 def command_of(options: CampaignOptions) -> str:
     """The command line that continues the campaign."""
@@ -55,6 +45,8 @@ def command_of(options: CampaignOptions) -> str:
 
 def run(options: CampaignOptions) -> int:
     """Runs a campaign and prints its progress and results; returns the exit code."""
+    if options.dry_run:
+        return dry_run(options)
     console, shard = make_console(stderr=options.as_json), Shard.parse(options.shard)
     file, config, folder = read_campaign(options)
     key_over_http = options.key_over_http

@@ -1,17 +1,17 @@
-"""`tdac campaign --dry-run`: the runs and their maximum cost."""
+"""What `tdac campaign` reads, and `--dry-run`: the runs and their maximum cost."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.campaign.config import CampaignConfig
+from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
 from tdac_agent.campaign.drive import read_progress
 from tdac_agent.campaign.perform import RUNS
 from tdac_agent.campaign.plan import Cell, Plan, Shard, make_plan, models_of
-from tdac_agent.cli.campaign import read_campaign
 from tdac_agent.cli.campaign_flags import CampaignOptions
 from tdac_agent.cli.campaign_table import labels_of, make_console, make_table
 from tdac_agent.cli.console import print_json
@@ -23,6 +23,7 @@ from tdac_agent.models.prices import PriceList, load_prices, price_file
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 
+FOLDER = Path("campaigns")
 LEGEND = (
     "K: iterations; J: repairs per iteration; questions: of all runs if no controller "
     "ever passes; USD once, 3 times: cost if each question is asked once, or three "
@@ -53,6 +54,15 @@ class PlanRow:
     cost_most: float | None
 
 
+def read_campaign(options: CampaignOptions) -> tuple[Path, CampaignConfig, Path]:
+    """The campaign file, its contents with the typed limits, and the folder."""
+    file = find_config(options.config)
+    limits = {"max_cost": options.max_cost, "max_tokens": options.max_tokens}
+    typed = {name: value for name, value in limits.items() if value is not None}
+    config = read_config(file).model_copy(update=typed)
+    return file, config, options.out or FOLDER / config.name
+
+
 def _limits(config: CampaignConfig) -> str:
     """The limits of all runs together, and how they are set; empty without any."""
     words = []
@@ -65,7 +75,7 @@ def _limits(config: CampaignConfig) -> str:
     return " and ".join(words)
 
 
-def run(options: CampaignOptions) -> int:
+def dry_run(options: CampaignOptions) -> int:
     """Prints the plan and returns 0; asks no model, needs no key, writes nothing."""
     console, shard = make_console(stderr=options.as_json), Shard.parse(options.shard)
     file, config, folder = read_campaign(options)

@@ -67,17 +67,10 @@ class CampaignOptions:
     epilog="Examples: `tdac campaign offline`; `tdac campaign my.yaml --dry-run`; "
     "`tdac campaign my.yaml --workers 8 --max-cost 40`"
 )
-@typed_options()
-def campaign(options: CampaignOptions) -> int:
+@typed_options("campaign:run")
+def campaign(options: CampaignOptions) -> None:
     """Carry out all synthesis runs of an experiment, and write their tables.
 
     The file asks for R runs of each task × learner × optimizer × prompt × setting. The
     same command continues an interrupted campaign; finished runs are not repeated.
     """
-    if options.dry_run:
-        from tdac_agent.cli import campaign_dry_run as dry
-
-        return dry.run(options)
-    from tdac_agent.cli import campaign as command
-
-    return command.run(options)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.mistakes import begun
 from tdac_agent.cli.options import (
     Profile,
     json_option,
@@ -40,10 +39,6 @@ class CheckSuiteOptions:
 @app.command(
     "check-suite", epilog="Example: `tdac check-suite --task office --suite my_tests`"
 )
-@typed_options(without=(*ONLY_FOR_SYNTH, "set_name"))
-def check_suite(task: TaskFlags, options: CheckSuiteOptions) -> int:
+@typed_options("check_suite:run", without=(*ONLY_FOR_SYNTH, "set_name"))
+def check_suite(flags: TaskFlags, options: CheckSuiteOptions) -> None:
     """Check that a suite passes a good controller and fails bad ones."""
-    with begun():
-        from tdac_agent.cli import check_suite as command
-
-    return command.run(task, options)

@@ -24,7 +24,7 @@ from tdac_agent.tasks.setting import Setting
 from tdac_envs.ladder.task_sets import TaskSet
 
 
-def run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int:
+def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int:
     """Prints the prompt alone to stdout, the rest to stderr; returns 0."""
     names = options.learner, options.optimizer or options.learner
     for name in names:

@@ -75,14 +75,11 @@ class EvaluateOptions:
     "--task epuck`; `tdac evaluate runs/maze-1 ppo.zip --task maze --out compared`; "
     "`tdac evaluate builtin ppo.zip --set unknown -n 20`"
 )
-@typed_options(without=(*ONLY_FOR_SYNTH, "task", "file"))
-def evaluate(options: EvaluateOptions, task: TaskFlags) -> int:
+@typed_options("evaluate:run", without=(*ONLY_FOR_SYNTH, "task", "file"))
+def evaluate(options: EvaluateOptions, flags: TaskFlags) -> None:
     """Compare policies of any kind on the same tasks and seeds, or on a task set.
 
     For your own work: a few policies, single tasks, a quick answer. For a ranking on
     several sets, on hidden worlds or with several seeds of a training, use `tdac
     bench`.
     """
-    from tdac_agent.cli import evaluate as command
-
-    return command.run(task, options)

@@ -38,15 +38,12 @@ class MapOptions:
 
 
 @app.command("map", epilog="Example: `tdac map plan.png --start 90 302 --goal 178 386`")
-@typed_options(without=NOT_OF_A_MAP)
-def map_command(options: MapOptions, task: TaskFlags) -> None:
+@typed_options("maps:run", without=NOT_OF_A_MAP)
+def map_command(options: MapOptions, flags: TaskFlags) -> None:
     """Turn a map image into an occupancy grid, with a preview.
 
     The preview has rulers, in pixels or metres, to read off start and goal.
     """
-    from tdac_agent.cli import maps
-
-    maps.run(options, task)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,9 +58,6 @@ class WorldOptions:
 
 
 @app.command("world", epilog="Example: `tdac world maze.wbt --png maze.png`")
-@typed_options()
+@typed_options("world:run")
 def world_command(options: WorldOptions) -> None:
     """Show the e-pucks, goal, arena and obstacles of a Webots world."""
-    from tdac_agent.cli import world
-
-    world.run(options)

@@ -41,18 +41,18 @@ LEGEND = (
 )
 
 
-def run(options: MapOptions, typed: TaskFlags) -> None:
+def run(options: MapOptions, flags: TaskFlags) -> None:
     """Preprocesses a map, writes its folder and prints the best candidates."""
-    if (typed.start is None) != (typed.goal is None):
+    if (flags.start is None) != (flags.goal is None):
         raise TaskError("give both --start X Y and --goal X Y, or neither")
-    check_values(typed)
-    path, scale = Path(options.image), typed.resolution
+    check_values(flags)
+    path, scale = Path(options.image), flags.resolution
     if options.image in bundled_maps():
         bundled = bundled_map(options.image)
-        path, typed = bundled.image, _or_else(typed, bundled)
-    frame = "metres" if typed.in_metres else "pixels"
-    units = units_of(path, frame, scale).with_typed(typed.start, typed.goal)
-    task = in_pixels(typed, units)
+        path, flags = bundled.image, _or_else(flags, bundled)
+    frame = "metres" if flags.in_metres else "pixels"
+    units = units_of(path, frame, scale).with_typed(flags.start, flags.goal)
+    task = in_pixels(flags, units)
     source = load_image(path, scale)
     if options.ros and source.resolution is None:
         raise TaskError(
@@ -101,14 +101,14 @@ def run(options: MapOptions, typed: TaskFlags) -> None:
         )
 
 
-def _or_else(typed: TaskFlags, bundled: BundledMap) -> TaskFlags:
+def _or_else(flags: TaskFlags, bundled: BundledMap) -> TaskFlags:
     """The flags, with the values of a bundled map instead of None."""
     return replace(
-        typed,
-        start=typed.start or bundled.start,
-        goal=typed.goal or bundled.goal,
-        heading=bundled.heading if typed.heading is None else typed.heading,
-        robot_radius=typed.robot_radius or bundled.robot_radius,
+        flags,
+        start=flags.start or bundled.start,
+        goal=flags.goal or bundled.goal,
+        heading=bundled.heading if flags.heading is None else flags.heading,
+        robot_radius=flags.robot_radius or bundled.robot_radius,
     )
 
 

@@ -47,14 +47,11 @@ class McpOptions:
     epilog="Examples: `claude mcp add tdac -- tdac mcp --set unknown`; "
     "`tdac mcp --task maze --out runs/mine`; `tdac mcp --set lost --http`"
 )
-@typed_options(without=ONLY_FOR_SYNTH)
-def mcp(task: TaskFlags, options: McpOptions) -> None:
+@typed_options("mcp:run", without=ONLY_FOR_SYNTH)
+def mcp(flags: TaskFlags, options: McpOptions) -> None:
     """Serve coding agents, which write and submit controllers (MCP).
 
     An agent starts the command itself and talks to it on stdin and stdout, or reaches
     it by --http. Its submissions are judged in the sandbox and kept as a run. On a task
     set, they drive on worlds of dev, and the chosen one on hidden worlds.
     """
-    from tdac_agent.cli import mcp as command
-
-    command.run(task, options)

@@ -12,6 +12,7 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.controller_choice import (
     change_note,
     controller_and_task,
+    controller_file,
     with_own_set,
 )
 from tdac_agent.cli.display import has_display
@@ -60,11 +61,12 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
         raise TaskError("give --episode or --seed, not both")
     disturbance = noise.disturbance()
     name = _checked(options.episode)
-    check_video(options.video)
     flags = with_own_set(options.controller, flags)
     check_scope(flags.set_name is not None, flags, options, noise)
     if flags.set_name is not None:
         return _play_world(flags.set_name, options)
+    controller_file(options.controller)  # fails early on a wrong name
+    check_video(options.video)
     file, task = controller_and_task(options.controller, flags)
     if note := change_note(options.controller, flags):
         print(note)
@@ -82,6 +84,7 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
 def _play_world(name: str, options: PlayOptions) -> int:
     """Plays an episode on a world of a task set; returns as `run` does."""
     check_shown(options.split)
+    check_video(options.video)
     tasks, split, index = load_set(name), options.split, options.index
     compile_for_set(tasks)
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:

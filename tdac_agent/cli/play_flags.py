@@ -60,13 +60,10 @@ class PlayOptions:
     "`tdac play runs/maze-1 --seed 17`; `tdac play runs/maze-1 --goal 178 386`; "
     "`tdac play builtin --set unknown --index 3 --video unknown.gif`"
 )
-@typed_options(without=ONLY_FOR_SYNTH)
-def play(options: PlayOptions, task: TaskFlags, noise: NoiseFlags) -> int:
+@typed_options("play:run", without=ONLY_FOR_SYNTH)
+def play(options: PlayOptions, flags: TaskFlags, noise: NoiseFlags) -> None:
     """Show one episode of a controller, run in the sandbox.
 
     The episode is one of `tdac verify`, or with --seed one of `tdac verify --robust`,
     or with --set one of `tdac verify --set`.
     """
-    from tdac_agent.cli import play as command
-
-    return command.run(task, options, noise)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import typer
 from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
@@ -37,8 +38,10 @@ LONGEST_CAPTION = 14
 """Longest name of a world on a contact sheet, letters."""
 
 
-def list_sets(as_json: bool) -> None:
-    """Prints the task sets that come with the package."""
+def list_sets(context: typer.Context, as_json: bool) -> None:
+    """Prints the task sets that come with the package, unless one is to be shown."""
+    if context.invoked_subcommand is not None:
+        return
     sets = [load_set(name) for name in shipped_names()]
     if as_json:
         print_json([_record(each) for each in sets])

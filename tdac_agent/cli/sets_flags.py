@@ -49,12 +49,9 @@ class ShowSetOptions:
     invoke_without_command=True,
     epilog="Examples: `tdac sets`; `tdac sets show unknown --index 3 --png world.png`",
 )
+@typed_options("sets:list_sets")
 def sets_command(context: typer.Context, as_json: Json = False) -> None:
     """List task sets, or show the worlds of one."""
-    if context.invoked_subcommand is None:
-        from tdac_agent.cli import sets
-
-        sets.list_sets(as_json)
 
 
 @sets_app.command(
@@ -62,9 +59,6 @@ def sets_command(context: typer.Context, as_json: Json = False) -> None:
     epilog="Examples: `tdac sets show lost`; `tdac sets show unknown --index 3`; "
     "`tdac sets show my_set.yaml --sheet worlds.png`",
 )
-@typed_options()
+@typed_options("sets:show")
 def show_command(options: ShowSetOptions) -> None:
     """Show a task set, and the figures and pictures of its worlds."""
-    from tdac_agent.cli import sets
-
-    sets.show(options)

@@ -26,13 +26,10 @@ class StudioOptions:
 
 
 @app.command(epilog="Example: `tdac studio --open`")
-@typed_options()
+@typed_options("studio:run")
 def studio(options: StudioOptions) -> None:
     """Choose maps, watch candidates drive, and start runs, in the browser.
 
     The page shows the files and runs of the current folder. Only the browser that opens
     the printed address gets in.
     """
-    from tdac_agent.cli import studio as command
-
-    command.run(options)

@@ -9,9 +9,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import typer
 from rich.markup import escape
 
 from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.dry_run import dry_run
 from tdac_agent.cli.progress import SynthProgress
 from tdac_agent.cli.run_view import show_run, show_selection
 from tdac_agent.cli.sentences import print_plain
@@ -54,8 +56,19 @@ WITH_RESUME = ALLOWED | {
 _EXIT = {"verified": 0, "selected": 0, "budget": 4}
 
 
-def run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int:
+def run(
+    context: typer.Context,
+    flags: TaskFlags,
+    options: SynthOptions,
+    run_flags: RunFlags,
+) -> int:
     """Synthesises a controller and prints the run; returns the exit code."""
+    if run_flags.resume is not None:
+        sources = {name: context.get_parameter_source(name) for name in context.params}
+        typed = {n for n, s in sources.items() if s and s.name == "COMMANDLINE"}
+        return resume(options, run_flags, typed)
+    if run_flags.dry_run:
+        return dry_run(flags, options, run_flags)
     check_tier(options.tier)
     check_models(options)
     console = Console(stderr=run_flags.as_json)

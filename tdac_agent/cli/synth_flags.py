@@ -7,7 +7,6 @@ from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.mistakes import begun
 from tdac_agent.cli.options import (
     Profile,
     json_option,
@@ -50,24 +49,15 @@ class RunFlags:
     "`tdac synth --learner anthropic:claude-sonnet-5-5`; "
     "`tdac synth --set known`; `tdac synth --resume runs/maze-1`"
 )
-@typed_options()
+@typed_options("synth:run")
 def synth(
-    context: typer.Context, task: TaskFlags, options: SynthOptions, run: RunFlags
-) -> int:
+    context: typer.Context,
+    flags: TaskFlags,
+    options: SynthOptions,
+    run_flags: RunFlags,
+) -> None:
     """Write, test and repair a controller until it is verified.
 
     With --set, it is written for worlds that it has never seen: the best one on worlds
     of the split dev is selected.
     """
-    with begun():
-        from tdac_agent.cli import synth as command
-
-    if run.resume is not None:
-        sources = {n: context.get_parameter_source(n) for n in context.params}
-        typed = {n for n, s in sources.items() if s and s.name == "COMMANDLINE"}
-        return command.resume(options, run, typed)
-    if run.dry_run:
-        from tdac_agent.cli import dry_run
-
-        return dry_run.run(task, options, run)
-    return command.run(task, options, run)

@@ -113,9 +113,6 @@ class TrainOptions:
     "--seed 1`; `tdac train --task maze --task office --variation random`; "
     "`tdac train --set unknown --steps 100000`"
 )
-@typed_options()
-def train(options: TrainOptions) -> int:
+@typed_options("train:run")
+def train(options: TrainOptions) -> None:
     """Train a baseline policy with stable-baselines3 on tasks or a task set."""
-    from tdac_agent.cli import train as command
-
-    return command.run(options)

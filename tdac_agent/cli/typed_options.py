@@ -1,8 +1,8 @@
 """Makes a flag of each field of an options dataclass, and words of its values again.
 
     @app.command()
-    @typed_options()
-    def synth(task: TaskFlags, options: SynthOptions) -> int: ...
+    @typed_options("bench:run")
+    def bench(options: BenchOptions) -> None: ...
 
 The fields are declared with `tdac_agent.options.option`. The command is called with the
 objects, so that a new field needs no other line here.
@@ -15,31 +15,40 @@ import functools
 import inspect
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
+from importlib import import_module
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
 
+from tdac_agent.cli.mistakes import begun
 from tdac_agent.options import Flag, flag_of
 
 Command = Callable[..., Any]
 
 
-def typed_options(*, without: Collection[str] = ()) -> Callable[[Command], Command]:
+def typed_options(
+    work: str | None = None, *, without: Collection[str] = ()
+) -> Callable[[Command], Command]:
     """Replaces each parameter whose type is a dataclass by flags for its fields.
 
     Args:
+        work: What the command runs, with its arguments: a function of a module of
+            `tdac_agent.cli`, as in `bench:run`, which is imported when it runs. By
+            default, the command itself.
         without: Names of fields that the command has no flags for; they keep their
             defaults.
     """
-    return lambda command: _WithFlags(command, without)
+    return lambda command: _WithFlags(command, work, without)
 
 
 class _WithFlags:
     """A command with flags. Typer reads signature and annotations if it needs them."""
 
-    def __init__(self, command: Command, without: Collection[str]) -> None:
+    def __init__(
+        self, command: Command, work: str | None, without: Collection[str]
+    ) -> None:
         functools.update_wrapper(self, command, ("__name__", "__doc__", "__module__"))
-        self._command, self._without = command, without
+        self._command, self._work, self._without = command, work, without
 
     @functools.cached_property
     def _kinds(self) -> dict[str, Any]:
@@ -69,7 +78,16 @@ class _WithFlags:
     def __call__(self, **values: Any) -> Any:
         options = {name: _object(kind, values) for name, kind in self._kinds.items()}
         check_needs(options.values())
-        return self._command(**values, **options)
+        return self._loaded()(**values, **options)
+
+    def _loaded(self) -> Command:
+        """The function that does the work; its imports may take seconds."""
+        if self._work is None:
+            return self._command
+        module, _, name = self._work.partition(":")
+        with begun():
+            work: Command = getattr(import_module(f"tdac_agent.cli.{module}"), name)
+        return work
 
 
 def _fields(kind: Any) -> dict[str, tuple[dataclasses.Field[Any], Flag, Any]]:

@@ -27,7 +27,7 @@ from tdac_envs.core.errors import TaskError
 if TYPE_CHECKING:
     from tdac_agent.cli.options import NoiseFlags
     from tdac_agent.cli.task_flags import TaskFlags
-    from tdac_agent.cli.verify_flags import VerifyOptions
+    from tdac_agent.cli.verify_options import VerifyOptions
     from tdac_agent.evaluation.robust_report import RobustReport
     from tdac_agent.evaluation.set_report import SetReport
     from tdac_agent.tasks.task import Task

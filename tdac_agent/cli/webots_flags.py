@@ -81,15 +81,12 @@ class WebotsOptions:
 @webots_app.command(
     "run", epilog="Example: `tdac webots run my_controller.py maze.wbt --steps 4000`"
 )
-@typed_options()
-def webots_run(options: WebotsOptions) -> int:
+@typed_options("webots:run")
+def webots_run(options: WebotsOptions) -> None:
     """Run an unmodified Webots controller, judged by the environment.
 
     Exits with 0 if it reached the goal (if there is one) and touched nothing.
     """
-    from tdac_agent.cli import webots
-
-    return webots.run(options)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,16 +102,13 @@ class ExportWebotsOptions:
 @export_app.command(
     "webots", epilog="Example: `tdac export webots runs/epuck-1 --out my_project`"
 )
-@typed_options()
-def export_webots(options: ExportWebotsOptions) -> int:
+@typed_options("export:run_webots")
+def export_webots(options: ExportWebotsOptions) -> None:
     """Write a Webots project with a verified e-puck controller.
 
     The controller is unchanged; an adapter supplies its observations. The project is
     then run once by tdac, not by Webots itself.
     """
-    from tdac_agent.cli import export
-
-    return export.run_webots(options)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,14 +132,11 @@ class ExportHarborOptions:
 @export_app.command(
     "harbor", epilog="Example: `tdac export harbor --set unknown --out my_task`"
 )
-@typed_options(without=ONLY_FOR_SYNTH)
-def export_harbor(task: TaskFlags, options: ExportHarborOptions) -> int:
+@typed_options("export:run_harbor", without=ONLY_FOR_SYNTH)
+def export_harbor(flags: TaskFlags, options: ExportHarborOptions) -> None:
     """Write a task or a task set as a task folder of Harbor.
 
     It has the instruction, the agent's environment, tests that judge with tdac in a
     container of their own, and an oracle. The hidden worlds of a set follow from a salt
     that is drawn now; only the tests have it.
     """
-    from tdac_agent.cli import export
-
-    return export.run_harbor(task, options)
