@@ -148,7 +148,7 @@ def _with_named_files(
             flags = with_named_file(replace(flags, file=name))
     if not policies:
         raise TaskError(
-            "which policies? give files, run folders or names such as builtin"
+            "no policy: give files, run folders, or names such as builtin"
         )
     return replace(options, policies=tuple(policies), tasks=tuple(tasks)), flags
 

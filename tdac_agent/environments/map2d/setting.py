@@ -287,7 +287,7 @@ def robot_text(robot: RobotParams, units: MapUnits) -> str:
     return (
         f"robot: radius {units.length(robot.radius)}, full speed "
         f"{units.length(robot.max_wheel_speed, 0)}/s (to change them: --robot-radius, "
-        "and robot: {max_wheel_speed: …} in a task.yaml)"
+        "--max-speed)"
     )
 
 

@@ -174,4 +174,4 @@ def test_the_robot_of_a_map_in_metres(tdac, plan):
     """Its default speed in pixels is fast in metres, so it is printed."""
     _, text, _ = tdac("map", plan, "--metres", *ENDS)
     assert "robot: radius 0.6 m, full speed 7.6 m/s" in text
-    assert "max_wheel_speed" in text
+    assert "--max-speed" in text
