@@ -121,7 +121,7 @@ def _run_remaining(
     executor: str,
     console: Console,
 ) -> None:
-    with LiveView(console, progress, terms) as view:
+    with LiveView(console, progress) as view:
         run_all(progress, remaining, terms, executor_of(executor), view.saw)
 
 

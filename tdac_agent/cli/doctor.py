@@ -115,9 +115,9 @@ def _window() -> Check:
 def _extras() -> list[Check]:
     checks = []
     for extra, module in EXTRAS.items():
-        found = importlib.util.find_spec(module) is not None
-        detail = module if found else f"optional: {install_command(extra)}"
-        checks.append(Check(f"extra {extra}", found, detail))
+        is_installed = importlib.util.find_spec(module) is not None
+        detail = module if is_installed else f"optional: {install_command(extra)}"
+        checks.append(Check(f"extra {extra}", is_installed, detail))
     return checks
 
 

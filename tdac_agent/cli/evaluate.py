@@ -147,9 +147,7 @@ def _with_named_files(
         else:
             flags = with_named_file(replace(flags, file=name))
     if not policies:
-        raise TaskError(
-            "no policy: give files, run folders, or names such as builtin"
-        )
+        raise TaskError("no policy: give files, run folders, or names such as builtin")
     return replace(options, policies=tuple(policies), tasks=tuple(tasks)), flags
 
 

@@ -51,31 +51,33 @@ SIGNIFICANT = 0.05
 
 
 def show_evaluation(
-    found: Evaluation, console: Console, units: dict[str, Units]
+    results: Evaluation, console: Console, units: dict[str, Units]
 ) -> None:
     """Prints a table per task with its failure reasons, then the comparisons.
 
     Args:
-        found: The evaluation.
+        results: The evaluation.
         console: Console to print to.
         units: Units of each task by its name, as from `Setting.shown`.
     """
-    timings = {(t.task, t.policy): t for t in found.timings}
-    for task in found.tasks:
-        rows = [row for row in found.rows if row.task == task.name]
-        console.print(_table(found, task, rows, timings, units[task.name]))
+    timings = {(t.task, t.policy): t for t in results.timings}
+    for task in results.tasks:
+        rows = [row for row in results.rows if row.task == task.name]
+        console.print(_table(results, task, rows, timings, units[task.name]))
         console.print()
         for line in _notes(rows):
             print_sentences(console, line, indent=2)
     console.print(LEGEND, style="dim", highlight=False)
-    if found.comparisons:
+    if results.comparisons:
         console.print()
-        console.print(comparison_table(found.comparisons, several=len(found.tasks) > 1))
+        console.print(
+            comparison_table(results.comparisons, several=len(results.tasks) > 1)
+        )
         console.print(PAIRED, style="dim", highlight=False)
 
 
 def _table(
-    found: Evaluation,
+    results: Evaluation,
     task: EvaluatedTask,
     rows: Sequence[PolicyRow],
     timings: dict[tuple[str, str], Timing],
@@ -88,8 +90,8 @@ def _table(
         "random": "random starts and goals",
     }
     title = (
-        f"{task.called or task.name}: {found.episodes} episodes each, "
-        f"{starts.get(found.variation, 'the nominal start')}, seed {found.seed}"
+        f"{task.called or task.name}: {results.episodes} episodes each, "
+        f"{starts.get(results.variation, 'the nominal start')}, seed {results.seed}"
     )
     table = titled_table(title, gap=0)
     longest = max(len(row.policy) for row in rows)
@@ -169,38 +171,40 @@ def _figure(value: float | None, decimals: int) -> str:
     return NONE if value is None else f"{value:.{decimals}f}"
 
 
-def show_set_evaluation(found: SetEvaluation, console: Console) -> None:
+def show_set_evaluation(results: SetEvaluation, console: Console) -> None:
     """Prints the scores, those by generator, failures, and pairs."""
-    worlds = f"worlds 0 to {found.worlds - 1} of {found.split}"
-    title = f"{found.set} {found.set_sha256[:8]}: {worlds}"
-    console.print(_scores(found, title))
+    worlds = f"worlds 0 to {results.worlds - 1} of {results.split}"
+    title = f"{results.set} {results.set_sha256[:8]}: {worlds}"
+    console.print(_scores(results, title))
     console.print()
-    for row in found.rows:
+    for row in results.rows:
         _print_failures(row, console)
-    kinds = list(dict.fromkeys(kind for row in found.rows for kind in row.by_generator))
+    kinds = list(
+        dict.fromkeys(kind for row in results.rows for kind in row.by_generator)
+    )
     if len(kinds) > 1:
-        console.print(_by_generator(found, kinds))
+        console.print(_by_generator(results, kinds))
         console.print()
     print_sentences(console, SET_LEGEND)
-    if found.comparisons:
+    if results.comparisons:
         console.print()
-        console.print(comparison_table(found.comparisons, several=False))
+        console.print(comparison_table(results.comparisons, several=False))
         console.print(PAIRED, style="dim", highlight=False)
 
 
-def _policies(title: str, found: SetEvaluation) -> Table:
+def _policies(title: str, results: SetEvaluation) -> Table:
     table = titled_table(title)
-    longest = max(len(row.policy) for row in found.rows)
+    longest = max(len(row.policy) for row in results.rows)
     table.add_column("policy", overflow="fold", min_width=min(longest, WIDEST_ON_SET))
     return table
 
 
-def _scores(found: SetEvaluation, title: str) -> Table:
-    table = _policies(title, found)
+def _scores(results: SetEvaluation, title: str) -> Table:
+    table = _policies(title, results)
     table.add_column("knows", no_wrap=True)
     for name in ("reached", "95 %", "SCT", "SPL", "BARN", "hit", "late", "error"):
         table.add_column(name, justify="right", no_wrap=True)
-    for policy, row in zip(found.policies, found.rows, strict=True):
+    for policy, row in zip(results.policies, results.rows, strict=True):
         cells = [NONE] * 5
         if row.scores is not None and row.interval is not None:
             colour = "green" if row.successes == row.worlds else "yellow"
@@ -217,12 +221,12 @@ def _scores(found: SetEvaluation, title: str) -> Table:
     return table
 
 
-def _by_generator(found: SetEvaluation, kinds: Sequence[str]) -> Table:
+def _by_generator(results: SetEvaluation, kinds: Sequence[str]) -> Table:
     """Success and SCT of each policy in the worlds of each generator."""
-    table = _policies("by generator: reached, SCT", found)
+    table = _policies("by generator: reached, SCT", results)
     for kind in kinds:
         table.add_column(escape(kind), justify="right", no_wrap=True)
-    for row in found.rows:
+    for row in results.rows:
         own = [row.by_generator.get(kind) for kind in kinds]
         cells = (
             NONE if each is None else f"{100 * each.success:.0f} % {each.time:.2f}"

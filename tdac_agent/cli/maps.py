@@ -161,8 +161,8 @@ def _print_reading(
     size = f"{params.width} x {params.height} px"
     if units != PIXELS:
         size += f" ({units.length(params.width)} x {units.length(params.height)})"
-    about = f"{_describe(chosen)}; {scale_text(params.resolution)}"
-    print_sentences(console, f"{params.source}, {size}: {about}")
+    reading = f"{_describe(chosen)}; {scale_text(params.resolution)}"
+    print_sentences(console, f"{params.source}, {size}: {reading}")
     for note in params.notes:
         console.print(f"[yellow]note:[/] {escape(note)}")
 

@@ -38,7 +38,6 @@ Profile = Literal["policy", "paper"]
 Variation = Literal["nominal", "jitter", "mixed", "random"]
 
 CONTROLLER = "Controller file, or run folder, which brings its own task."
-controller_option = partial(option, ..., argument=True)
 JSON = "Print JSON instead of a table."
 Json = Annotated[bool, typer.Option("--json", help=JSON)]
 json_option = partial(option, False, JSON, "--json")

@@ -128,8 +128,8 @@ class SynthProgress:
             self.say(f"  {at}", escape(problem), "yellow")
         if not self._has_quoted:
             self._has_quoted = True
-            said = f"it says: “{record['says']}”" if record["says"] else "it is empty"
-            self.say(f"  {at}", escape(said), "dim")
+            quote = f"it says: “{record['says']}”" if record["says"] else "it is empty"
+            self.say(f"  {at}", escape(quote), "dim")
 
     def _show_episodes(self, at: str, record: dict[str, Any]) -> None:
         """Shows how disturbed episodes go, and prints those of the comparison."""

@@ -110,8 +110,8 @@ def _held_out(report: Report) -> list[str]:
         for episode in report.episodes
         if episode.held_out and (episode.outcome != "reached" or episode.collisions)
     ]
-    told = "held out: a model is told only that such a start failed, so there is no"
-    return [*ended, f"({told} diagnosis; `tdac play --episode` shows it)"]
+    reason = "held out: a model is told only that such a start failed, so there is no"
+    return [*ended, f"({reason} diagnosis; `tdac play --episode` shows it)"]
 
 
 def _show_failed(console: Console, failures: Sequence[Failure]) -> None:

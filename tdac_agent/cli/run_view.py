@@ -36,17 +36,17 @@ from tdac_envs.core.intake import RECORD_BYTES, read_file
 def show_run(run: Run, console: Console) -> None:
     """Prints the attempts in a table, then the result and the next commands."""
     usage, folder = usage_of(run), run.folder
-    found = read_improvement(folder) if run.improve else None
+    search = read_improvement(folder) if run.improve else None
     if run.attempts:
-        console.print(_attempts(run, found))
+        console.print(_attempts(run, search))
     if run.verified:
         ending = f"[bold green]verified[/] in iteration {run.tau}, "
-        if found is not None and found.selected != found.first:
-            ending += f"improved in iteration {found.k}, "
+        if search is not None and search.selected != search.first:
+            ending += f"improved in iteration {search.k}, "
         ending += f"{run.seconds:.1f} s: {escape(str(run.controller))}"
         console.print(ending, soft_wrap=True)
-        if found is not None:
-            _print_indented(console, found.told)
+        if search is not None:
+            _print_indented(console, search.told)
         if run.reason:
             _print_indented(console, f"the search ended early: {run.reason}")
         _print_indented(console, usage)
@@ -94,7 +94,7 @@ def usage_of(run: Run) -> str:
     return f"{tokens}; {cost}"
 
 
-def _attempts(run: Run, found: TaskImprovement | None) -> Table:
+def _attempts(run: Run, search: TaskImprovement | None) -> Table:
     table = Table(title=escape(f"{run.task}: {run.learner}"), title_justify="left")
     table.add_column("k", justify="right")
     table.add_column("j", justify="right")
@@ -109,8 +109,8 @@ def _attempts(run: Run, found: TaskImprovement | None) -> Table:
         failed = list_tests(attempt.failed_tests, 4)
         if attempt.unchanged or not failed:
             failed = _remark(attempt)
-        if found is not None:
-            failed = failed or found.text_of(attempt.k, attempt.j)
+        if search is not None:
+            failed = failed or search.text_of(attempt.k, attempt.j)
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
 
@@ -124,8 +124,8 @@ def list_tests(tests: Sequence[str], most: int) -> str:
 
 def _remark(attempt: Attempt) -> str:
     """The last note on an attempt without valid or new code, or on a variation."""
-    told = not attempt.valid or attempt.unchanged or attempt.parent is not None
-    return "; ".join(attempt.notes[-1:]) if told else ""
+    is_explained = not attempt.valid or attempt.unchanged or attempt.parent is not None
+    return "; ".join(attempt.notes[-1:]) if is_explained else ""
 
 
 def _result(attempt: Attempt) -> str:

@@ -92,12 +92,12 @@ class _WithFlags:
 
 def _fields(kind: Any) -> dict[str, tuple[dataclasses.Field[Any], Flag, Any]]:
     """The fields of a dataclass that have flags, with these and their types."""
-    hints, found = get_type_hints(kind), {}
+    hints, flags = get_type_hints(kind), {}
     for field in dataclasses.fields(kind):
         flag = flag_of(field)
         if flag is not None:
-            found[field.name] = field, flag, flag.type or hints[field.name]
-    return found
+            flags[field.name] = field, flag, flag.type or hints[field.name]
+    return flags
 
 
 def _flags(kind: Any, without: Collection[str]) -> Iterable[inspect.Parameter]:
