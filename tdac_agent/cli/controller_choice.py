@@ -6,12 +6,8 @@ import difflib
 from dataclasses import replace
 from pathlib import Path
 
-from tdac_agent.cli.task_choice import (
-    NAMING,
-    changed_task,
-    chosen_task,
-    with_named_file,
-)
+from tdac_agent.cli.task_changes import changed_task
+from tdac_agent.cli.task_choice import NAMING, chosen_task, with_named_file
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import words_of
 from tdac_agent.errors import ControllerFileError

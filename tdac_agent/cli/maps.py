@@ -11,7 +11,8 @@ from rich.table import Table
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.map_flags import MapOptions
 from tdac_agent.cli.sentences import print_plain, print_sentences
-from tdac_agent.cli.task_choice import check_values, in_pixels
+from tdac_agent.cli.task_changes import in_pixels
+from tdac_agent.cli.task_choice import check_values
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.environments.map2d.setting import robot_text
 from tdac_envs.core.errors import PicturedError, TaskError
@@ -53,6 +54,8 @@ def run(options: MapOptions, flags: TaskFlags) -> None:
     frame = "metres" if flags.in_metres else "pixels"
     units = units_of(path, frame, scale).with_typed(flags.start, flags.goal)
     task = in_pixels(flags, units)
+    if task.start is None and task.heading is not None:
+        raise TaskError("--heading needs --start X Y")
     source = load_image(path, scale)
     if options.ros and source.resolution is None:
         raise TaskError(

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import Field, fields, replace
+from dataclasses import Field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tdac_agent.cli.task_changes import (
+    changed_task,
+    file_of,
+    keys_of,
+    refuse_foreign,
+    shown,
+)
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import flag_name, typed_fields
 from tdac_agent.options import flag_of
@@ -19,13 +26,10 @@ from tdac_agent.tasks.task_file import (
     MAP_FILES,
     SET_FILE,
     TASK_FILE,
-    TaskFile,
     bundled_tasks,
-    checked,
 )
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
-from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.source import check_exists
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 
@@ -39,26 +43,6 @@ NAMING = {
     "set_name": "--set",
 }
 """Fields that name a task or a task set, and their flags."""
-KEYS = {
-    "tolerance": "tolerance",
-    "dt": "dt",
-    "goal": "goal",
-    "movers": "movers",
-    "snap": "snap",
-    "resolution": "resolution",
-    "polarity": "polarity",
-    "threshold": "threshold",
-    "instructions": "instructions",
-    "ignore": "ignore",
-    "robot_radius": "robot.radius",
-    "max_speed": "robot.max_wheel_speed",
-    "rays": "robot.n_rays",
-    "fov": "robot.field_of_view",
-    "range_max": "robot.range_max",
-    "robot_image": "robot.image",
-}
-"""Fields, and the keys of a task file that they give."""
-LENGTHS = ("tolerance", "robot_radius", "max_speed", "range_max")
 
 
 def with_named_file(flags: TaskFlags) -> TaskFlags:
@@ -193,8 +177,11 @@ def chosen_task(flags: TaskFlags, default: str = "maze") -> Task:
         return changed_task(load_task(flags.task), flags)
     if flags.world is not None:
         _refuse_naming("--world defines an e-puck task", flags, ("map_image",))
-        given_keys = {"env": environment_with_key("world").id, "world": flags.world}
-        return load_task(_file({**given_keys, **_keys(flags)}), base=Path())
+        entry = environment_with_key("world")
+        refuse_foreign(flags, entry)
+        keys = {"env": entry.id, "world": flags.world, **keys_of(flags)}
+        return shown(load_task(file_of(keys), base=Path()), flags)
+    refuse_foreign(flags, environment_with_key("map"))
     source = flags.map_image or default
     own = source not in bundled_maps()
     if own:
@@ -206,115 +193,9 @@ def chosen_task(flags: TaskFlags, default: str = "maze") -> Task:
         )
     if flags.in_metres and not own:
         raise TaskError("--metres needs a --map with a resolution, as in map.yaml")
-    keys = _keys(flags)
-    if not own and "start" not in keys and flags.heading is not None:
-        keys["start"] = (*bundled_map(source).start, flags.heading)
+    keys = keys_of(flags, start=None if own else bundled_map(source).start)
     frame = "metres" if flags.in_metres else "pixels"
-    return load_task(_file({"map": source, "frame": frame, **keys}), base=Path())
-
-
-def changed_task(task: Task, flags: TaskFlags) -> Task:
-    """A task with the parts that the flags give, shown in metres for `--metres`.
-
-    Places and lengths are in the frame of the task, or in metres with `--metres`.
-    What follows from start and goal, such as the horizon, follows from the new ones.
-
-    Raises:
-        TaskError: The changed task cannot be used, or has no metres.
-    """
-    if typed_fields(flags.changes):
-        task = _changed(task, flags)
-    if not flags.in_metres:
-        return task
-    return replace(task, setting=task.setting.in_metres())
-
-
-def _changed(task: Task, flags: TaskFlags) -> Task:
-    from tdac_agent.environments.map2d.setting import map_setting
-
-    base, spec = task.folder or Path(), task.spec
-    if flags.in_metres and spec.frame == "pixels":
-        flags = in_pixels(flags, MapUnits.metres(map_setting(task.setting).params))
-    keys = _keys(flags, base)
-    robot = keys.pop("robot", {})
-    old = spec.model_dump(
-        exclude_unset=True, by_alias=True, exclude=_following(spec, base)
-    )
-    own = old.pop("robot", {})
-    if "radius" in robot and own.get("axle") == 2 * own.get("radius", 0):
-        del own["axle"]  # it follows from the radius
-    robot = {**own, **robot}
-    made = load_task(
-        _file({**old, **keys, **({"robot": robot} if robot else {})}), base=base
-    )
-    return replace(task, spec=made.spec, setting=made.setting)
-
-
-def _following(spec: TaskFile, base: Path) -> set[str]:
-    """Keys whose values are those that follow from the rest of the task file.
-
-    The task file of a run has all of them.
-    """
-    fixed = {"horizon", "tolerance"} & spec.model_fields_set
-    if not fixed:
-        return set()
-    free = load_task(spec.model_copy(update=dict.fromkeys(fixed)), base=base)
-    nominal, ends = free.nominal, free.setting.ends()
-    following = {"horizon": nominal.horizon, "tolerance": ends["tolerance"]}
-    return {key for key in fixed if getattr(spec, key) == following[key]}
-
-
-def in_pixels(flags: TaskFlags, units: MapUnits) -> TaskFlags:
-    """The flags with their places and lengths converted to pixels."""
-    values = {name: getattr(flags, name) for name in LENGTHS}
-    lengths: dict[str, Any] = {
-        n: units.length_in_pixels(v) for n, v in values.items() if v is not None
-    }
-    return replace(
-        flags,
-        start=None if flags.start is None else units.pixels(flags.start),
-        goal=None if flags.goal is None else units.pixels(flags.goal),
-        heading=None
-        if flags.heading is None
-        else units.heading_in_pixels(flags.heading),
-        **lengths,
-    )
-
-
-def _keys(flags: TaskFlags, base: Path = Path()) -> dict[str, Any]:
-    """The keys of a task file that the flags give."""
-    keys: dict[str, Any] = {}
-    if flags.start is not None:
-        yaw = () if flags.heading is None else (flags.heading,)
-        keys["start"] = (*flags.start, *yaw)
-    for field in typed_fields(flags.changes):
-        if field.name not in KEYS:
-            continue
-        value = getattr(flags, field.name)
-        if field.name == "instructions":
-            value = _text(value)
-        if field.name == "robot_image" and base != Path():
-            value = value.absolute()
-        part, _, key = KEYS[field.name].rpartition(".")
-        (keys.setdefault(part, {}) if part else keys)[key] = value
-    return keys
-
-
-def _file(data: dict[str, Any]) -> TaskFile:
-    """The task file with these keys; an error names the flag of a key."""
-    try:
-        return checked(data, "flags")
-    except TaskError as error:
-        key, _, reason = str(error).removeprefix("flags: ").partition(": ")
-        raise TaskError(f"{_flag_of_key(key)}: {reason}") from error
-
-
-def _flag_of_key(key: str) -> str:
-    """The flag that gives a key, also one below it, as in `start.0`."""
-    flags = {field.name: flag_name(field) for field in fields(TaskFlags)}
-    known = {path: flags[name] for name, path in KEYS.items()}
-    known |= {"start": "--start", "map": "--map", "world": "--world"}
-    return known.get(key) or known.get(key.partition(".")[0], key)
+    return load_task(file_of({"map": source, "frame": frame, **keys}), base=Path())
 
 
 def _refuse_naming(why: str, flags: TaskFlags, names: Collection[str]) -> None:
@@ -385,14 +266,3 @@ def check_tier(name: str) -> None:
     if name not in names:
         known = ", ".join(names)
         raise TaskError(f"unknown sandbox tier {name!r}; expected one of {known}")
-
-
-def _text(typed: str) -> str:
-    """The user's instructions: the text, or the contents of the file that it names."""
-    path = Path(typed)
-    if len(typed) < 250 and "\n" not in typed and path.is_file():
-        try:
-            return read_file(path, TEXT_BYTES).decode("utf-8", "replace")
-        except OSError as error:
-            raise TaskError(f"cannot read {typed}: {error.strerror}") from error
-    return typed

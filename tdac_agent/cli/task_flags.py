@@ -67,7 +67,6 @@ class TaskFlags:
         "Start heading, rad, from +x towards +y (down on a map, up with --metres).",
         metavar="YAW",
         panel=TASKS,
-        needs="--start X Y",
     )
     tolerance: float | None = option(
         None,

@@ -19,7 +19,7 @@ from small import SHORT, small_cells, write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.cli.main import PARTS, command_line
-from tdac_agent.cli.task_choice import changed_task
+from tdac_agent.cli.task_changes import changed_task
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, TaskFlags
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.tasks.task import lay_out
@@ -526,6 +526,8 @@ def test_what_follows_from_start_and_goal_is_not_kept(good, tmp_path):
     assert changed(run, tolerance=3.5).nominal.goal_tolerance == 3.5
     wider = changed(run, robot_radius=7.0).nominal.robot
     assert (wider.radius, wider.axle_length) == (7.0, 14.0)
+    turned = changed(run, heading=0.5).nominal.start
+    assert turned == (*fixed.nominal.start[:2], 0.5)
     assert changed(run).sha256() == fixed.sha256()
     file.write_text(text)
     assert changed(good, goal=(100.0, 30.0)).nominal.horizon == 400

@@ -227,13 +227,12 @@ def test_a_place_in_one_word():
         ("--world maze", "--task already defines the task: leave out --world"),
         ("--set known", "give --task or --set, not both"),
         ("office", "give office or --task, not both"),
-        ("--ignore Tree", "--ignore: only valid with env: TDAC-EPuck-v0"),
+        ("--ignore Tree", "--ignore is for TDAC-EPuck-v0, and this task is of TDAC-Ma"),
         ("--robot-image no.png", "no robot image"),
         ("--rays 5000", "--rays: "),
         ("--fov 400", "--fov: "),
         ("--max-speed -1", "--max-speed: "),
         ("--resolution 0.1 --map maze", "leave out --map"),
-        ("--heading 1", "--heading needs --start X Y"),
     ],
 )
 def test_flags_that_do_not_fit_a_task(refused, words, message):
@@ -316,3 +315,36 @@ def test_the_grid_as_a_ros_map(tdac, tmp_path):
 def test_a_ros_map_without_a_scale(refused, words, message):
     errors = refused("map", *words)
     assert message in errors
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            "--robot-radius 3",
+            "--robot-radius is for TDAC-Map2D-v0, and this task is of ",
+        ),
+        ("--movers crowd:3", "--movers is for TDAC-Map2D-v0"),
+        ("--metres", "--metres is for maps; a world is in metres anyway"),
+        ("--map office", "--world defines an e-puck task: leave out --map"),
+        ("--heading 1", "--heading needs --start X Y"),
+    ],
+)
+def test_flags_that_do_not_fit_a_world(refused, words, message):
+    assert message in refused("synth", "--world", "arena", *words.split())
+
+
+def test_flags_of_the_robot(tmp_path):
+    """Each is a key of the task file, also next to a task with movers."""
+    flags = TaskFlags(
+        max_speed=40.0, rays=9, fov=90.0, range_max=100.0, tolerance=5.0, dt=0.1
+    )
+    for task in (chosen_task(flags), chosen_task(replace(flags, task="maze"))):
+        robot, nominal = task.nominal.robot, task.nominal
+        assert (robot.max_wheel_speed, robot.n_rays) == (40.0, 9)
+        assert (robot.field_of_view_deg, robot.range_max) == (90.0, 100.0)
+        assert (nominal.goal_tolerance, nominal.dt) == (5.0, 0.1)
+    (tmp_path / "task.yaml").write_text("map: office\nmovers: bounce:2\n")
+    file = str(tmp_path / "task.yaml")
+    plain = chosen_task(TaskFlags(task=file))
+    assert chosen_task(TaskFlags(task=file, rays=18)).sha256() == plain.sha256()
