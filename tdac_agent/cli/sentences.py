@@ -5,10 +5,10 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
-from rich.console import Console
 from rich.markup import escape
 from rich.text import Text
 
+from tdac_agent.cli.console import Console
 from tdac_agent.cli.mistakes import folded
 
 

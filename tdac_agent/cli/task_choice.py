@@ -52,8 +52,6 @@ def with_named_file(flags: TaskFlags) -> TaskFlags:
         TaskError: There is no such file, or a task or a task set is named as well.
     """
     check_frame(flags)
-    if flags.task is not None and flags.set_name is not None:
-        raise TaskError("give --task or --set, not both")
     if flags.file is None:
         return flags
     field = kind_of_file(flags.file)
@@ -121,6 +119,9 @@ def check_scope(on_set: bool, flags: TaskFlags, *options: Any) -> None:
         ),
     ]
     names = [*map(flag_name, wrong), *["--metres"] * (on_set and flags.in_metres)]
+    if on_set:
+        others = {name: flag for name, flag in NAMING.items() if name != "set_name"}
+        names = [f for n, f in others.items() if getattr(flags, n) is not None] + names
     if names and on_set:
         raise TaskError(f"--set brings its own tasks; leave out {names[0]}")
     if names:

@@ -181,13 +181,13 @@ def _check_finite(flag: str, value: Any) -> None:
 
 
 def flag_name(field: dataclasses.Field[Any]) -> str:
-    """The flag of a field, as in `--robot-radius`; its longest if it has several."""
+    """The flag of a field, as in `--robot-radius`; the first if it has several."""
     flag = flag_of(field)
     if flag is not None and flag.argument:
         return flag.metavar or field.name.upper()
     names = flag.names if flag else ()
-    plain = [name.partition("/")[0] for name in names]
-    return max(plain, key=len) if plain else f"--{field.name.replace('_', '-')}"
+    first = names[0].partition("/")[0] if names else ""
+    return first or f"--{field.name.replace('_', '-')}"
 
 
 def typed_fields(options: Any) -> list[dataclasses.Field[Any]]:
@@ -226,11 +226,11 @@ def check_needs(options: Iterable[Any]) -> None:
     Raises:
         TaskError: There are such flags.
     """
-    typed = [field for each in options for field in typed_fields(each)]
-    there = {flag_name(field) for field in typed}
+    typed = [(each, flag_of(each)) for own in options for each in typed_fields(own)]
+    there = {flag_name(field) for field, _ in typed}
+    there |= {name for _, flag in typed if flag for name in flag.names}
     needing: dict[str, list[dataclasses.Field[Any]]] = {}
-    for field in typed:
-        flag = flag_of(field)
+    for field, flag in typed:
         if flag is not None and flag.needs and flag.needs.split()[0] not in there:
             needing.setdefault(flag.needs, []).append(field)
     for needed, fields in needing.items():

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import gc
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tdac_agent.cli.controller_choice import (
     change_note,
@@ -13,11 +12,11 @@ from tdac_agent.cli.controller_choice import (
     controller_file,
     with_own_set,
 )
+from tdac_agent.cli.junit import write_junit, write_set_junit
 from tdac_agent.cli.spinner import Spinner
 from tdac_agent.cli.task_choice import check_scope, check_tier
 from tdac_agent.cli.typed_options import require_flag, typed_fields, words_of
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.sequential import SequentialTest
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
     from tdac_agent.cli.task_flags import TaskFlags
     from tdac_agent.cli.verify_options import VerifyOptions
     from tdac_agent.evaluation.robust_report import RobustReport
-    from tdac_agent.evaluation.set_report import SetReport
     from tdac_agent.tasks.task import Task
     from tdac_agent.verification.diagnosis.report import Report
 
@@ -65,65 +63,65 @@ def _check_robust(options: VerifyOptions, noise: NoiseFlags) -> None:
 def _verify_on_task(
     flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags, child_pool: ChildPool
 ) -> int:
-    file, task = _prepared(options.controller, flags)
+    with Spinner("preparing the task …") as spinner:
+        if typed_fields(flags):  # it is built anew
+            spinner()
+        file, task = controller_and_task(options.controller, flags)
     task = allowed(task, options.suite, trust=options.trust)
     if options.robust is not None:
         task.disturbed_options(noise.disturbance())
     _freeze()
     with WarmJudge(child_pool) as judge:
-        # Imported while the judge starts.
-        from tdac_agent.verification.verify import verify
+        report = _report(file, task, options, judge)
+        # Imported late: the judge has worked meanwhile.
+        from tdac_agent.cli.console import Console, print_json
+        from tdac_agent.cli.report_view import show_report
+        from tdac_agent.cli.sentences import print_plain
 
-        with Spinner(f"verifying {file.name} on {task.name} …") as spinner:
-            report = verify(
-                file,
-                task,
-                profile=options.profile,
-                paper=options.paper,
-                tier=options.tier,
-                seed=options.seed,
-                out=options.out,
-                judge=judge,
-                meanwhile=spinner,
-            )
-        if options.junit is not None:
-            write_junit(report, options.junit)
-        note = change_note(options.controller, flags)
-        if note:
-            print(note, file=sys.stderr if options.as_json else sys.stdout)
+        console, units = Console(stderr=options.as_json), task.setting.shown
+        if note := change_note(options.controller, flags):
+            print_plain(console, note)
         if not options.as_json:
-            _show(report, options, task)
+            show_report(report, console, options.out, task.folder, units)
         robust = None
         if options.robust is not None and report.passed:
             robust = _measure(file, task, options, noise, judge)
     if options.as_json:
-        _print_json(report, options, robust)
+        print_json(_record(report, options, robust))
+    elif robust is not None:
+        from tdac_agent.cli.robust_view import show_robust
+
+        show_robust(robust, console, _replay(flags, options, noise), units)
     elif options.robust is not None:
-        _show_robust(robust, _replay(flags, options, noise), task)
+        console.print("robustness not measured: the controller is not verified")
     return 0 if report.passed and (robust is None or robust.accepted) else 1
+
+
+def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) -> Report:
+    # Imported while the judge starts.
+    from tdac_agent.verification.verify import verify
+
+    with Spinner(f"verifying {file.name} on {task.name} …") as spinner:
+        report = verify(
+            file,
+            task,
+            profile=options.profile,
+            paper=options.paper,
+            tier=options.tier,
+            seed=options.seed,
+            out=options.out,
+            judge=judge,
+            meanwhile=spinner,
+        )
+    if options.junit is not None:
+        write_junit(report, options.junit)
+    return report
 
 
 def _freeze() -> None:
     """Lets the garbage collector work again, except on what was imported."""
     gc.freeze()
     gc.enable()
-
-
-def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
-    """The file and its task; shows a status while a task is built from flags."""
-    if not typed_fields(flags):
-        return controller_and_task(controller, flags)
-    from tdac_agent.cli.console import Console
-
-    with Console(stderr=True).status("preparing the task …"):
-        return controller_and_task(controller, flags)
-
-
-def _show(report: Report, options: VerifyOptions, task: Task) -> None:
-    from tdac_agent.cli.console import Console
-    from tdac_agent.cli.report_view import show_report
-
-    show_report(report, Console(), options.out, task.folder, task.setting.shown)
 
 
 def _measure(
@@ -163,28 +161,12 @@ def _measure(
         raise
 
 
-def _print_json(
-    report: Report, options: VerifyOptions, robust: RobustReport | None
-) -> None:
-    """Prints the report; `--robust` adds the key `robust`, null if it was not run."""
-    from tdac_agent.cli.console import print_json
-
+def _record(report: Report, options: VerifyOptions, robust: RobustReport | None) -> Any:
+    """The report; `--robust` adds the key `robust`, null if it was not run."""
     if options.robust is None:
-        print_json(report)
-        return
+        return report
     added = None if robust is None else robust.model_dump(mode="json")
-    print_json({**report.model_dump(mode="json"), "robust": added})
-
-
-def _show_robust(robust: RobustReport | None, replay: list[str], task: Task) -> None:
-    from tdac_agent.cli.console import Console
-    from tdac_agent.cli.robust_view import show_robust
-
-    console = Console()
-    if robust is None:
-        console.print("robustness not measured: the controller is not verified")
-    else:
-        show_robust(robust, console, replay, task.setting.shown)
+    return {**report.model_dump(mode="json"), "robust": added}
 
 
 def _replay(flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags) -> list[str]:
@@ -253,49 +235,3 @@ def check_folder(out: Path) -> None:
             each.rmdir()
     except OSError as error:
         raise ControllerFileError(f"cannot write to {out}: {error.strerror}") from error
-
-
-def write_junit(report: Report, path: Path) -> None:
-    """Writes a JUnit XML file with a test case per expected test."""
-    messages = {failure.test: failure.message for failure in report.failures}
-    cases = {name: messages.get(name) for name in report.tests}
-    _write_cases(f"tdac {report.provenance.task}", cases, report.seconds, path)
-
-
-def write_set_junit(report: SetReport, path: Path) -> None:
-    """Writes a JUnit XML file with a test case per test and per public world."""
-    split = report.provenance.split
-    failed = "; ".join(report.told) or "failed"
-    cases = {n: failed if r == "failed" else None for n, r in report.tests.items()}
-    cases |= {
-        f"{split}::world {each.index}": None if each.success else each.outcome
-        for each in report.episodes
-    }
-    if report.sequential is not None:
-        decision = report.sequential.decision
-        cases[f"{split}::decision"] = None if decision == "accepted" else decision
-    _write_cases(f"tdac {report.provenance.set}", cases, report.seconds, path)
-
-
-def _write_cases(
-    title: str, cases: dict[str, str | None], seconds: float, path: Path
-) -> None:
-    """Writes a JUnit XML file; a failed case has a message."""
-    from xml.etree import ElementTree
-
-    suite = ElementTree.Element(
-        "testsuite",
-        name=title,
-        tests=str(len(cases)),
-        failures=str(sum(message is not None for message in cases.values())),
-        time=str(seconds),
-    )
-    for name, message in cases.items():
-        file, _, test = name.partition("::")
-        case = ElementTree.SubElement(suite, "testcase", classname=file, name=test)
-        if message is not None:
-            ElementTree.SubElement(case, "failure", message=message)
-    try:
-        write_atomic(path, ElementTree.tostring(suite, encoding="utf-8"))
-    except OSError as error:
-        raise ControllerFileError(f"cannot write {path}: {error.strerror}") from error

@@ -225,7 +225,7 @@ def test_a_place_in_one_word():
     [
         ("--map office", "--task already defines the task: leave out --map"),
         ("--world maze", "--task already defines the task: leave out --world"),
-        ("--set known", "give --task or --set, not both"),
+        ("--set known", "--set brings its own tasks; leave out --task"),
         ("office", "give office or --task, not both"),
         ("--ignore Tree", "--ignore is for TDAC-EPuck-v0, and this task is of TDAC-Ma"),
         ("--robot-image no.png", "no robot image"),

@@ -46,7 +46,7 @@ def parsed(*words, **look):
 
 
 ALL = (
-    *("--place", "-1", "2.25", "--name", "x", "--name", "y", "--count", "9"),
+    *("--place", "-1", "2.25", "--name", "x", "--name", "y", "-n", "9"),
     *("--speed", "2", "--mode", "b", "--no-refine", "--json"),
 )
 

@@ -170,8 +170,8 @@ def test_a_folder_that_is_not_empty_is_refused(tmp_path):
     ("words", "why"),
     [
         ("", "give a task with --task NAME, or a task set"),
-        ("--task maze --set unknown", "give --task or --set, not both"),
-        ("--task maze -n 3", "--worlds needs --set NAME"),
+        ("--task maze --set unknown", "leave out --task"),
+        ("--task maze -n 3", "-n needs --set NAME"),
     ],
 )
 def test_the_command_says_what_is_missing(tdac, words, why):
