@@ -71,8 +71,8 @@ def refuse_foreign(flags: TaskFlags, own: Environment) -> None:
         key = KEYS.get(field.name, field.name).partition(".")[0]
         for other in own_environments():
             if key in other.keys and key not in own.keys:
-                what = f"is for {other.id}, and this task is of {own.id}"
-                raise TaskError(f"{flag_name(field)} {what}: leave it out")
+                why = f"this task is of {own.id}, not of {other.id}"
+                raise TaskError(f"{why}: leave out {flag_name(field)}")
 
 
 def _changed(task: Task, flags: TaskFlags) -> Task:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from tdac_agent.evaluation.robust_report import RobustReport
     from tdac_agent.tasks.task import Task
     from tdac_agent.verification.diagnosis.report import Report
+    from tdac_envs.ladder.task_sets import TaskSet
 
 
 def run(
@@ -177,7 +178,6 @@ def _replay(flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags) -> list
 
 def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> int:
     """Drives a controller on a set and prints the report; returns the exit code."""
-    from tdac_agent.builtin.level import controller_of
     from tdac_agent.cli.console import Console, print_json
     from tdac_agent.cli.driving_bar import DrivingBar
     from tdac_agent.cli.set_view import show_next_steps, show_set_report
@@ -188,27 +188,18 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
         raise TaskError("--hidden-folder needs --split hidden")
     if options.profile == "paper":
         raise TaskError("--profile paper is for single tasks: leave it out with --set")
-    tasks, split, worlds = (
-        load_set(name, options.hidden_folder),
-        options.split,
-        options.worlds,
-    )
-    if options.controller == "builtin":
-        file = controller_of(tasks, "give a file")
-    else:
-        file = controller_file(options.controller)
-    if worlds is not None:
-        tasks.check_count(split, worlds, "-n")
+    tasks = load_set(name, options.hidden_folder)
+    file = _controller_on(tasks, options)
     _freeze()
-    most = worlds or most_worlds(tasks, split)
+    most = options.worlds or most_worlds(tasks, options.split)
     console = Console(stderr=options.as_json)
     bar = DrivingBar(console, most, f"worlds of {tasks.name}", is_long=True)
     with WarmJudge(child_pool) as judge, bar:
         report = verify_on_set(
             file,
             tasks,
-            split,
-            worlds,
+            options.split,
+            options.worlds,
             salt_file=options.salt_file,
             tier=options.tier,
             out=options.out,
@@ -223,6 +214,19 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
         show_set_report(report, console)
         show_next_steps(report, name, options.controller, options.out, console)
     return 0 if report.passed else 1
+
+
+def _controller_on(tasks: TaskSet, options: VerifyOptions) -> Path:
+    """The controller file; also checks that the set has so many worlds."""
+    from tdac_agent.builtin.level import controller_of
+
+    if options.controller == "builtin":
+        file = controller_of(tasks, "give a file")
+    else:
+        file = controller_file(options.controller)
+    if options.worlds is not None:
+        tasks.check_count(options.split, options.worlds, "-n")
+    return file
 
 
 def check_folder(out: Path) -> None:
