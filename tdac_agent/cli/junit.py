@@ -25,11 +25,13 @@ def write_set_junit(report: SetReport, path: Path) -> None:
     """Writes a JUnit XML file with a test case per test and per public world."""
     split = report.provenance.split
     failed = "; ".join(report.told) or "failed"
-    cases = {n: failed if r == "failed" else None for n, r in report.tests.items()}
-    cases |= {
-        f"{split}::world {each.index}": None if each.success else each.outcome
-        for each in report.episodes
+    cases = {
+        f"static::{name}": failed if result == "failed" else None
+        for name, result in report.tests.items()
     }
+    for each in report.episodes:
+        reason = each.text or each.cause or each.outcome
+        cases[f"{split}::world {each.index}"] = None if each.success else reason
     if report.sequential is not None:
         decision = report.sequential.decision
         cases[f"{split}::decision"] = None if decision == "accepted" else decision

@@ -108,7 +108,7 @@ def _with_named_files(options: TrainOptions) -> TrainOptions:
             options = replace(options, set_name=file)
         else:
             raise TaskError(f"{file!r}: expected task.yaml files, or one set.yaml")
-    return options
+    return replace(options, files=())
 
 
 def _plan_and_folder(options: TrainOptions) -> tuple[TrainingPlan, Path]:

@@ -169,6 +169,8 @@ def test_a_junit_file_of_a_set(tdac, tmp_path):
     root = ElementTree.parse("a.xml").getroot()
     assert int(root.get("tests")) == len(root) > 0
     assert 0 < int(root.get("failures")) == len(root.findall("testcase/failure"))
+    assert {case.get("classname") for case in root} == {"static"}
+    assert all(case.get("name") for case in root)
 
 
 @pytest.mark.parametrize(
