@@ -12,7 +12,6 @@ from tdac_agent.cli.controller_choice import (
     controller_file,
     with_own_set,
 )
-from tdac_agent.cli.junit import write_junit, write_set_junit
 from tdac_agent.cli.spinner import Spinner
 from tdac_agent.cli.task_choice import check_scope, check_tier
 from tdac_agent.cli.typed_options import require_flag, typed_fields, words_of
@@ -115,6 +114,8 @@ def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) ->
             meanwhile=spinner,
         )
     if options.junit is not None:
+        from tdac_agent.cli.junit import write_junit
+
         write_junit(report, options.junit)
     return report
 
@@ -207,6 +208,8 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
             watch=bar.show,
         )
     if options.junit is not None:
+        from tdac_agent.cli.junit import write_set_junit
+
         write_set_junit(report, options.junit)
     if options.as_json:
         print_json(report)
