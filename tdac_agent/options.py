@@ -27,6 +27,9 @@ class Flag:
         most: Largest value.
         panel: Heading under which the help shows it.
         type: Type of its value on the command line, if that differs from the field's.
+        argument: Whether it is a word of its own, without a flag.
+        needs: Another flag, without which it has no effect, as in `--robust N`.
+        scope: `task` or `set` if only a single task or only a task set has it.
     """
 
     help: str
@@ -36,13 +39,16 @@ class Flag:
     most: float | None = None
     panel: str | None = None
     type: Any = None
+    argument: bool = False
+    needs: str = ""
+    scope: str = ""
 
 
 def option(default: Any, help: str, *names: str, **look: Any) -> Any:  # noqa: A002
     """A field of a dataclass that is also a flag.
 
     Args:
-        default: Its default.
+        default: Its default; `...` if it must be given.
         help: Its help text.
         names: Its flags; by default one that is made of the field's name.
         look: Further attributes of `Flag`.

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import typer
 
+from tdac_agent.cli.coordinates import with_coordinates
 from tdac_agent.cli.main import command_line
-from tdac_agent.cli.places import with_places
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -41,7 +41,7 @@ def test_there_are_commands():
 def test_a_command_is_accepted(page, line, monkeypatch, tmp_path):
     """Its flags exist, and their values are of the right kind."""
     monkeypatch.chdir(tmp_path)
-    words = with_places(shlex.split(line, comments=True)[1:])
+    words = with_coordinates(shlex.split(line, comments=True)[1:])
     command = typer.main.get_command(command_line(words))
     context = command.make_context("tdac", words)
     while context._protected_args:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Optional
+from typing import Literal
 
 import typer
 
-from tdac_agent.cli.options import Json, Tier, dir_flag, file_flag, number_flag
+from tdac_agent.cli.options import json_option, out_option, tier_option
+from tdac_agent.cli.typed_options import typed_options
+from tdac_agent.options import option
 
-ExecutorName = Literal["local", "ray"]
 bench_app = typer.Typer(
     help="Drive programs and learned policies on the same unseen worlds.",
     no_args_is_help=True,
@@ -18,85 +20,83 @@ app = typer.Typer()
 app.add_typer(bench_app, name="bench")
 
 
+@dataclass(frozen=True, slots=True)
+class BenchOptions:
+    """The flags of `tdac bench run`."""
+
+    entrants: tuple[str, ...] = option(
+        ...,
+        "Controller files, folders of runs and trainings, .zip files of "
+        "stable-baselines3, `builtin`, or a classical planner: `go-to-goal`, "
+        "`tangent-bug`, `follow-the-gap`, `dwa`, `mppi`, `orca`; `privileged` is a "
+        "planner that knows all movers. NAME=FILE names an entrant; NAME=FILE,FILE are "
+        "policies trained alike with several seeds.",
+        argument=True,
+        metavar="ENTRANT...",
+    )
+    sets: str = option(
+        ...,
+        "Task sets (`tdac sets`) or set.yaml files, with commas between them.",
+        "--set",
+        metavar="NAME,…",
+    )
+    split: str = option("test", "dev, test or hidden.", metavar="NAME")
+    worlds: int = option(
+        100, "Number of worlds of each set.", "-n", "--worlds", least=1
+    )
+    out: Path | None = out_option(
+        "Folder for the results; after an interruption, the same command drives only "
+        "what is missing.  [default: bench-1, …]"
+    )
+    salt_file: Path | None = option(
+        None,
+        "File with the salt of hidden worlds, which stay sealed until `tdac bench "
+        "reveal`.  [default: drawn, and revealed at the end]",
+        metavar="FILE",
+    )
+    tier: str = tier_option()
+    executor: Literal["local", "ray"] | None = option(
+        None,
+        "Drive several files at a time: in processes of this machine (local), or on "
+        "the Ray cluster in RAY_ADDRESS, which shares the folder (ray).  [default: one "
+        "after another, each on all cores]",
+    )
+    workers: int | None = option(
+        None,
+        "Files at a time with --executor.  [default: one per core]",
+        least=1,
+        needs="--executor local or --executor ray",
+    )
+    as_json: bool = json_option()
+
+
 @bench_app.command(
     "run",
     epilog="Examples: `tdac bench builtin dwa mine.py --set unknown`; `tdac bench "
     "builtin ppo=a.zip,b.zip --set known,crowd --split hidden -n 400 --out arena`",
 )
-def run_command(
-    entrants: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="ENTRANT...",
-            help="Controller files, folders of runs and trainings, .zip files of "
-            "stable-baselines3, "
-            "`builtin`, or a classical planner: `go-to-goal`, `tangent-bug`, "
-            "`follow-the-gap`, `dwa`, `mppi`, `orca`; `privileged` is a planner that "
-            "knows all movers. NAME=FILE names an entrant; "
-            "NAME=FILE,FILE are policies trained alike with several seeds.",
-        ),
-    ],
-    sets: Annotated[
-        str,
-        typer.Option(
-            "--set",
-            metavar="NAME,…",
-            help="Task sets (`tdac sets`) or set.yaml files, with commas between them.",
-        ),
-    ],
-    split: Annotated[
-        str, typer.Option(metavar="NAME", help="dev, test or hidden.")
-    ] = "test",
-    worlds: Annotated[
-        int,
-        number_flag("-n", "--worlds", min=1, help="Number of worlds of each set."),
-    ] = 100,
-    out: Annotated[
-        Optional[Path],  # noqa: UP045 - typer reads it at run time
-        dir_flag(
-            "--out",
-            help="Folder for the results; after an interruption, the same command "
-            "drives only what is missing.  [default: bench-1, …]",
-        ),
-    ] = None,
-    salt_file: Annotated[
-        Optional[Path],  # noqa: UP045
-        file_flag(
-            "--salt-file",
-            help="File with the salt of hidden worlds, which stay sealed until `tdac "
-            "bench reveal`.  [default: drawn, and revealed at the end]",
-        ),
-    ] = None,
-    tier: Tier = "auto",
-    executor: Annotated[
-        Optional[ExecutorName],  # noqa: UP045
-        typer.Option(
-            help="Drive several files at a time: in processes of this machine (local), "
-            "or on the Ray cluster in RAY_ADDRESS, which shares the folder (ray).  "
-            "[default: one after another, each on all cores]",
-        ),
-    ] = None,
-    workers: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(
-            "--workers",
-            min=1,
-            help="Files at a time with --executor.  [default: one per core]",
-        ),
-    ] = None,
-    as_json: Json = False,
-) -> None:
+@typed_options("bench:run")
+def run_command(options: BenchOptions) -> None:
     """Drive entrants on the same worlds of task sets, and compare them.
 
+    For a ranking to publish: several sets, hidden worlds, seeds of a training, figures.
+    To compare a few policies while you work, or on tasks, use `tdac evaluate`.
     `tdac bench show DIR...` shows results again, `tdac bench reveal DIR` publishes
     hidden worlds.
     """
-    from tdac_agent.cli import bench
 
-    spread = executor, workers
-    raise typer.Exit(
-        bench.run(entrants, sets, split, worlds, out, salt_file, tier, *spread, as_json)
+
+@dataclass(frozen=True, slots=True)
+class ShowOptions:
+    """The flags of `tdac bench show`."""
+
+    folders: tuple[Path, ...] = option(
+        ..., "Folders with results.", argument=True, metavar="DIR..."
     )
+    out: Path | None = out_option(
+        "Folder for the tables, figures and page of them all."
+    )
+    as_json: bool = json_option()
 
 
 @bench_app.command(
@@ -104,32 +104,22 @@ def run_command(
     epilog="Examples: `tdac bench show bench-1`; "
     "`tdac bench show mine theirs --out both`",
 )
-def show_command(
-    folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR...", help="Folders with results.")
-    ],
-    out: Annotated[
-        Optional[Path],  # noqa: UP045 - typer reads it at run time
-        dir_flag("--out", help="Folder for the tables, figures and page of them all."),
-    ] = None,
-    as_json: Json = False,
-) -> None:
+@typed_options("bench:show_folders")
+def show_command(options: ShowOptions) -> None:
     """Show results again, or those of several folders together."""
-    from tdac_agent.cli import bench
 
-    raise typer.Exit(bench.show_folders(folders, out, as_json))
+
+@dataclass(frozen=True, slots=True)
+class RevealOptions:
+    """The flags of `tdac bench reveal`."""
+
+    folder: Path = option(..., "Folder with results.", argument=True, metavar="DIR")
+    salt_file: Path = option(..., "The salt of its hidden worlds.", metavar="FILE")
 
 
 @bench_app.command(
     "reveal", epilog="Example: `tdac bench reveal bench-1 --salt-file my.salt`"
 )
-def reveal_command(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with results.")],
-    salt_file: Annotated[
-        Path, file_flag("--salt-file", help="The salt of its hidden worlds.")
-    ],
-) -> None:
+@typed_options("bench:reveal")
+def reveal_command(options: RevealOptions) -> None:
     """Publish the hidden worlds of a bench: their salt and all episodes."""
-    from tdac_agent.cli import bench
-
-    raise typer.Exit(bench.reveal(folder, salt_file))

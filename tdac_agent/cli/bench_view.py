@@ -29,32 +29,32 @@ LEGEND = (
 )
 
 
-def show(found: Bench, console: Console) -> None:
+def show(results: Bench, console: Console) -> None:
     """Prints a table for each set, one over all, and how far the first is ahead."""
-    for own in found.sets:
-        rows = found.of_set(own.name)
+    for own in results.sets:
+        rows = results.of_set(own.name)
         knows_map = any(row.knows == "+ map" for row in rows)
         console.print(_table(own, rows, console.width))
         console.print()
         for row in rows:
             for note in _notes(row, knows_map):
                 print_sentences(console, note, indent=2)
-    if found.overall:
-        console.print(_overall(found))
+    if results.overall:
+        console.print(_overall(results))
         console.print()
-        there = {each.entrant for each in found.overall}
-        there |= {row.entrant for row in found.rows if row.kind == "privileged"}
-        if absent := [name for name in found.entrants if name not in there]:
+        there = {each.entrant for each in results.overall}
+        there |= {row.entrant for row in results.rows if row.kind == "privileged"}
+        if absent := [name for name in results.entrants if name not in there]:
             note = f"not on all sets, and so not above: {', '.join(absent)}"
             print_sentences(console, note, indent=2)
     print_sentences(console, LEGEND)
-    if any(own.worlds < FEW for own in found.sets):
+    if any(own.worlds < FEW for own in results.sets):
         print_sentences(
             console,
             f"With fewer than {FEW} worlds, intervals by bootstrap are too narrow.",
         )
-    first = found.entrants[0]
-    pairs = [pair for pair in found.pairs if first in (pair.one, pair.other)]
+    first = results.entrants[0]
+    pairs = [pair for pair in results.pairs if first in (pair.one, pair.other)]
     if pairs:
         console.print()
         console.print(_pairs(first, pairs))
@@ -125,12 +125,12 @@ def _notes(row: BenchRow, knows_map: bool) -> list[str]:
     return notes
 
 
-def _overall(found: Bench) -> Table:
-    table = titled_table(f"all {len(found.sets)} sets, equal weights")
+def _overall(results: Bench) -> Table:
+    table = titled_table(f"all {len(results.sets)} sets, equal weights")
     table.add_column("entrant", overflow="fold")
     for name in ("time", "95 %", "middle half", "reached"):
         table.add_column(name, justify="right", no_wrap=True)
-    for each in found.overall:
+    for each in results.overall:
         table.add_row(
             escape(each.entrant),
             f"{each.time.value:.3f}",
@@ -162,5 +162,5 @@ def _pairs(first: str, pairs: Sequence[BenchPair]) -> Table:
     return table
 
 
-def _negative(found: Interval) -> Interval:
-    return Interval(value=-found.value, low=-found.high, high=-found.low)
+def _negative(interval: Interval) -> Interval:
+    return Interval(value=-interval.value, low=-interval.high, high=-interval.low)

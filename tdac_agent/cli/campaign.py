@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
-import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
 
-from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
+from tdac_agent.campaign.config import CampaignConfig
 from tdac_agent.campaign.drive import (
     campaign_folder,
     foreign_runs,
@@ -31,10 +29,13 @@ from tdac_agent.campaign.plan import (
     setting_of,
 )
 from tdac_agent.campaign.progress import CampaignProgress
+from tdac_agent.cli.campaign_dry_run import dry_run, read_campaign
+from tdac_agent.cli.campaign_flags import CampaignOptions
 from tdac_agent.cli.campaign_live import LiveView
 from tdac_agent.cli.campaign_table import make_console, progress_line
-from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.sentences import print_plain, print_sentences
+from tdac_agent.cli.typed_options import words_of
 from tdac_agent.executors.local import executor_of
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.lifecycle import model_warnings
@@ -43,80 +44,43 @@ from tdac_agent.models.ready import check_ready, check_servers
 from tdac_agent.models.tariff import bounds_of, tariffs_of
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
-FOLDER = Path("campaigns")
+
+def command_of(options: CampaignOptions) -> str:
+    """The command line that continues the campaign."""
+    words = words_of(replace(options, as_json=False))
+    return shlex.join(["tdac", "campaign", options.config, *words])
 
 
-@dataclass(frozen=True, slots=True)
-class CampaignCommand:
-    """The settings of a `tdac campaign` command.
-
-    Attributes:
-        given: Campaign file, or name of a bundled campaign.
-        limits: `max_cost` and `max_tokens` that override those of the file.
-        executor: `local` or `ray`.
-        workers: Number of concurrent runs; None for one per CPU core.
-        shard: Share of the runs, `i/n`.
-        out: Campaign folder; None for `campaigns/NAME`.
-        trust: Whether the file may run and contact everything it names.
-        key_over_http: Whether an API key may be sent unencrypted to another machine.
-    """
-
-    given: str
-    limits: dict[str, Any]
-    executor: str
-    workers: int | None
-    shard: str
-    out: Path | None
-    trust: bool = False
-    key_over_http: bool = False
-
-    def folder(self, config: CampaignConfig) -> Path:
-        """The campaign folder."""
-        return self.out or FOLDER / config.name
-
-    def command(self) -> str:
-        """The command line that continues the campaign."""
-        words = ["tdac", "campaign", self.given]
-        flags = {"--workers": self.workers, "--out": self.out}
-        flags |= {f"--{name.replace('_', '-')}": v for name, v in self.limits.items()}
-        for flag, value in flags.items():
-            words += [] if value is None else [flag, str(value)]
-        words += [] if self.executor == "local" else ["--executor", self.executor]
-        words += ["--trust"] if self.trust else []
-        words += ["--key-over-http"] if self.key_over_http else []
-        words += [] if self.shard == "1/1" else ["--shard", self.shard]
-        return shlex.join(words)
-
-
-def run(wanted: CampaignCommand, as_json: bool) -> int:
+def run(options: CampaignOptions) -> int:
     """Runs a campaign and prints its progress and results; returns the exit code."""
-    console = make_console(stderr=as_json)
-    shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
-    config = with_limits(read_config(file), wanted.limits)
-    folder = wanted.folder(config)
+    if options.dry_run:
+        return dry_run(options)
+    console, shard = make_console(stderr=options.as_json), Shard.parse(options.shard)
+    file, config, folder = read_campaign(options)
+    key_over_http = options.key_over_http
     # What has finished needs no model, and a server may need a permission.
-    if not folder.exists() and (config.base_url is None or wanted.trust):
+    if not folder.exists() and (config.base_url is None or options.trust):
         names = ("base_url", "max_cost", "max_tokens")
         known = {name: getattr(config, name) for name in names}
-        check_ready(config.models, {**known, "key_over_http": wanted.key_over_http})
+        check_ready(config.models, {**known, "key_over_http": key_over_http})
     with console.status("reading the tasks …"):
-        plan = make_plan(config, file.parent, trust=wanted.trust)
+        plan = make_plan(config, file.parent, trust=options.trust)
     with campaign_folder(folder, shard, read_file(file, TEXT_BYTES).decode("utf-8")):
         terms = Terms(
             folder=str(folder.resolve()),
-            workers=wanted.workers or len(os.sched_getaffinity(0)),
+            workers=options.workers or len(os.sched_getaffinity(0)),
             max_cost=config.max_cost,
             max_tokens=config.max_tokens,
             keep=config.keep,
-            key_over_http=wanted.key_over_http,
+            key_over_http=key_over_http,
         )
         progress, remaining = read_progress(plan, shard, terms.runs)
-        check_models(plan, remaining, config, key_over_http=wanted.key_over_http)
+        check_models(plan, remaining, config, key_over_http=key_over_http)
         _print_heading(console, config, progress, folder)
         _print_notes(console, plan, terms)
         try:
             if remaining:
-                _run_remaining(progress, remaining, terms, wanted.executor, console)
+                _run_remaining(progress, remaining, terms, options.executor, console)
         finally:
             # Imported late: pandas and scipy take seconds to load.
             from tdac_agent.campaign.collect import collect, write_tables
@@ -126,15 +90,10 @@ def run(wanted: CampaignCommand, as_json: bool) -> int:
             written = write_tables(tables, plan, folder)
             show_summary(tables.summary, console)
             show_set_summary(tables.set_summary, console)
-            _print_ending(console, progress, folder, wanted, written)
-    if as_json:
-        sys.stdout.write(json.dumps(_as_json(progress, folder), indent=2) + "\n")
+            _print_ending(console, progress, folder, options, written)
+    if options.as_json:
+        print_json(_as_json(progress, folder))
     return _exit_code(progress)
-
-
-def with_limits(config: CampaignConfig, limits: dict[str, Any]) -> CampaignConfig:
-    """The campaign with the limits given on the command line."""
-    return config.model_copy(update=limits)
 
 
 def check_models(
@@ -170,7 +129,7 @@ def _run_remaining(
     executor: str,
     console: Console,
 ) -> None:
-    with LiveView(console, progress, terms) as view:
+    with LiveView(console, progress) as view:
         run_all(progress, remaining, terms, executor_of(executor), view.saw)
 
 
@@ -208,7 +167,7 @@ def _print_ending(
     console: Console,
     progress: CampaignProgress,
     folder: Path,
-    wanted: CampaignCommand,
+    options: CampaignOptions,
     tables: list[Path],
 ) -> None:
     for problem, count in progress.problems.most_common():
@@ -216,12 +175,10 @@ def _print_ending(
     console.print(progress_line(progress), soft_wrap=True)
     names = ", ".join(path.name for path in tables)
     report = shlex.join(["tdac", "report", str(folder)])
-    text = f"  tables in {folder}: {names}\n  HTML report: {report}"
-    console.print(escape(text), soft_wrap=True)
+    print_plain(console, f"  tables in {folder}: {names}\n  HTML report: {report}")
     if progress.finished < progress.planned:
         more = " with a higher --max-cost" if progress.exhausted else ""
-        command = escape(wanted.command())
-        console.print(f"  to continue{more}: {command}", soft_wrap=True)
+        print_plain(console, f"  to continue{more}: {command_of(options)}")
 
 
 def _as_json(progress: CampaignProgress, folder: Path) -> dict[str, Any]:

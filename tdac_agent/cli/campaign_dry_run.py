@@ -1,15 +1,14 @@
-"""`tdac campaign --dry-run`: the runs and their maximum cost."""
+"""What `tdac campaign` reads, and `--dry-run`: the runs and their maximum cost."""
 
 from __future__ import annotations
 
-import json
-import sys
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.campaign.config import find_config, read_config
+from tdac_agent.campaign.config import CampaignConfig, find_config, read_config
 from tdac_agent.campaign.drive import read_progress
 from tdac_agent.campaign.perform import RUNS
 from tdac_agent.campaign.plan import (
@@ -20,8 +19,9 @@ from tdac_agent.campaign.plan import (
     models_of,
     question_of,
 )
-from tdac_agent.cli.campaign import CampaignCommand, with_limits
+from tdac_agent.cli.campaign_flags import CampaignOptions
 from tdac_agent.cli.campaign_table import labels_of, make_console, make_table
+from tdac_agent.cli.console import print_json
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.models.budget import format_usd
 from tdac_agent.models.choice import check_name
@@ -30,6 +30,7 @@ from tdac_agent.models.prices import PriceList, load_prices, price_file
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 
+FOLDER = Path("campaigns")
 LEGEND = (
     "K: iterations; J: repairs per iteration; questions: of all runs if no controller "
     "ever passes; USD once, 3 times: cost if each question is asked once, or three "
@@ -60,53 +61,50 @@ class PlanRow:
     cost_most: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class CostLimits:
-    """The limits of all runs together; None if there is none.
-
-    Attributes:
-        cost: USD.
-        tokens: Input plus output.
-    """
-
-    cost: float | None
-    tokens: int | None
-
-    def words(self) -> str:
-        """The limits and how they are set; empty if there are none."""
-        words = []
-        if self.cost is not None:
-            words.append(f"{format_usd(self.cost)} (max_cost in the file, --max-cost)")
-        if self.tokens is not None:
-            words.append(f"{self.tokens} tokens (max_tokens in the file, --max-tokens)")
-        return " and ".join(words)
+def read_campaign(options: CampaignOptions) -> tuple[Path, CampaignConfig, Path]:
+    """The campaign file, its contents with the typed limits, and the folder."""
+    file = find_config(options.config)
+    limits = {"max_cost": options.max_cost, "max_tokens": options.max_tokens}
+    typed = {name: value for name, value in limits.items() if value is not None}
+    config = read_config(file).model_copy(update=typed)
+    return file, config, options.out or FOLDER / config.name
 
 
-def run(wanted: CampaignCommand, as_json: bool) -> int:
+def _limits(config: CampaignConfig) -> str:
+    """The limits of all runs together, and how they are set; empty without any."""
+    words = []
+    if config.max_cost is not None:
+        cost = format_usd(config.max_cost)
+        words.append(f"{cost} (max_cost in the file, --max-cost)")
+    if config.max_tokens is not None:
+        tokens = config.max_tokens
+        words.append(f"{tokens} tokens (max_tokens in the file, --max-tokens)")
+    return " and ".join(words)
+
+
+def dry_run(options: CampaignOptions) -> int:
     """Prints the plan and returns 0; asks no model, needs no key, writes nothing."""
-    console = make_console(stderr=as_json)
-    shard, file = Shard.parse(wanted.shard), find_config(wanted.given)
-    config = with_limits(read_config(file), wanted.limits)
+    console, shard = make_console(stderr=options.as_json), Shard.parse(options.shard)
+    file, config, folder = read_campaign(options)
     for name in config.models:
         check_name(name)
     with console.status("reading the tasks …"):
-        plan = make_plan(config, file.parent, trust=wanted.trust)
-    prices, folder = load_prices(), wanted.folder(config)
+        plan = make_plan(config, file.parent, trust=options.trust)
+    prices = load_prices()
     progress, _ = read_progress(plan, shard, folder / RUNS)
     rows = [
         _row(tally.cell, tally.planned, plan, prices)
         for tally in progress.tallies.values()
     ]
-    if as_json:
-        sys.stdout.write(json.dumps([asdict(row) for row in rows], indent=2) + "\n")
+    if options.as_json:
+        print_json([asdict(row) for row in rows])
         return 0
     console.print(_table([t.cell for t in progress.tallies.values()], rows))
     print_sentences(console, LEGEND, "dim")
     if progress.before:
         done = f"{progress.before} of {progress.planned} runs in {folder} have already"
         print_sentences(console, f"{done} finished; they are counted above, too")
-    limits = CostLimits(config.max_cost, config.max_tokens)
-    for line in _lines(rows, limits, prices):
+    for line in _lines(rows, config, prices):
         print_sentences(console, line)
     for line in model_warnings(models_of(plan.cells)):
         print_sentences(console, f"note: {line}", "yellow")
@@ -152,7 +150,7 @@ def _table(cells: list[Cell], rows: list[PlanRow]) -> Table:
     return table
 
 
-def _lines(rows: list[PlanRow], limits: CostLimits, prices: PriceList) -> list[str]:
+def _lines(rows: list[PlanRow], config: CampaignConfig, prices: PriceList) -> list[str]:
     """What the runs may do and cost at most."""
     runs = sum(row.runs for row in rows)
     tested = sum(row.runs * row.iterations * (1 + row.patience) for row in rows)
@@ -172,25 +170,25 @@ def _lines(rows: list[PlanRow], limits: CostLimits, prices: PriceList) -> list[s
         f"{format_usd(once)} if each is asked once, and at most {format_usd(most)} if "
         f"each is asked three times{kinds}; a run that is verified early costs a small "
         "part of that",
-        _stop(limits, most, is_known=not unknown),
+        _stop(config, most, is_known=not unknown),
         f"prices of {prices.dated}: {price_file()}",
     ]
     return lines
 
 
-def _stop(limits: CostLimits, most: float, *, is_known: bool) -> str:
+def _stop(config: CampaignConfig, most: float, *, is_known: bool) -> str:
     """What is spent at most, given the limits of all runs together."""
-    words = limits.words()
+    words = _limits(config)
     if not words:
         return "no limit for all runs together; set one by --max-cost or --max-tokens"
     line = f"limit of all runs together: {words}"
-    if limits.cost is None:
+    if config.max_cost is None:
         return f"{line}; the campaign stops before exceeding it"
-    if is_known and limits.cost >= most:
+    if is_known and config.max_cost >= most:
         return f"{line}; never reached, since all runs cost at most {format_usd(most)}"
     return (
-        f"{line}; so this campaign costs at most {format_usd(limits.cost)}: it stops "
-        "before exceeding it"
+        f"{line}; so this campaign costs at most {format_usd(config.max_cost)}: it "
+        "stops before exceeding it"
     )
 
 

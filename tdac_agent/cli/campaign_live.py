@@ -12,7 +12,7 @@ from rich.padding import Padding
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from tdac_agent.campaign.perform import Outcome, Terms
+from tdac_agent.campaign.perform import Outcome
 from tdac_agent.campaign.progress import CampaignProgress, Doing, RunUpdate, Tally
 from tdac_agent.cli.campaign_table import (
     COLOURS,
@@ -33,12 +33,9 @@ BAR_WIDTH = 60
 class LiveView:
     """Context manager that shows the progress of a campaign."""
 
-    def __init__(
-        self, console: Console, progress: CampaignProgress, terms: Terms
-    ) -> None:
+    def __init__(self, console: Console, progress: CampaignProgress) -> None:
         self._console = console
         self._progress = progress
-        self._terms = terms
         cells = [tally.cell for tally in progress.tallies.values()]
         self._labels = labels_of(cells)
         self._paid = any(cell.asks_models for cell in cells)
@@ -73,8 +70,8 @@ class LiveView:
 
     def _line(self, outcome: Outcome) -> str:
         at = "" if outcome.tau is None else f" in iteration {outcome.tau}"
-        told = outcome.reason and outcome.status != "verified"
-        why = f": {outcome.reason}" if told else ""
+        explained = outcome.reason and outcome.status != "verified"
+        why = f": {outcome.reason}" if explained else ""
         done = f"[{self._progress.finished}/{self._progress.planned}]"
         colour = COLOURS.get(outcome.status, "yellow")
         status = f"{outcome.status}{at}, {format_duration(outcome.seconds)}{why}"

@@ -47,7 +47,7 @@ def show_set_summary(summary: pd.DataFrame, console: Console) -> None:
 
 def _show(
     summary: pd.DataFrame,
-    about: str,
+    first: str,
     console: Console,
     figures_of: Callable[[dict[Any, Any], str], dict[str, str]],
 ) -> list[str]:
@@ -60,7 +60,7 @@ def _show(
     rows = summary.to_dict("records")
     figures = [figures_of(row, between) for row in rows]
     shown = [name for name in figures[0] if any(one[name] for one in figures)]
-    heads = [about if name == "task" else name for name in names]
+    heads = [first if name == "task" else name for name in names]
     table = make_table(heads, shown)
     for row, figure in zip(rows, figures, strict=True):
         labels = [Path(str(row[n])).name if n == "prompt" else row[n] for n in names]

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import TaskFlags, check_tier
+from tdac_agent.cli.check_suite_flags import CheckSuiteOptions
+from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.task_choice import check_tier, chosen_single
+from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.tasks.task import display_name
-from tdac_agent.tasks.task_file import Profile
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite.privileged import REFERENCE
@@ -20,34 +18,25 @@ from tdac_agent.verification.suite.proof import ProofRow, SuiteCheck
 from tdac_agent.verification.suite_check import check_suite
 
 
-def run(
-    flags: TaskFlags,
-    profile: Profile | None,
-    suite: Path | None,
-    trust: bool,
-    tier: str,
-    seed: int | None,
-    repeats: int,
-    as_json: bool,
-) -> int:
+def run(flags: TaskFlags, options: CheckSuiteOptions) -> int:
     """Checks a suite and prints the result; returns the exit code."""
-    check_tier(tier)
-    console = Console(stderr=as_json)
+    check_tier(options.tier)
+    console = Console(stderr=options.as_json)
     with WarmJudge() as judge, console.status("preparing the task …") as status:
-        task = allowed(flags.load(), suite, trust=trust)
+        task = allowed(chosen_single(flags), options.suite, trust=options.trust)
         check = check_suite(
             task,
-            profile=profile,
-            tier=tier,
-            seed=seed,
-            repeats=repeats,
+            profile=options.profile,
+            tier=options.tier,
+            seed=options.seed,
+            repeats=options.repeats,
             judge=judge,
             on_progress=lambda doing: status.update(
                 f"checking the suite on {escape(task.name)}: {doing} …"
             ),
         )
-    if as_json:
-        sys.stdout.write(check.model_dump_json(indent=2) + "\n")
+    if options.as_json:
+        print_json(check)
     else:
         _show(check, display_name(task), console)
     return 0 if check.proven else 1

@@ -2,45 +2,43 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import dataclass
+from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.mistakes import begun
 from tdac_agent.cli.options import (
-    JitterSeed,
-    Json,
     Profile,
-    Suite,
-    Tier,
-    Trust,
-    number_flag,
+    json_option,
+    profile_option,
+    seed_option,
+    suite_option,
+    tier_option,
+    trust_option,
 )
-from tdac_agent.cli.task_flags import NamedTask, takes_task
+from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, TaskFlags
+from tdac_agent.cli.typed_options import typed_options
+from tdac_agent.options import option
 
 app = typer.Typer()
+
+
+@dataclass(frozen=True, slots=True)
+class CheckSuiteOptions:
+    """The further flags of `tdac check-suite`."""
+
+    suite: Path | None = suite_option()
+    trust: bool = trust_option()
+    profile: Profile | None = profile_option()
+    tier: str = tier_option()
+    seed: int | None = seed_option()
+    repeats: int = option(5, "Verifications per controller; they must agree.", least=1)
+    as_json: bool = json_option()
 
 
 @app.command(
     "check-suite", epilog="Example: `tdac check-suite --task office --suite my_tests`"
 )
-@takes_task()
-def check_suite(
-    named_task: NamedTask,
-    suite: Suite = None,
-    trust: Trust = False,
-    profile: Profile = None,
-    tier: Tier = "auto",
-    seed: JitterSeed = None,
-    repeats: Annotated[
-        int, number_flag(min=1, help="Verifications per controller; they must agree.")
-    ] = 5,
-    as_json: Json = False,
-) -> None:
+@typed_options("check_suite:run", without=(*ONLY_FOR_SYNTH, "set_name"))
+def check_suite(flags: TaskFlags, options: CheckSuiteOptions) -> None:
     """Check that a suite passes a good controller and fails bad ones."""
-    with begun():
-        from tdac_agent.cli import check_suite as command
-
-    raise typer.Exit(
-        command.run(named_task(), profile, suite, trust, tier, seed, repeats, as_json)
-    )

@@ -1,7 +1,8 @@
-"""The console that all commands print to."""
+"""The console that all commands print to, and their JSON."""
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterable
 from typing import Any
@@ -40,3 +41,12 @@ class Console(rich.console.Console):
                 yield segment
             else:
                 yield Segment(printable(segment.text), segment.style)
+
+
+def print_json(value: Any) -> None:
+    """Prints a record, or plain data, to stdout as JSON."""
+    if hasattr(value, "model_dump_json"):
+        text = value.model_dump_json(indent=2)
+    else:
+        text = json.dumps(value, indent=2)
+    sys.stdout.write(f"{text}\n")

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.synth import synthesise_and_show
+from tdac_agent.cli.synth import arguments_of, write
+from tdac_agent.cli.synth_options import SynthOptions
 from tdac_agent.library.listing import next_folder
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 
-_ABOUT = (
+INTRODUCTION = (
     "Replaying a language model's answers to the [bold]{prompt}[/] prompt for the task "
     "[bold]{task}[/], recorded {date}. They are unedited; each is from a fresh "
     "conversation that contained only the printed prompt. The controllers and all "
@@ -25,18 +26,15 @@ def run(out: Path | None, as_json: bool) -> int:
     """Replays the bundled run, by default into a new folder; returns the exit code."""
     console = Console(stderr=as_json)
     recorded = load_run(DEMO)
-    about = {"prompt": recorded.prompt, "task": recorded.task}
-    console.print(_ABOUT.format(date=recorded.started[:10], **about))
+    names = {"prompt": recorded.prompt, "task": recorded.task}
+    console.print(INTRODUCTION.format(date=recorded.started[:10], **names))
     with console.status("preparing the task …"):
         task = load_task(recorded.task)
-    wanted = {
-        "task": task,
-        "learner": "replay:demo",
-        "optimizer": None,
-        "out": out if out is not None else next_folder("demo"),
-        "iterations": recorded.iterations,
-        "patience": recorded.patience,
-        "seed": recorded.seed,
-        "prompt": recorded.prompt,
-    }
-    return synthesise_and_show(wanted, console)
+    options = SynthOptions(
+        learner="replay:demo",
+        iterations=recorded.iterations,
+        patience=recorded.patience,
+        seed=recorded.seed,
+        prompt=recorded.prompt,
+    )
+    return write(task, out or next_folder("demo"), arguments_of(options), console)

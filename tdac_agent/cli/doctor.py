@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
-import json
 import os
 import platform
-import sys
 from dataclasses import asdict, dataclass
 
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.cli.console import Console
+from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.display import has_display
 from tdac_agent.cli.trials import attempt
 from tdac_agent.sandbox import available_tiers
@@ -68,7 +66,7 @@ def run(as_json: bool) -> int:
             "checks": [asdict(check) for check in checks],
             "versions": _versions(),
         }
-        sys.stdout.write(json.dumps(record, indent=2) + "\n")
+        print_json(record)
     else:
         show_checks(checks)
     return 0 if _usable(checks) else 3
@@ -117,9 +115,9 @@ def _window() -> Check:
 def _extras() -> list[Check]:
     checks = []
     for extra, module in EXTRAS.items():
-        found = importlib.util.find_spec(module) is not None
-        detail = module if found else f"optional: {install_command(extra)}"
-        checks.append(Check(f"extra {extra}", found, detail))
+        is_installed = importlib.util.find_spec(module) is not None
+        detail = module if is_installed else f"optional: {install_command(extra)}"
+        checks.append(Check(f"extra {extra}", is_installed, detail))
     return checks
 
 

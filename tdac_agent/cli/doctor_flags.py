@@ -10,22 +10,22 @@ app = typer.Typer()
 
 
 @app.command(epilog="Example: `tdac doctor`")
-def doctor(as_json: Json = False) -> None:
+def doctor(as_json: Json = False) -> int:
     """Check what works on this machine: sandbox, judge, video, extras.
 
     Exits with 3 if a required part does not work.
     """
     from tdac_agent.cli import doctor as command
 
-    raise typer.Exit(command.run(as_json))
+    return command.run(as_json)
 
 
 @app.command(epilog="Example: `tdac warm`")
-def warm() -> None:
+def warm() -> int:
     """Compile everything now, so that no later command has to wait.
 
     If an administrator runs it on an installed package, it serves all users.
     """
     from tdac_agent.cli import warm as command
 
-    raise typer.Exit(command.run())
+    return command.run()

@@ -3,97 +3,69 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
 
-from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.synth_flags import RunFlags
+from tdac_agent.cli.synth_options import SynthOptions
+from tdac_agent.cli.task_choice import chosen
+from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.models.budget import format_usd
 from tdac_agent.models.choice import Options, check_name, missing_for_name
 from tdac_agent.models.prices import SHIPPED, load_prices, price_file
 from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
+from tdac_agent.prompting.given_rules import read_given
 from tdac_agent.prompting.prompt import generate_prompt, load_template
-from tdac_agent.prompting.rules import RepairRule, RuleBook
+from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.synthesis.workload import most_variations
 from tdac_agent.tasks.setting import Setting
-from tdac_agent.tasks.task_file import Profile
 from tdac_envs.ladder.task_sets import TaskSet
 
 
-def run(
-    flags: TaskFlags,
-    profile: Profile | None,
-    models: dict[str, Any],
-    loop: dict[str, Any],
-    as_json: bool,
-) -> int:
-    """Prints the prompt alone to stdout, the rest to stderr; returns 0.
-
-    Args:
-        flags: Flags that name the task.
-        profile: What a controller must define; by default as the task says.
-        models: `learner`, `optimizer`, `base_url`, `key_over_http`, `prompt`,
-            `max_output`, `rules`, `max_cost` and `max_tokens`, as for `synthesize`.
-        loop: `iterations`, `patience`, `candidates`, `refine`, `vision` and `improve`.
-        as_json: Whether to print the forecast as JSON.
-    """
-    for name in _names(models):
+def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int:
+    """Prints the prompt alone to stdout, the rest to stderr; returns 0."""
+    names = options.learner, options.optimizer or options.learner
+    for name in names:
         check_name(name)
-    template = load_template(models["prompt"])
-    task = flags.load().with_profile(profile)
-    question = generate_prompt(task, rules_of(models), template)
-    return show(task.name, task.setting, question, models, loop, as_json)
-
-
-def rules_of(models: dict[str, Any]) -> tuple[RepairRule, ...]:
-    """The rules that the run is given."""
-    book: RuleBook | None = models["rules"]
-    return () if book is None else book.in_force
-
-
-def _names(models: dict[str, Any]) -> tuple[str, str]:
-    """Names of the learner and of the optimizer."""
-    return models["learner"], models["optimizer"] or models["learner"]
-
-
-def show(
-    name: str,
-    setting: Setting | TaskSet,
-    question: str,
-    models: dict[str, Any],
-    loop: dict[str, Any],
-    as_json: bool,
-) -> int:
-    """Prints the first question, and the maximum cost of a run; returns 0.
-
-    Args:
-        name: Name of the task or task set.
-        setting: Setting of the task, or the task set.
-        question: The question.
-        models: As for `run`.
-        loop: `iterations`, `patience`, `candidates`, `refine`, `vision` and `improve`.
-        as_json: Whether to print the forecast as JSON.
-    """
-    names = _names(models)
-    terms = dict(loop)
-    improve = terms.pop("improve")
-    checked_vision(loop["vision"], names[1], loop["patience"], improve)
-    varied = most_variations(improve, on_set=isinstance(setting, TaskSet))
-    options = Options(setting, models["base_url"], models["key_over_http"])
-    missing = [line for each in names for line in missing_for_name(each, options)]
-    limits = ("base_url", "max_output", "max_cost", "max_tokens")
-    terms |= {limit: models[limit] for limit in limits}
-    terms["variations"] = varied
-    forecast = cost_of(name, question, *names, load_prices(), **terms)
-    if as_json:
-        sys.stdout.write(forecast.model_dump_json(indent=2) + "\n")
+    template = load_template(options.prompt)
+    book = None if options.rules is None else read_given(options.rules)
+    rules = () if book is None else book.in_force
+    problem = chosen(flags, options, run_flags)
+    on_set = isinstance(problem, TaskSet)
+    setting: Setting | TaskSet
+    if isinstance(problem, TaskSet):
+        question, setting = set_prompt(problem, rules, template), problem
+    else:
+        problem = problem.with_profile(run_flags.profile)
+        question, setting = generate_prompt(problem, rules, template), problem.setting
+    checked_vision(options.vision, names[1], options.patience, options.improve)
+    server = Options(setting, options.base_url, options.key_over_http)
+    missing = [line for each in names for line in missing_for_name(each, server)]
+    forecast = cost_of(
+        problem.name,
+        question,
+        *names,
+        load_prices(),
+        iterations=options.iterations,
+        patience=options.patience,
+        candidates=options.candidates,
+        refine=options.refine,
+        vision=options.vision,
+        variations=most_variations(options.improve, on_set=on_set),
+        base_url=options.base_url,
+        max_output=options.max_output,
+        max_cost=options.max_cost,
+        max_tokens=options.max_tokens,
+    )
+    if run_flags.as_json:
+        print_json(forecast)
         return 0
     sys.stdout.write(forecast.prompt)
     sys.stdout.flush()
     console = Console(stderr=True, highlight=False)
-    unbounded = _unbounded(forecast) if models["base_url"] is None else []
+    unbounded = _unbounded(forecast) if options.base_url is None else []
     for line in [*_estimates(forecast), *_still_needed([*missing, *unbounded])]:
         print_sentences(console, line)
     return 0

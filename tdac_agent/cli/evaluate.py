@@ -1,30 +1,43 @@
-"""`tdac evaluate`: compares policies of any kind on the same tasks and seeds."""
+"""`tdac evaluate`: compares policies of any kind on the same episodes."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, TypeGuard
 
-from rich.markup import escape
-
-from tdac_agent.cli.console import Console
+from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.driving_bar import DrivingBar
+from tdac_agent.cli.evaluate_flags import EvaluateOptions
 from tdac_agent.cli.evaluate_view import show_evaluation
-from tdac_agent.cli.flags import TaskFlags, check_tier
-from tdac_agent.cli.policy_bar import policy_bar
-from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.sentences import print_plain, print_sentences
+from tdac_agent.cli.task_choice import (
+    check_scope,
+    check_tier,
+    chosen_task,
+    kind_of_file,
+    with_named_file,
+)
+from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.cli.typed_options import flag_name, typed_fields
 from tdac_agent.errors import ControllerFileError, Fault
-from tdac_agent.evaluation.evaluate import evaluate, load_problems
+from tdac_agent.evaluation.evaluate import (
+    EPISODES,
+    POLICIES,
+    Problem,
+    evaluate,
+    load_problems,
+)
+from tdac_agent.evaluation.evaluation_report import Evaluation
 from tdac_agent.evaluation.policies import entrants_of
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.store import count_unfinished
 from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,87 +45,104 @@ if TYPE_CHECKING:
 NO_WRAPPERS = "none"
 
 
-def run(
-    policies: list[str],
-    tasks: list[str],
-    flags: TaskFlags,
-    episodes: int,
-    seed: int,
-    variation: Literal["nominal", "jitter", "mixed", "random"],
-    wrappers: list[str] | None,
-    csv: Path | None,
-    out: Path | None,
-    tier: str,
-    as_json: bool,
-) -> int:
+def run(flags: TaskFlags, options: EvaluateOptions) -> int:
     """Evaluates the policies and prints the results; returns the exit code."""
-    check_tier(tier)
-    names = None if wrappers is None else wrapper_names(wrappers)
-    entrants_of(policies, names)  # fails early on a wrong name
-    check_outputs(csv, out)
-    console = Console(stderr=as_json)
-    bar = policy_bar(console)
-    row = bar.add_task("", total=episodes, successes=0, doing="preparing")
-
-    is_driven = False
-
-    def watch(task: str, policy: str, count: int, successes: int) -> None:
-        nonlocal is_driven
-        is_driven = True
-        doing = escape(f"{task}: {policy}")
-        bar.update(row, completed=count, successes=successes, doing=doing, refresh=True)
-
-    with ChildPool() as child_pool, _keeping(console, out):
-        loaded = load_problems(_tasks(tasks, flags))
+    check_tier(options.tier)
+    options, flags = _with_named_files(options, flags)
+    check_scope(flags.set_name is not None, flags, options)
+    wrappers = None if options.wrappers is None else wrapper_names(options.wrappers)
+    if flags.set_name is None:
+        entrants_of(options.policies, wrappers)  # fails early on a wrong name
+    check_outputs(options.csv, options.out)
+    console = Console(stderr=options.as_json)
+    with ChildPool() as child_pool, _keeping(console, options.out):
+        problems = load_problems(_problems(options.tasks, flags))
+        count = _count(problems, options)
+        bar = DrivingBar(console, count)
         with WarmJudge(child_pool) as judge, bar:
-            found = evaluate(
-                policies,
-                loaded,
-                episodes,
-                seed=seed,
-                variation=variation,
-                wrappers=names,
-                tier=tier,
-                out=out,
+            results = evaluate(
+                options.policies,
+                problems,
+                count,
+                seed=options.seed,
+                variation=options.variation,
+                split=options.split,
+                wrappers=wrappers,
+                tier=options.tier,
+                out=options.out,
                 judge=judge,
-                watch=watch,
+                watch=lambda task, name, n, won: bar.show(n, won, f"{task}: {name}"),
             )
-    if csv is not None:
-        write_csv(found.to_frame(), csv)
-    if as_json:
-        sys.stdout.write(found.model_dump_json(indent=2) + "\n")
+    if options.csv is not None:
+        write_csv(results.to_frame(), options.csv)
+    if options.as_json:
+        print_json(results)
     else:
-        units = {
-            task.name: task.setting.shown for task in loaded if isinstance(task, Task)
-        }
-        show_evaluation(found, console, units)
-        if out is not None and not is_driven:
-            done = f"{out} already has this evaluation; nothing was driven"
-            print_sentences(console, done)
-        elif out is not None:
-            pictures = ", ".join(f"{task.name}.png" for task in found.tasks)
-            files = f"evaluation.json, episodes.csv, timing.csv, {pictures}"
-            console.print(escape(f"wrote {files} to {out}"), soft_wrap=True)
-    if found.all_crashed:
+        show_evaluation(results, console, problems)
+    if options.out is not None and not options.as_json:
+        _print_written(results, options.out, bar, console)
+    if results.all_crashed:
         console.print("[red]every policy crashed in every episode[/]")
         return 1
     return 0
 
 
-def _tasks(names: list[str], flags: TaskFlags) -> list[Task]:
-    """The tasks that `--task` names, then that of `--map` or `--world`, if any.
+def _count(problems: Sequence[Problem], options: EvaluateOptions) -> int:
+    """Episodes per policy and problem; at most as many as a set has worlds."""
+    worlds = [each.count(options.split) for each in problems if _is_set(each)]
+    return options.episodes or min([EPISODES, *filter(None, worlds)])
+
+
+def _is_set(problem: Problem) -> TypeGuard[TaskSet]:
+    return isinstance(problem, TaskSet)
+
+
+def _print_written(
+    results: Evaluation, out: Path, bar: DrivingBar, console: Console
+) -> None:
+    if not bar.counts[0]:
+        done = f"{out} already has this evaluation; nothing was driven"
+        print_sentences(console, done)
+        return
+    pictures = [f"{task.name}.png" for task in results.tasks if task.split is None]
+    names = ["evaluation.json", "episodes.csv", "timing.csv", *pictures]
+    print_plain(console, f"wrote {', '.join(names)}, {POLICIES}/ to {out}")
+
+
+def _with_named_files(
+    options: EvaluateOptions, flags: TaskFlags
+) -> tuple[EvaluateOptions, TaskFlags]:
+    """The options, with tasks and sets among the policies as those of their flags."""
+    policies, tasks = [], [*options.tasks]
+    for name in options.policies:
+        kind = None if Path(name).is_dir() else kind_of_file(name)
+        if kind is None:
+            policies.append(name)
+        elif kind == "task":
+            tasks.append(name)
+        else:
+            flags = with_named_file(replace(flags, file=name))
+    if not policies:
+        raise TaskError("no policy: give files, run folders, or names such as builtin")
+    return replace(options, policies=tuple(policies), tasks=tuple(tasks)), flags
+
+
+def _problems(names: Sequence[str], flags: TaskFlags) -> list[Problem]:
+    """The set, or the tasks that `--task` names and that of `--map` or `--world`.
 
     Raises:
         TaskError: Flags contradict each other, or a task cannot be used.
     """
-    shown = TaskFlags(frame=flags.frame)
+    if flags.set_name is not None:
+        return [load_set(flags.set_name)]
+    shown = TaskFlags(frame=flags.frame, metres=flags.metres)
     if flags.map_image or flags.world:
         named = [replace(shown, task=name) for name in names]
-        return [each.load() for each in (*named, flags)]
-    others = replace(flags, frame=None).words()
-    if others:
-        raise TaskError(f"{others[0]} needs --map or --world")
-    return [replace(shown, task=name).load() for name in names or ["maze"]]
+        return [chosen_task(each) for each in (*named, flags)]
+    changes = typed_fields(flags.changes)
+    if changes and len(names) > 1:
+        raise TaskError(f"{flag_name(changes[0])} changes one task: give one --task")
+    return [chosen_task(replace(flags, task=name)) for name in names or ["maze"]]
 
 
 @contextmanager
@@ -130,17 +160,17 @@ def _keeping(console: Console, out: Path | None) -> Generator[None]:
         raise
 
 
-def wrapper_names(words: list[str]) -> list[str]:
+def wrapper_names(words: Sequence[str]) -> list[str]:
     """The names of the wrappers; `none` alone stands for an empty list.
 
     Raises:
         TaskError: `none` is combined with other names.
     """
-    if words == [NO_WRAPPERS]:
+    if list(words) == [NO_WRAPPERS]:
         return []
     if NO_WRAPPERS in words:
         raise TaskError("--wrapper none cannot be combined with another --wrapper")
-    return words
+    return list(words)
 
 
 def check_outputs(csv: Path | None, out: Path | None) -> None:

@@ -10,6 +10,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.titled_table import titled_table
+from tdac_agent.evaluation.evaluate import Problem
 from tdac_agent.evaluation.evaluation_report import (
     EvaluatedProblem,
     Evaluation,
@@ -17,11 +18,13 @@ from tdac_agent.evaluation.evaluation_report import (
     PolicyRow,
     Timing,
 )
+from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 
 NONE = "–"
-# Least width of long policy names, so that a table fits into 80 columns.
-WIDEST = 12
+# Least widths of long policy names, so that a table fits into 80 columns.
+WIDEST, WIDEST_ON_SET = 12, 16
+MOST_CAUSES = 6
 LEGEND = (
     "knows: what the policy may use; sensors include pose and goal, + map and + "
     "guidance come in addition to sensors, privileged is everything. 95 %: exact "
@@ -30,6 +33,14 @@ LEGEND = (
     "length of the speed (0 is smoothest); these are medians of the successes. gap: "
     "clearance beside the body, least / mean. ms/step: median / 99th percentile of a "
     "policy call, measured by the judge."
+)
+SET_LEGEND = (
+    "knows: what the policy may use; sensors include the goal, and the pose where the "
+    "set observes it. 95 %: exact interval of the rate (Clopper-Pearson); with several "
+    "runs on each world, worlds are resampled. SCT: success x OT / T (least possible "
+    "/ actual time); SPL: success x L / driven (shortest / actual path); BARN: at most "
+    "0.5 (docs/task-sets.md). hit: episodes with a contact; late: cut off at the "
+    "horizon; error: the policy's own, or too much CPU time."
 )
 PAIRED = (
     ">: reaches the goal more often; ~: no significant difference; by McNemar's exact "
@@ -41,31 +52,39 @@ SIGNIFICANT = 0.05
 
 
 def show_evaluation(
-    found: Evaluation, console: Console, units: dict[str, Units]
+    results: Evaluation, console: Console, problems: Sequence[Problem]
 ) -> None:
-    """Prints a table per task with its failure reasons, then the comparisons.
-
-    Args:
-        found: The evaluation.
-        console: Console to print to.
-        units: Units of each task by its name, as from `Setting.shown`.
-    """
-    timings = {(t.task, t.policy): t for t in found.timings}
-    for task in found.tasks:
-        rows = [row for row in found.rows if row.task == task.name]
-        console.print(_table(found, task, rows, timings, units[task.name]))
+    """Prints the tables of each task or set with failures, then the comparisons."""
+    for task, problem in zip(results.tasks, problems, strict=True):
+        if isinstance(problem, Task):
+            _show_task(results, task, problem.setting.shown, console)
+        else:
+            _show_set(results, task, console)
+    on_sets = [task.split is not None for task in results.tasks]
+    if not all(on_sets):
+        console.print(LEGEND, style="dim", highlight=False)
+    if any(on_sets):
+        print_sentences(console, SET_LEGEND)
+    if results.comparisons:
         console.print()
-        for line in _notes(rows):
-            print_sentences(console, line, indent=2)
-    console.print(LEGEND, style="dim", highlight=False)
-    if found.comparisons:
-        console.print()
-        console.print(comparison_table(found.comparisons, several=len(found.tasks) > 1))
+        several = len(results.tasks) > 1
+        console.print(comparison_table(results.comparisons, several=several))
         console.print(PAIRED, style="dim", highlight=False)
 
 
+def _show_task(
+    results: Evaluation, task: EvaluatedProblem, units: Units, console: Console
+) -> None:
+    timings = {(t.task, t.policy): t for t in results.timings}
+    rows = results.of(task.name)
+    console.print(_table(results, task, rows, timings, units))
+    console.print()
+    for line in _notes(rows):
+        print_sentences(console, line, indent=2)
+
+
 def _table(
-    found: Evaluation,
+    results: Evaluation,
     task: EvaluatedProblem,
     rows: Sequence[PolicyRow],
     timings: dict[tuple[str, str], Timing],
@@ -77,9 +96,10 @@ def _table(
         "mixed": "jittered and random starts",
         "random": "random starts and goals",
     }
+    start = starts.get(str(results.variation), "the nominal start")
     title = (
-        f"{task.called or task.name}: {found.episodes} episodes each, "
-        f"{starts.get(str(found.variation), 'the nominal start')}, seed {found.seed}"
+        f"{task.called or task.name}: {results.episodes} episodes each, {start}, "
+        f"seed {results.seed}"
     )
     table = titled_table(title, gap=0)
     longest = max(len(row.policy) for row in rows)
@@ -161,3 +181,73 @@ def _counts(pair: PairedComparison) -> str:
 
 def _figure(value: float | None, decimals: int) -> str:
     return NONE if value is None else f"{value:.{decimals}f}"
+
+
+def _show_set(results: Evaluation, task: EvaluatedProblem, console: Console) -> None:
+    """Prints the scores, those by generator, and failures."""
+    worlds = f"worlds 0 to {results.episodes - 1} of {task.split}"
+    rows = results.of(task.name)
+    console.print(_scores(f"{task.name} {task.sha256[:8]}: {worlds}", rows))
+    console.print()
+    for row in rows:
+        _print_failures(row, console)
+    kinds = list(dict.fromkeys(kind for row in rows for kind in row.by_generator))
+    if len(kinds) > 1:
+        console.print(_by_generator(rows, kinds))
+        console.print()
+
+
+def _policies(title: str, rows: Sequence[PolicyRow]) -> Table:
+    table = titled_table(title)
+    longest = max(len(row.policy) for row in rows)
+    table.add_column("policy", overflow="fold", min_width=min(longest, WIDEST_ON_SET))
+    return table
+
+
+def _scores(title: str, rows: Sequence[PolicyRow]) -> Table:
+    table = _policies(title, rows)
+    table.add_column("knows", no_wrap=True)
+    for name in ("reached", "95 %", "SCT", "SPL", "BARN", "hit", "late", "error"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in rows:
+        cells = [NONE] * 5
+        if row.scores is not None and row.interval is not None:
+            colour = "green" if row.successes == row.episodes else "yellow"
+            colour = colour if row.successes else "red"
+            low, high = 100 * row.interval.low, 100 * row.interval.high
+            scores = row.scores.time, row.scores.path, row.scores.barn
+            cells = [
+                f"[{colour}]{row.successes}/{row.episodes}[/]",
+                f"{low:.0f}–{high:.0f}",
+                *(f"{score:.3f}" for score in scores),
+            ]
+        hit, late = (row.outcomes.get(each, 0) for each in ("collision", "out of time"))
+        counts = hit, late, row.episodes - row.successes - hit - late
+        table.add_row(escape(row.policy), row.knows, *cells, *map(str, counts))
+    return table
+
+
+def _by_generator(rows: Sequence[PolicyRow], kinds: Sequence[str]) -> Table:
+    """Success and SCT of each policy in the worlds of each generator."""
+    table = _policies("by generator: reached, SCT", rows)
+    for kind in kinds:
+        table.add_column(escape(kind), justify="right", no_wrap=True)
+    for row in rows:
+        own = [row.by_generator.get(kind) for kind in kinds]
+        cells = (
+            NONE if each is None else f"{100 * each.success:.0f} % {each.time:.2f}"
+            for each in own
+        )
+        table.add_row(escape(row.policy), *cells)
+    return table
+
+
+def _print_failures(row: PolicyRow, console: Console) -> None:
+    """The failures of a policy by cause; if nothing was driven, the reasons."""
+    if row.scores is None:
+        for text in row.told:
+            print_sentences(console, f"{row.policy}, not driven: {text}", indent=2)
+    elif row.causes:
+        causes = list(row.causes.items())[:MOST_CAUSES]
+        text = ", ".join(f"{count} {name}" for name, count in causes)
+        print_sentences(console, f"{row.policy}, failures: {text}", indent=2)

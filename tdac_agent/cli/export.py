@@ -1,36 +1,66 @@
-"""`tdac export webots`: a verified e-puck controller as a Webots project."""
+"""`tdac export`: a controller as a Webots project, a task as a folder of Harbor."""
 
 from __future__ import annotations
 
-import json
-import sys
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
 
-from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import check_tier
+from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.sentences import print_plain
+from tdac_agent.cli.spinner import Spinner
+from tdac_agent.cli.task_choice import check_tier, chosen
+from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.cli.typed_options import typed_fields
+from tdac_agent.cli.webots_flags import ExportHarborOptions, ExportWebotsOptions
 from tdac_agent.environments.epuck.export import SPARE, Project, export_webots
+from tdac_agent.harbor.folder import WORLDS, export_set, export_task
 from tdac_agent.webots.report import WebotsReport
 from tdac_agent.webots.run import run_controller
+from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.webots.stage import open_stage
 
 
-def run(run_folder: Path, out: Path, tier: str, as_json: bool) -> int:
+def run_webots(options: ExportWebotsOptions) -> int:
     """Writes the project and runs it once without Webots; returns 0 if it passes."""
-    check_tier(tier)
-    project = export_webots(run_folder, out)
+    check_tier(options.tier)
+    project = export_webots(options.run, options.out)
     stage = open_stage(project.world)
     steps = project.horizon + SPARE
     env = stage.make_env(steps=steps, goal_tolerance=project.tolerance)
-    done = run_controller(project.controller, stage, env, tier=tier)
-    if as_json:
-        sys.stdout.write(json.dumps(_record(project, done.report), indent=2) + "\n")
+    done = run_controller(project.controller, stage, env, tier=options.tier)
+    if options.as_json:
+        print_json(_record(project, done.report))
     else:
         _show(project, done.report, Console())
     return 0 if done.report.passed else 1
+
+
+def run_harbor(flags: TaskFlags, options: ExportHarborOptions) -> int:
+    """Writes the folder of a task or a task set; returns 0."""
+    if not typed_fields(flags) and options.worlds is None:
+        raise TaskError("give a task with --task NAME, or a task set with --set NAME")
+    with Spinner(f"writing {options.out} …") as spinner:
+        spinner()
+        problem = chosen(flags, options)
+        if isinstance(problem, TaskSet):
+            export_set(problem, options.out, options.worlds or WORLDS)
+        else:
+            export_task(problem, options.out)
+    if options.as_json:
+        print_json({"schema_version": 1, "folder": str(options.out)})
+        return 0
+    console = Console()
+    print_plain(console, f"wrote {options.out}")
+    if isinstance(problem, TaskSet):
+        console.print(
+            "[yellow]tests/salt tells the hidden worlds[/]: keep tests/ and solution/ "
+            "from the agent, as Harbor does",
+            soft_wrap=True,
+        )
+    return 0
 
 
 def _record(project: Project, report: WebotsReport) -> dict[str, Any]:
@@ -46,7 +76,7 @@ def _record(project: Project, report: WebotsReport) -> dict[str, Any]:
 
 def _show(project: Project, report: WebotsReport, console: Console) -> None:
     for path in (project.world, project.controller):
-        console.print(f"wrote {escape(str(path))}", soft_wrap=True)
+        print_plain(console, f"wrote {path}")
     if report.passed:
         result = f"[bold green]reached[/] the goal after {report.steps} steps"
     else:

@@ -14,34 +14,20 @@ import sys
 from collections.abc import Callable
 from copy import copy
 from functools import partial
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperArgument, TyperCommand, TyperGroup
 
-from tdac_agent.cli import (
-    bench_flags,
-    campaign_flags,
-    check_suite_flags,
-    doctor_flags,
-    evaluate_flags,
-    map_flags,
-    mcp_flags,
-    play_flags,
-    runs_flags,
-    sets_flags,
-    studio_flags,
-    synth_flags,
-    train_flags,
-    verify_flags,
-    webots_flags,
-)
+from tdac_agent.cli.coordinates import with_coordinates
 from tdac_agent.cli.mistakes import explain, fail
-from tdac_agent.cli.places import with_places
 from tdac_agent.cli.terminal import filter_streams
 
 FOR_HELP = frozenset(["-h", "--help"])
 DEFAULTS = ("run", "show")
+COMPLETE, ZSH = "_TDAC_COMPLETE", "_TYPER_COMPLETE_ARGS"
+"""Variables of a shell that asks how to complete a command line."""
 
 
 class _Command(TyperCommand):
@@ -90,7 +76,7 @@ app = typer.Typer(
     name="tdac",
     cls=_Group,
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -100,25 +86,27 @@ app = typer.Typer(
         "maze, without an API key or a network."
     ),
 )
-# In the order of `tdac --help`. These modules define flags only and import a command's
-# work when it runs, so that help is fast.
-PARTS = (
-    map_flags.app,
-    synth_flags.app,
-    mcp_flags.app,
-    verify_flags.app,
-    play_flags.app,
-    evaluate_flags.app,
-    bench_flags.app,
-    train_flags.app,
-    campaign_flags.app,
-    check_suite_flags.app,
-    sets_flags.app,
-    studio_flags.app,
-    runs_flags.app,
-    webots_flags.app,
-    doctor_flags.app,
-)
+PARTS = {
+    "map_flags": ("map", "world"),
+    "synth_flags": ("synth",),
+    "mcp_flags": ("mcp",),
+    "verify_flags": ("verify",),
+    "play_flags": ("play",),
+    "evaluate_flags": ("evaluate",),
+    "bench_flags": ("bench",),
+    "train_flags": ("train",),
+    "campaign_flags": ("campaign",),
+    "check_suite_flags": ("check-suite",),
+    "sets_flags": ("sets",),
+    "studio_flags": ("studio",),
+    "runs_flags": ("demo", "report", "runs", "rules"),
+    "webots_flags": ("webots", "export"),
+    "doctor_flags": ("doctor", "warm"),
+}
+"""Modules with the flags of commands, in the order of `tdac --help`, and their names.
+
+They import a command's work when it runs, so that help is fast.
+"""
 
 
 @app.callback(invoke_without_command=True)
@@ -135,15 +123,16 @@ def _root(
 
 
 def command_line(words: list[str]) -> typer.Typer:
-    """The app, reduced to what the words need, since Typer is slow to read flags.
+    """The app, reduced to what the words need, since flags are slow to read.
 
     It has only the command that is the first word; for `tdac --help` it has all
     commands, without their flags.
     """
     line, first = copy(app), set(words[:1])
     line.registered_groups = []
-    for part in [part for part in PARTS if first & _names(part)] or PARTS:
-        line.add_typer(_copy_of(part, with_flags=bool(first - FOR_HELP)))
+    for part in [name for name, own in PARTS.items() if first & {*own}] or PARTS:
+        typed: typer.Typer = import_module(f"tdac_agent.cli.{part}").app
+        line.add_typer(_copy_of(typed, with_flags=bool(first - FOR_HELP)))
     return line
 
 
@@ -174,14 +163,11 @@ def _without_flags(command: Callable[..., Any] | None) -> Callable[[], None]:
     return nothing
 
 
-def _names(part: typer.Typer) -> set[str | None]:
-    """Names of the commands and groups of a part."""
-    commands = {
-        command.name or command.callback.__name__.replace("_", "-")
-        for command in part.registered_commands
-        if command.callback is not None
-    }
-    return commands | {group.name for group in part.registered_groups}
+def _completed() -> list[str]:
+    """The words so far, if a shell asks how to complete them; else none."""
+    if COMPLETE not in os.environ:
+        return []
+    return os.environ.get("COMP_WORDS", os.environ.get(ZSH, "")).split()[1:]
 
 
 def main() -> None:
@@ -198,8 +184,9 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     try:
-        words = with_places(sys.argv[1:])
-        code = command_line(words)(words, prog_name="tdac", standalone_mode=False)
+        words = with_coordinates(sys.argv[1:])
+        line = command_line(_completed() or words)
+        code = line(words, prog_name="tdac", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         code = 130
     except Exception as error:

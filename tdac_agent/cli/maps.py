@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import math
-import sys
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.cli.console import Console
-from tdac_agent.cli.flags import check_finite, check_heading, check_radius
-from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.map_flags import MapOptions
+from tdac_agent.cli.sentences import print_plain, print_sentences
+from tdac_agent.cli.task_changes import in_pixels
+from tdac_agent.cli.task_choice import check_values
+from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.environments.map2d.setting import robot_text
-from tdac_agent.tasks.units import Point
 from tdac_envs.core.errors import PicturedError, TaskError
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
@@ -25,15 +24,10 @@ from tdac_envs.grid.plan import path_length
 from tdac_envs.map2d.source import units_of
 from tdac_envs.map2d.task import Terrain, make_task
 from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
-from tdac_envs.mapping.candidates import MapCandidate, Preset
+from tdac_envs.mapping.candidates import MapCandidate
 from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.map_folder import write_map
-from tdac_envs.mapping.params import (
-    FrameName,
-    MapParams,
-    ReadingOptions,
-    RobotParams,
-)
+from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates
 from tdac_envs.mapping.ros_writer import ROS_FILES, write_ros_map
 from tdac_envs.mapping.wording import obstacles_text, scale_text
@@ -48,98 +42,26 @@ LEGEND = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class MapTask:
-    """The task on a map as typed: px or, with `--metres`, m in the map's frame."""
-
-    start: Point | None
-    goal: Point | None
-    heading: float | None
-    robot_radius: float | None
-
-    def check(self) -> None:
-        """Checks the flags together.
-
-        Raises:
-            TaskError: A number is not finite, or a flag is missing.
-        """
-        if (self.start is None) != (self.goal is None):
-            raise TaskError("give both --start X Y and --goal X Y, or neither")
-        check_finite(start=self.start, goal=self.goal)
-        check_heading(self.heading)
-        check_radius(self.robot_radius)
-
-    def in_pixels(self, units: MapUnits) -> MapTask:
-        """The task in pixels."""
-        heading, radius = self.heading, self.robot_radius
-        return MapTask(
-            None if self.start is None else units.pixels(self.start),
-            None if self.goal is None else units.pixels(self.goal),
-            None if heading is None else units.heading_in_pixels(heading),
-            None if radius is None else units.length_in_pixels(radius),
-        )
-
-    def or_else(self, bundled: BundledMap) -> MapTask:
-        """This task, with the values of a bundled map instead of None."""
-        return MapTask(
-            self.start or bundled.start,
-            self.goal or bundled.goal,
-            bundled.heading if self.heading is None else self.heading,
-            self.robot_radius or bundled.robot_radius,
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class RosMap:
-    """Whether the grid is also written as a ROS map, and with which resolution."""
-
-    wanted: bool
-    resolution: float | None
-
-    def resolution_of(self, params: MapParams) -> float:
-        """Metres per pixel.
-
-        Raises:
-            TaskError: Neither the flag nor the file gives it, or they disagree.
-        """
-        given, own = self.resolution, params.resolution
-        if given is not None and not 0.0 < given < math.inf:
-            raise TaskError(f"--resolution: expected metres per pixel, got {given:g}")
-        if given is not None and own is not None and given != own:
-            raise TaskError(f"--resolution {given:g}: the file gives {own:g} m per px")
-        found = own or given
-        if found is None:
-            raise TaskError(
-                f"--yaml: {params.source} gives no resolution; add --resolution METRES"
-            )
-        return found
-
-
-def run(
-    image: str,
-    typed: MapTask,
-    snap: bool,
-    frame: FrameName | None,
-    said: ReadingOptions,
-    preset: Preset,
-    out: Path | None,
-    ros: RosMap,
-    as_json: bool,
-) -> None:
+def run(options: MapOptions, flags: TaskFlags) -> None:
     """Preprocesses a map, writes its folder and prints the best candidates."""
-    typed.check()
-    if ros.resolution is not None and not ros.wanted:
-        raise TaskError("--resolution needs --yaml")
-    path = Path(image)
-    if image in bundled_maps():
-        bundled = bundled_map(image)
-        path, typed = bundled.image, typed.or_else(bundled)
-    units = units_of(path, frame or "pixels").with_typed(typed.start, typed.goal)
-    task = typed.in_pixels(units)
+    if (flags.start is None) != (flags.goal is None):
+        raise TaskError("give both --start X Y and --goal X Y, or neither")
+    check_values(flags)
+    path, scale = Path(options.image), flags.resolution
+    if options.image in bundled_maps():
+        bundled = bundled_map(options.image)
+        path, flags = bundled.image, _or_else(flags, bundled)
+    frame = "metres" if flags.in_metres else "pixels"
+    units = units_of(path, frame, scale).with_typed(flags.start, flags.goal)
+    task = in_pixels(flags, units)
     if task.start is None and task.heading is not None:
         raise TaskError("--heading needs --start X Y")
-    source = load_image(path)
-    folder = out if out is not None else Path(f"{path.stem}-map")
+    source = load_image(path, scale)
+    if options.ros and source.resolution is None:
+        raise TaskError(
+            f"--yaml: {source.name} gives no resolution; add --resolution METRES"
+        )
+    folder = options.out or Path(f"{path.stem}-map")
     radius = RobotParams().radius if task.robot_radius is None else task.robot_radius
     try:
         grid, params, ranked = preprocess_with_candidates(
@@ -147,28 +69,27 @@ def run(
             task.start,
             task.goal,
             radius,
-            preset=preset,
-            snap=snap,
+            preset=options.preset,
+            snap=task.snap,
             heading=task.heading or 0.0,
-            options=said,
+            options=ReadingOptions(task.polarity, task.threshold),
             units=units,
         )
     except PicturedError as error:
         error.folder = folder
         raise
-    resolution = ros.resolution_of(params) if ros.wanted else None
     shortest = _shortest_path(grid, params)
     files = write_map(folder, grid, params, source, units, shortest)
-    if resolution is not None:
-        files += write_ros_map(folder, grid, resolution, params.origin)
-    if as_json:
+    if options.ros and params.resolution is not None:
+        files += write_ros_map(folder, grid, params.resolution, params.origin)
+    if options.as_json:
         rows = [_row(candidate) for candidate in ranked]
         record = {
             "params": params.model_dump(mode="json"),
             "candidates": rows,
             "files": [str(file) for file in files],
         }
-        sys.stdout.write(json.dumps(record, indent=2) + "\n")
+        print_json(record)
         return
     console = Console(highlight=False)
     _print_reading(console, params, ranked[0], units)
@@ -176,9 +97,22 @@ def run(
         _print_candidates(console, ranked, units)
         _print_drive(console, params, shortest, units)
     _print_files(console, params, folder, units)
-    if resolution is not None:
-        yaml = escape(str(folder / ROS_FILES[0]))
-        console.print(f"the grid as a ROS map: {yaml} ({resolution:g} m per px)")
+    if options.ros:
+        yaml = folder / ROS_FILES[0]
+        print_plain(
+            console, f"the grid as a ROS map: {yaml} ({params.resolution:g} m per px)"
+        )
+
+
+def _or_else(flags: TaskFlags, bundled: BundledMap) -> TaskFlags:
+    """The flags, with the values of a bundled map instead of None."""
+    return replace(
+        flags,
+        start=flags.start or bundled.start,
+        goal=flags.goal or bundled.goal,
+        heading=bundled.heading if flags.heading is None else flags.heading,
+        robot_radius=flags.robot_radius or bundled.robot_radius,
+    )
 
 
 def _shortest_path(grid: OccupancyGrid, params: MapParams) -> Path2D | None:
@@ -230,8 +164,8 @@ def _print_reading(
     size = f"{params.width} x {params.height} px"
     if units != PIXELS:
         size += f" ({units.length(params.width)} x {units.length(params.height)})"
-    about = f"{_describe(chosen)}; {scale_text(params.resolution)}"
-    print_sentences(console, f"{params.source}, {size}: {about}")
+    reading = f"{_describe(chosen)}; {scale_text(params.resolution)}"
+    print_sentences(console, f"{params.source}, {size}: {reading}")
     for note in params.notes:
         console.print(f"[yellow]note:[/] {escape(note)}")
 

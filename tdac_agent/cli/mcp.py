@@ -6,32 +6,25 @@ import os
 import shutil
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tdac_agent.cli.mcp_flags import McpOptions
+from tdac_agent.cli.task_choice import chosen
+from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.cli.typed_options import typed_fields
 from tdac_agent.library.listing import next_folder
-from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.run_record import Agent
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.trust import allowed
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
-from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.ladder.task_sets import TaskSet
 
 if TYPE_CHECKING:
     from tdac_agent.mcp.desk import Desk
 
-DEFAULT = "maze"
 
-
-def run(
-    task: str | None,
-    set_name: str | None,
-    episodes: int | None,
-    out: Path | None,
-    port: int | None,
-    http: bool,
-) -> None:
+def run(flags: TaskFlags, options: McpOptions) -> None:
     """Serves until the agent leaves, or a signal.
 
     Raises:
@@ -41,27 +34,22 @@ def run(
     """
     if find_spec("mcp") is None:
         raise TaskError(f"the server needs an extra: {install_command('mcp')}")
-    if task is not None and set_name is not None:
-        raise TaskError("give --task or --set, not both")
-    if port is not None and not http:
-        raise TaskError("--port needs --http")
     from tdac_agent.mcp.gate import given_token
     from tdac_agent.mcp.opening import EPISODES, begun, open_desk
     from tdac_agent.mcp.serve import serve_stdio
 
-    known = None
-    if out is not None and task is None and set_name is None:
-        known = begun(out)
-    about = known.about if known else _named(task, set_name)
-    most = episodes or (known.episodes if known else EPISODES)
-    folder = out if out is not None else next_folder(about.name)
+    out, http = options.out, options.http
+    known = begun(out) if out is not None and not typed_fields(flags) else None
+    problem = known.about if known else _named(flags)
+    most = options.episodes or (known.episodes if known else EPISODES)
+    folder = out or next_folder(problem.name)
     agent: Agent = "over HTTP" if http else "unconfined"
     token = given_token() if http else None
     try:
-        with open_desk(about, folder, most, agent) as desk:
+        with open_desk(problem, folder, most, agent) as desk:
             try:
                 if http:
-                    _serve_http(desk, port or 0, token)
+                    _serve_http(desk, options.port or 0, token)
                 else:
                     serve_stdio(desk)
             finally:
@@ -75,11 +63,12 @@ def run(
         os._exit(130)
 
 
-def _named(task: str | None, set_name: str | None) -> Task | TaskSet:
+def _named(flags: TaskFlags) -> Task | TaskSet:
     """The task or the task set of the flags."""
-    if set_name is not None:
-        return load_set(set_name)
-    return allowed(load_task(task or DEFAULT), None, trust=False)
+    problem = chosen(flags)
+    if isinstance(problem, TaskSet):
+        return problem
+    return allowed(problem, None, trust=False)
 
 
 def _serve_http(desk: Desk, port: int, token: str | None) -> None:

@@ -2,70 +2,56 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Optional
 
 import typer
 
-from tdac_agent.cli.options import TaskOption, dir_flag, number_flag
+from tdac_agent.cli.options import out_option
+from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, TaskFlags
+from tdac_agent.cli.typed_options import typed_options
+from tdac_agent.options import option
 
 app = typer.Typer()
+
+
+@dataclass(frozen=True, slots=True)
+class McpOptions:
+    """The further flags of `tdac mcp`."""
+
+    episodes: int | None = option(
+        None,
+        "Maximum number of simulated episodes of all submissions together; on a task, "
+        "each takes 6.  [default: 128]",
+        least=1,
+    )
+    out: Path | None = out_option(
+        "Run folder; a run in it is continued, with its own task if none is named.  "
+        "[default: runs/TASK-N]"
+    )
+    http: bool = option(
+        False,
+        "Serve HTTP on 127.0.0.1 instead of stdio. The bearer token is "
+        "$TDAC_MCP_TOKEN; without it, one is drawn and printed on stderr.",
+    )
+    port: int | None = option(
+        None,
+        "Port of --http; 0 for a free one.  [default: 0]",
+        least=0,
+        most=65535,
+        needs="--http",
+    )
 
 
 @app.command(
     epilog="Examples: `claude mcp add tdac -- tdac mcp --set unknown`; "
     "`tdac mcp --task maze --out runs/mine`; `tdac mcp --set lost --http`"
 )
-def mcp(
-    task: TaskOption = None,
-    set_name: Annotated[
-        Optional[str],  # noqa: UP045 - typer reads it at run time
-        typer.Option(
-            "--set",
-            metavar="NAME",
-            help="Task set (`tdac sets`) or set.yaml: submissions drive on worlds of "
-            "dev, the chosen one on hidden worlds.",
-        ),
-    ] = None,
-    episodes: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(
-            min=1,
-            help="Maximum number of simulated episodes of all submissions together; on "
-            "a task, each takes 6.  [default: 128]",
-        ),
-    ] = None,
-    out: Annotated[
-        Optional[Path],  # noqa: UP045
-        dir_flag(
-            "--out",
-            help="Run folder; a run in it is continued, with its own task if none is "
-            "given.  [default: runs/TASK-N]",
-        ),
-    ] = None,
-    http: Annotated[
-        bool,
-        typer.Option(
-            "--http",
-            help="Serve HTTP on 127.0.0.1 instead of stdio. The bearer token is "
-            "$TDAC_MCP_TOKEN; without it, one is drawn and printed on stderr.",
-        ),
-    ] = False,
-    port: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(
-            "--port",
-            min=0,
-            max=65535,
-            help="Port of --http; 0 for a free one.  [default: 0]",
-        ),
-    ] = None,
-) -> None:
+@typed_options("mcp:run", without=ONLY_FOR_SYNTH)
+def mcp(flags: TaskFlags, options: McpOptions) -> None:
     """Serve coding agents, which write and submit controllers (MCP).
 
     An agent starts the command itself and talks to it on stdin and stdout, or reaches
-    it by --http. Its submissions are judged in the sandbox and kept as a run.
+    it by --http. Its submissions are judged in the sandbox and kept as a run. On a task
+    set, they drive on worlds of dev, and the chosen one on hidden worlds.
     """
-    from tdac_agent.cli import mcp as command
-
-    command.run(task, set_name, episodes, out, port, http)

@@ -138,5 +138,5 @@ def _nearest(typed: str, options: list[str]) -> str | None:
     from tdac_envs.core.errors import nearest
 
     bare = {option.lstrip("-").lower(): option for option in options}
-    found = nearest(typed.lstrip("-").lower(), bare)
-    return bare[found] if found else None
+    meant = nearest(typed.lstrip("-").lower(), bare)
+    return bare[meant] if meant else None

@@ -8,16 +8,26 @@ from functools import partial
 from pathlib import Path
 
 from tdac_agent.cli.console import Console
+from tdac_agent.cli.controller_choice import (
+    change_note,
+    controller_and_task,
+    controller_file,
+    with_own_set,
+)
 from tdac_agent.cli.display import has_display
 from tdac_agent.cli.film import film_of
-from tdac_agent.cli.flags import TaskFlags, check_tier
+from tdac_agent.cli.options import NoiseFlags
+from tdac_agent.cli.play_flags import PlayOptions
 from tdac_agent.cli.printed import show_printed
-from tdac_agent.cli.robust_flags import DisturbanceFlags, require_flag
-from tdac_agent.cli.verify import controller_and_task
+from tdac_agent.cli.task_choice import check_scope, check_tier
+from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.cli.typed_options import require_flag, typed_fields
+from tdac_agent.environments.epuck.pictures import WorldPictures
+from tdac_agent.environments.map2d.pictures import MapPictures
 from tdac_agent.episodes.trajectory import Rollout
-from tdac_agent.evaluation.policies import Entrant
-from tdac_agent.evaluation.replay import drive_episode
-from tdac_agent.problems.episodes import Part
+from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted
+from tdac_agent.evaluation.replay import check_shown, drive_episode
+from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_agent.storage.plain import one_line
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
@@ -31,37 +41,59 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drawing.video import write_video
 from tdac_envs.drawing.window import Window
+from tdac_envs.ladder.task_sets import AnyTask, load_set
+from tdac_envs.map2d.task import Map2DTask
 
 SUFFIXES = (".mp4", ".gif")
 
 
-def run(
-    controller: str,
-    flags: TaskFlags,
-    video: Path | None,
-    speed: float | None,
-    episode: str | None,
-    seed: int | None,
-    disturbed: DisturbanceFlags,
-    tier: str,
-) -> int:
+def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
     """Plays one episode; returns 0 if the goal was reached, else 1."""
-    check_tier(tier)
-    if seed is None:
-        require_flag("--seed N", list(disturbed.given()))
-    elif episode is not None:
+    check_tier(options.tier)
+    if options.seed is None:
+        require_flag("--seed N", typed_fields(noise))
+    elif options.episode is not None:
         raise TaskError("give --episode or --seed, not both")
-    name, disturbance = _checked(episode), disturbed.disturbance()
-    check_video(video)
-    file, task = controller_and_task(controller, flags)
-    if seed is None:
-        rollout = drive(task, read_source(file), name, tier)
+    disturbance = noise.disturbance()
+    name = _checked(options.episode)
+    flags = with_own_set(options.controller, flags)
+    check_scope(flags.set_name is not None, flags, options, noise)
+    if flags.set_name is not None:
+        return _play_world(flags.set_name, options)
+    controller_file(options.controller)  # fails early on a wrong name
+    check_video(options.video)
+    file, task = controller_and_task(options.controller, flags)
+    if note := change_note(options.controller, flags):
+        print(note)
+    source = read_source(file)
+    if options.seed is None:
+        rollout = drive(task, source, name, options.tier)
     else:
         task.disturbed_options(disturbance)
-        driven = drive_disturbed(task, read_source(file), seed, disturbance, tier)
-        rollout = driven.rollout
-    pictures = task.pictures()
-    return show(rollout, partial(pictures.frames, rollout), task.name, video, speed)
+        setup = options.seed, disturbance, options.tier
+        rollout = drive_disturbed(task, source, *setup).rollout
+    frames_of = partial(task.pictures().frames, rollout)
+    return show(rollout, frames_of, task.name, options)
+
+
+def _play_world(name: str, options: PlayOptions) -> int:
+    """Plays an episode on a world of a task set; returns as `run` does."""
+    check_shown(options.split)
+    check_video(options.video)
+    tasks, split, index = load_set(name), options.split, options.index
+    episodes_of(tasks).compile()
+    entrant = fitted(entrant_of(options.controller, ours=()), tasks)
+    task = tasks.task(split, index)
+    part = Part((index,), split)
+    rollout = drive_episode(entrant, tasks, part, options.tier).rollout
+    title = f"{tasks.name}, {split} {index}"
+    return show(rollout, partial(_frames, task, rollout), title, options)
+
+
+def _frames(task: AnyTask, rollout: Rollout, stride: int) -> Iterator[Image]:
+    if isinstance(task, Map2DTask):
+        return MapPictures(task).frames(rollout, stride)
+    return WorldPictures(task).frames(rollout, stride)
 
 
 def check_video(video: Path | None) -> None:
@@ -80,8 +112,7 @@ def show(
     rollout: Rollout,
     frames_of: Callable[[int], Iterator[Image]],
     title: str,
-    video: Path | None,
-    speed: float | None,
+    options: PlayOptions,
 ) -> int:
     """Writes an episode as a video, or shows it in a window; prints how it ended.
 
@@ -89,13 +120,13 @@ def show(
         rollout: The episode.
         frames_of: Draws every n-th step.
         title: Name of the task.
-        video: File of the video; None for a window.
-        speed: Simulated time / playing time, if given.
+        options: File and speed of the video.
 
     Returns:
         0 if the goal was reached, else 1.
     """
     steps, dt = rollout.trajectory.steps, rollout.trajectory.dt
+    video, speed = options.video, options.speed
     # A window can be closed at any time: it shows real time, however long it lasts.
     speed = 1.0 if video is None and speed is None else speed
     film = film_of(steps, dt, speed, video)
@@ -130,12 +161,8 @@ def drive_disturbed(
     task: Task, source: bytes, seed: int, disturbance: Disturbance, tier: str
 ) -> Driven:
     """Runs the judged episode of a seed, as in a robust verification."""
-    with tempfile.TemporaryDirectory(prefix="tdac-play-") as folder:
-        file = Path(folder) / "controller.py"
-        file.write_bytes(source)
-        entrant = Entrant(file.name, PolicySpec("controller", file))
-        part = Part((seed,), disturbance=disturbance)
-        return drive_episode(entrant, task, part, tier)
+    entrant = Entrant("", PolicySpec("controller"), source=source)
+    return drive_episode(entrant, task, Part((seed,), disturbance=disturbance), tier)
 
 
 def _checked(episode: str | None) -> str:

@@ -19,6 +19,8 @@ _ANSWERS = (
     ("summarise", "rule update", "rule updates"),
     ("improve", "improvement", "improvements"),
 )
+FINAL = frozenset({"validation", "comparison"})
+"""Purposes of worlds whose results are printed."""
 VERBS = {
     "generate": "writing",
     "edit": "editing",
@@ -27,21 +29,23 @@ VERBS = {
 }
 
 
-class Progress:
+class SynthProgress:
     """Shows journal records as lines: current activity and results.
 
     Args:
         console: Console to print to.
         heading: Line to print when the run begins.
+        on_set: Whether the run is on a task set.
     """
 
-    def __init__(self, console: Console, heading: str) -> None:
+    def __init__(self, console: Console, heading: str, *, on_set: bool = False) -> None:
         self._console = console
         self._heading = heading
+        self._on_set = on_set
         self._has_quoted = False
         self._spinner = Spinner("dots", text="preparing")
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> SynthProgress:
         self._live = Live(
             self._spinner,
             console=self._console,
@@ -77,8 +81,11 @@ class Progress:
             self._print_attempt(at, record)
         elif kind == "improve.begin":
             self.say(f"  {at}", escape(record["said"]), "dim")
+        elif kind == "hidden.start":
+            self.doing("driving on hidden worlds")
         elif kind.startswith("drive."):
-            self._show_episodes(at, record)
+            show = self._show_worlds if self._on_set else self._show_episodes
+            show(at, record)
 
     def doing(self, text: str) -> None:
         """Shows the current activity."""
@@ -121,8 +128,8 @@ class Progress:
             self.say(f"  {at}", escape(problem), "yellow")
         if not self._has_quoted:
             self._has_quoted = True
-            said = f"it says: “{record['says']}”" if record["says"] else "it is empty"
-            self.say(f"  {at}", escape(said), "dim")
+            quote = f"it says: “{record['says']}”" if record["says"] else "it is empty"
+            self.say(f"  {at}", escape(quote), "dim")
 
     def _show_episodes(self, at: str, record: dict[str, Any]) -> None:
         """Shows how disturbed episodes go, and prints those of the comparison."""
@@ -132,24 +139,36 @@ class Progress:
         elif record["what"] == "comparison":
             self.say(f"  {at}", f"other disturbed episodes: {reached}", "dim")
 
+    def _show_worlds(self, at: str, record: dict[str, Any]) -> None:
+        """Shows how it drives on worlds of a set, and prints those of the selection."""
+        what = record["what"]
+        driven = "hidden worlds" if what == "hidden" else f"{at}  {what}"
+        match record["event"]:
+            case "drive.start":
+                self.doing(f"{driven}: {record['worlds']} worlds")
+            case "drive.step":
+                so_far = f"{record['reached']} of {record['done']} worlds reached"
+                self.doing(f"{driven}: {so_far}")
+            case "drive.end" if what in FINAL:
+                result = f"{record['reached']} of {record['driven']} reached"
+                self.say(f"  {at}", f"{what} worlds: {result}", "dim")
+
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
+        note = escape("; ".join(record["notes"][-1:]))
         if record.get("parent") is not None:
-            self.say_varied(at, record)
+            self.say(f"~ {at}", note, "" if record["valid"] else "yellow")
         elif not record["valid"]:
-            self.say(f"– {at}", escape("; ".join(record["notes"][-1:])), "yellow")
+            self.say(f"– {at}", note, "yellow")
         elif record["unchanged"]:
-            self.say(f"= {at}", escape("; ".join(record["notes"][-1:])), "yellow")
+            self.say(f"= {at}", note, "yellow")
         elif record["passed"]:
-            self.say(f"✔ {at}", "all tests passed", "green")
+            self.say(f"✔ {at}", note if self._on_set else "all tests passed", "green")
+        elif self._on_set:
+            self.say(f"[red]✘ {at}[/]", f"[red]{note}[/]")
         else:
             failed = record["failed_tests"]
             names = escape(list_tests(failed, 3))
             self.say(f"[red]✘ {at}[/]", f"[red]{len(failed)} failed:[/] {names}")
-
-    def say_varied(self, at: str, record: dict[str, Any]) -> None:
-        """Prints what came of a variation of a candidate."""
-        said = escape("; ".join(record["notes"][-1:]))
-        self.say(f"~ {at}", said, "" if record["valid"] else "yellow")
 
     def say(self, place: str, text: str, style: str = "") -> None:
         """Prints a line in two columns, so that wrapped text stays below the text."""

@@ -45,10 +45,10 @@ def show_report(
     """
     units = UNITS[report.provenance.unit] if units is None else units
     report = in_units(report, units)
-    verdict, about = report.verdict, report.provenance
-    for warning in about.warnings:
+    verdict, provenance = report.verdict, report.provenance
+    for warning in provenance.warnings:
         console.print(f"[yellow]warning: {escape(warning)}[/]")
-    for node in about.left_out:
+    for node in provenance.left_out:
         console.print(f"[yellow]left out of the world: {escape(node)}[/]")
     groups, not_run = group_failures(report)
     for group in groups:
@@ -66,16 +66,20 @@ def show_report(
     if out is not None:
         _show_files(out, console)
     colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
-    task = about.called or about.task
+    task = provenance.called or provenance.task
     # Task names are not unique, so the folder is shown, too.
-    task += f" of {folder}" if folder is not None and task != about.task else ""
-    _, _, name = about.suite.partition(" + ")
-    own = f" with the tests {name} ({about.own_suite})" if about.own_suite else ""
+    task += f" of {folder}" if folder is not None and task != provenance.task else ""
+    _, _, name = provenance.suite.partition(" + ")
+    own = (
+        f" with the tests {name} ({provenance.own_suite})"
+        if provenance.own_suite
+        else ""
+    )
     console.print(
         f"[bold {colour}]{word}[/]: {verdict.passed_tests} of {verdict.expected} tests "
         f"passed in {report.seconds:.1f} s  (task {escape(task)}, profile "
-        f"{about.profile}{escape(own)}, sandbox {escape(about.sandbox)}, "
-        f"seed {about.seed})"
+        f"{provenance.profile}{escape(own)}, sandbox {escape(provenance.sandbox)}, "
+        f"seed {provenance.seed})"
     )
     if _lacks_names(report):
         console.print(
@@ -105,8 +109,8 @@ def _held_out(report: Report) -> list[str]:
         for episode in report.episodes
         if episode.held_out and (episode.outcome != "reached" or episode.collisions)
     ]
-    told = "held out: a model is told only that such a start failed, so there is no"
-    return [*ended, f"({told} diagnosis; `tdac play --episode` shows it)"]
+    reason = "held out: a model is told only that such a start failed, so there is no"
+    return [*ended, f"({reason} diagnosis; `tdac play --episode` shows it)"]
 
 
 def _show_failed(console: Console, failures: Sequence[Failure]) -> None:

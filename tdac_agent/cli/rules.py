@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from pathlib import Path
 
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.cli.console import Console
+from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.run_view import list_tests
+from tdac_agent.cli.sentences import print_plain
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.given_rules import GIVEN, shared_rules, written
 from tdac_agent.prompting.rules import RepairRule, RuleBook
@@ -25,7 +25,7 @@ def run(folder: Path, as_json: bool) -> int:
     """Prints the rules; returns the exit code."""
     record, book = load_run(folder), load_rules(folder)
     if as_json:
-        sys.stdout.write(book.model_dump_json(indent=2) + "\n")
+        print_json(book)
         return 0
     console = Console()
     title = f"{record.task}: rules by {record.optimizer}, {record.status}"
@@ -69,8 +69,8 @@ def export(folders: list[Path], out: Path) -> int:
     except OSError as error:
         raise RunError(f"cannot write {out}: {error.strerror}") from error
     use = shlex.join(["tdac", "synth", "--rules", str(out)])
-    text = f"{out}: {len(rules)} of {number} rules in force; to use them: {use}"
-    Console().print(escape(text), soft_wrap=True)
+    kept = f"{len(rules)} of {number} rules in force"
+    print_plain(Console(), f"{out}: {kept}; to use them: {use}")
     return 0
 
 

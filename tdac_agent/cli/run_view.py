@@ -5,38 +5,55 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 
+from rich.box import SIMPLE
 from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import print_plain
+from tdac_agent.cli.set_view import show_set_report
 from tdac_agent.library.listing import resume_command
 from tdac_agent.models.budget import format_usd
-from tdac_agent.runs.improvement_record import TaskImprovement, read_improvement
+from tdac_agent.runs.improvement_record import (
+    NOT_SHOWN,
+    TaskImprovement,
+    is_shown,
+    read_improvement,
+)
 from tdac_agent.runs.run_record import Attempt, Run
+from tdac_agent.runs.selection_record import (
+    HIDDEN_FILE,
+    CandidateFigures,
+    Improvement,
+    Selection,
+)
+from tdac_agent.tasks.task_file import SET_FILE
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 
 def show_run(run: Run, console: Console) -> None:
     """Prints the attempts in a table, then the result and the next commands."""
     usage, folder = usage_of(run), run.folder
-    found = read_improvement(folder) if run.improve else None
+    search = read_improvement(folder) if run.improve else None
     if run.attempts:
-        console.print(_attempts(run, found))
+        console.print(_attempts(run, search))
     if run.verified:
         ending = f"[bold green]verified[/] in iteration {run.tau}, "
-        if found is not None and found.selected != found.first:
-            ending += f"improved in iteration {found.k}, "
+        if search is not None and search.selected != search.first:
+            ending += f"improved in iteration {search.k}, "
         ending += f"{run.seconds:.1f} s: {escape(str(run.controller))}"
         console.print(ending, soft_wrap=True)
-        if found is not None:
-            _print_indented(console, found.told)
+        if search is not None:
+            _print_indented(console, search.told)
         if run.reason:
             _print_indented(console, f"the search ended early: {run.reason}")
         _print_indented(console, usage)
         evidence = f"{folder / 'report.json'}, {folder / 'trajectory.png'}"
-        _print_unwrapped(console, f"evidence: {evidence}")
+        print_plain(console, f"  evidence: {evidence}")
         drive = shlex.join(["tdac", "play", str(folder), "--video", "drive.mp4"])
-        _print_unwrapped(console, f"watch it drive: {drive}")
+        print_plain(console, f"  watch it drive: {drive}")
     elif run.status == "budget":
         print_budget_end(run, console)
     else:
@@ -52,18 +69,13 @@ def print_budget_end(run: Run, console: Console) -> None:
     console.print(f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}")
     _print_indented(console, usage_of(run))
     _print_indented(console, run.outlook)
-    _print_unwrapped(console, f"to continue: {resume_command(run)}")
+    print_plain(console, f"  to continue: {resume_command(run)}")
 
 
 def _print_indented(console: Console, text: str) -> None:
     """Prints a wrapped sentence below the line that it belongs to, unless empty."""
     if text:
         console.print(Padding(escape(text), (0, 0, 0, 2)))
-
-
-def _print_unwrapped(console: Console, text: str) -> None:
-    """Prints a path or command in one line, so that it can be copied."""
-    console.print(f"  {escape(text)}", soft_wrap=True)
 
 
 def usage_of(run: Run) -> str:
@@ -82,7 +94,7 @@ def usage_of(run: Run) -> str:
     return f"{tokens}; {cost}"
 
 
-def _attempts(run: Run, found: TaskImprovement | None) -> Table:
+def _attempts(run: Run, search: TaskImprovement | None) -> Table:
     table = Table(title=escape(f"{run.task}: {run.learner}"), title_justify="left")
     table.add_column("k", justify="right")
     table.add_column("j", justify="right")
@@ -97,8 +109,8 @@ def _attempts(run: Run, found: TaskImprovement | None) -> Table:
         failed = list_tests(attempt.failed_tests, 4)
         if attempt.unchanged or not failed:
             failed = _remark(attempt)
-        if found is not None:
-            failed = failed or found.text_of(attempt.k, attempt.j)
+        if search is not None:
+            failed = failed or search.text_of(attempt.k, attempt.j)
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
 
@@ -112,8 +124,8 @@ def list_tests(tests: Sequence[str], most: int) -> str:
 
 def _remark(attempt: Attempt) -> str:
     """The last note on an attempt without valid or new code, or on a variation."""
-    told = not attempt.valid or attempt.unchanged or attempt.parent is not None
-    return "; ".join(attempt.notes[-1:]) if told else ""
+    is_explained = not attempt.valid or attempt.unchanged or attempt.parent is not None
+    return "; ".join(attempt.notes[-1:]) if is_explained else ""
 
 
 def _result(attempt: Attempt) -> str:
@@ -122,3 +134,107 @@ def _result(attempt: Attempt) -> str:
     if attempt.unchanged:
         return "[yellow]same code[/]"
     return "[green]verified[/]" if attempt.passed else "[red]failed[/]"
+
+
+def show_selection(run: Run, console: Console) -> None:
+    """Prints a run on a task set: what was selected, or why nothing was."""
+    if run.status == "budget":
+        print_budget_end(run, console)
+        return
+    if run.tau is not None:
+        _show_selected(run, console)
+    else:
+        reason = escape(run.reason)
+        console.print(f"[bold red]no controller was selected[/]: {reason}")
+        console.print(f"  the attempts are in {run.folder / 'iterations'}")
+    if usage := usage_of(run):
+        console.print(f"  {escape(usage)}")
+
+
+def _show_selected(run: Run, console: Console) -> None:
+    """Prints the selection, the verdict on hidden worlds if any, and next commands."""
+    content = read_file(run.folder / "report.json", RECORD_BYTES)
+    selection = Selection.model_validate_json(content)
+    console.print(_candidates(selection))
+    most = selection.episodes + selection.improve
+    console.print(
+        f"  goals reached, of worlds of dev; {selection.used} of at most {most} "
+        "episodes were driven",
+        highlight=False,
+    )
+    if selection.stopped:
+        console.print(f"  the writing ended: {escape(selection.stopped)}")
+    console.print(
+        f"[bold]selected[/] k={selection.k} j={selection.j}, {run.seconds:.0f} s: "
+        f"{escape(str(run.controller))}",
+        soft_wrap=True,
+    )
+    scores = selection.optimistic
+    if scores is not None:
+        console.print(
+            f"  selected, optimistic: {100 * scores.success:.1f} % reached, time score "
+            f"{scores.time:.3f}",
+            highlight=False,
+        )
+    if selection.improvement is not None:
+        console.print(f"  {_improvement(selection.improvement)}", highlight=False)
+    hidden = run.folder / HIDDEN_FILE
+    if run.status != "selected" and hidden.is_file():
+        text = read_file(hidden, RECORD_BYTES)
+        show_set_report(EpisodeReport.model_validate_json(text), console)
+        return
+    words = ["tdac", "verify", str(run.controller), "--set", str(run.folder / SET_FILE)]
+    print_plain(console, f"  not verified yet: {shlex.join(words)}")
+
+
+def _improvement(search: Improvement) -> str:
+    """What the search for improvements brought, in one line."""
+    count = f"{search.variations} variation{'' if search.variations == 1 else 's'}"
+    base = f"k={search.k} j={search.j}"
+    if not search.worlds:
+        return f"improving: {count}; none was better than {base}, which stays"
+    assert search.before is not None
+    assert search.after is not None
+    assert search.low is not None
+    assert search.high is not None
+    caution = "" if is_shown(search.low, search.p) else f"; {NOT_SHOWN}"
+    return (
+        f"improving: {count}; time score {search.before:.3f} ({base}) -> "
+        f"{search.after:.3f} on {search.worlds} other worlds: "
+        f"{search.after - search.before:+.3f} "
+        f"(95 % interval {search.low:+.3f} to {search.high:+.3f})"
+        f"{caution}"
+    )
+
+
+def _candidates(selection: Selection) -> Table:
+    """The candidates of the loop, and the variations that went on to the selection."""
+    table, searched = Table(box=SIMPLE, padding=(0, 1, 0, 0)), selection.improve > 0
+    search = ("improving",) if searched else ()
+    for name in ("k", "j", "feedback", *search, "validation", "time score"):
+        table.add_column(name, justify="right")
+    for each in selection.candidates:
+        if each.feedback_worlds or each.validation_worlds:
+            chosen = (each.k, each.j) == (selection.k, selection.j)
+            cells = _cells(each, searched=searched)
+            table.add_row(*cells, style="bold" if chosen else None)
+    return table
+
+
+def _cells(each: CandidateFigures, *, searched: bool) -> tuple[str, ...]:
+    return (
+        str(each.k),
+        str(each.j),
+        _part(each.feedback_reached, each.feedback_worlds),
+        *([_score(each.improve_time)] if searched else []),
+        _part(each.validation_reached, each.validation_worlds),
+        _score(each.validation_time),
+    )
+
+
+def _part(reached: int, worlds: int) -> str:
+    return f"{reached}/{worlds}" if worlds else ""
+
+
+def _score(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"

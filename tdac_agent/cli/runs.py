@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -12,8 +10,8 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.sentences import print_plain, print_sentences
 from tdac_agent.errors import RunError
 from tdac_agent.library.listing import folders_of, row_of
 from tdac_agent.models.budget import format_usd
@@ -45,7 +43,7 @@ def run(folder: Path, as_json: bool) -> int:
             raise RunError(f"cannot read {folder}: {error.strerror}") from error
         rows = []
     if as_json:
-        sys.stdout.write(json.dumps(rows, indent=2) + "\n")
+        print_json(rows)
         return 0
     console = Console()
     if rows:
@@ -59,8 +57,7 @@ def run(folder: Path, as_json: bool) -> int:
             if row.get("agent"):
                 print_sentences(console, _agent(row))
             if row["go_on"]:
-                text = f"{_what_goes_on(row)}: {row['go_on']}"
-                console.print(escape(text), soft_wrap=True)
+                print_plain(console, f"{_what_goes_on(row)}: {row['go_on']}")
     else:
         console.print(f"no runs in {folder}; `tdac synth` makes one", soft_wrap=True)
     return 0

@@ -3,26 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 import typer
 
-from tdac_agent.cli.options import Json, dir_flag, file_flag
+from tdac_agent.cli.options import Json
 
 app = typer.Typer()
+RUNS = "Run folder, folder of runs, or campaign; subfolders are searched."
 
 
 @app.command(epilog="Example: `tdac demo`")
 def demo(
     out: Annotated[
-        Path | None, dir_flag(help="Run folder.  [default: runs/demo-N]")
+        Path | None,
+        typer.Option(metavar="DIR", help="Run folder.  [default: runs/demo-N]"),
     ] = None,
     as_json: Json = False,
-) -> None:
+) -> int:
     """Replay a recorded run of a language model, with live tests."""
     from tdac_agent.cli import demo as command
 
-    raise typer.Exit(command.run(out, as_json))
+    return command.run(out, as_json)
 
 
 rules_app = typer.Typer(
@@ -35,11 +37,11 @@ app.add_typer(rules_app, name="rules")
 @rules_app.command("show", epilog="Example: `tdac rules runs/office-1`")
 def show_rules(
     run: Annotated[Path, typer.Argument(help="Run folder.")], as_json: Json = False
-) -> None:
+) -> int:
     """Show the rules of a run, with origin and effect; `show` may be left out."""
     from tdac_agent.cli import rules
 
-    raise typer.Exit(rules.run(run, as_json))
+    return rules.run(run, as_json)
 
 
 @rules_app.command(
@@ -49,12 +51,14 @@ def show_rules(
 )
 def export_rules(
     runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")],
-    out: Annotated[Path, file_flag("--out", help="Output file.")] = Path("rules.md"),
-) -> None:
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Output file.")] = Path(
+        "rules.md"
+    ),
+) -> int:
     """Write the rules of runs that can help on other tasks, the most useful first."""
     from tdac_agent.cli import rules
 
-    raise typer.Exit(rules.export(runs, out))
+    return rules.export(runs, out)
 
 
 @app.command(
@@ -66,28 +70,22 @@ def report_command(
         Path, typer.Argument(metavar="DIR", help="Run folder, or folder of runs.")
     ],
     out: Annotated[
-        Optional[Path],  # noqa: UP045 - typer reads it at run time
-        file_flag("--out", help="Output file.  [default: DIR/report.html]"),
+        Path | None,
+        typer.Option(metavar="FILE", help="Output file.  [default: DIR/report.html]"),
     ] = None,
-) -> None:
+) -> int:
     """Write an HTML report of runs: failures, code, rules, animations."""
     from tdac_agent.cli import report
 
-    raise typer.Exit(report.run(place, out))
+    return report.run(place, out)
 
 
 @app.command("runs", epilog="Examples: `tdac runs`; `tdac runs results --json`")
 def runs_command(
-    folder: Annotated[
-        Path,
-        typer.Argument(
-            metavar="DIR",
-            help="Run folder, folder of runs, or campaign; subfolders are searched.",
-        ),
-    ] = Path("runs"),
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help=RUNS)] = Path("runs"),
     as_json: Json = False,
-) -> None:
+) -> int:
     """List runs and trainings: progress, cost, how to continue them."""
     from tdac_agent.cli import runs
 
-    raise typer.Exit(runs.run(folder, as_json))
+    return runs.run(folder, as_json)

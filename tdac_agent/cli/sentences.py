@@ -1,7 +1,11 @@
-"""Prints sentences: wrapped on a terminal, one line each in a file."""
+"""Prints sentences, which are wrapped on a terminal, and lines that can be copied."""
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
+
+from rich.markup import escape
 from rich.text import Text
 
 from tdac_agent.cli.console import Console
@@ -24,3 +28,14 @@ def print_sentences(
         if console.is_terminal:
             text = folded(text, console.width, indent or 2)
         console.print(Text(text, style), soft_wrap=True)
+
+
+def print_plain(console: Console, text: str) -> None:
+    """Prints a text without markup in one line, so that it can be copied."""
+    console.print(Text(text), soft_wrap=True)
+
+
+def print_command(console: Console, before: str, words: Sequence[str]) -> None:
+    """Prints a command of tdac in one line, after a text with markup."""
+    line = f"{before} [bold]{escape(shlex.join(['tdac', *words]))}[/]"
+    console.print(line, soft_wrap=True, highlight=False)

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import math
-import sys
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import cv2
+import typer
 from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.sentences import print_plain, print_sentences
+from tdac_agent.cli.sets_flags import ShowSetOptions
 from tdac_agent.verification.judge.sequential import MARGIN
 from tdac_agent.verification.judge.worlds import movers_of
 from tdac_envs.core.errors import TaskError
@@ -39,12 +38,14 @@ LONGEST_CAPTION = 14
 """Longest name of a world on a contact sheet, letters."""
 
 
-def list_sets(as_json: bool) -> int:
-    """Prints the task sets that come with the package; returns 0."""
+def list_sets(context: typer.Context, as_json: bool) -> None:
+    """Prints the task sets that come with the package, unless one is to be shown."""
+    if context.invoked_subcommand is not None:
+        return
     sets = [load_set(name) for name in shipped_names()]
     if as_json:
-        _print_json([_record(each) for each in sets])
-        return 0
+        print_json([_record(each) for each in sets])
+        return
     console = Console()
     table = Table(box=SIMPLE, padding=(0, 1, 0, 0))
     for column in ("set", "observed", "what it asks"):
@@ -58,41 +59,27 @@ def list_sets(as_json: bool) -> int:
         'gym.make("TDAC-Ladder-v0", level="unknown") drives on one; '
         "tdac sets show NAME shows it and its worlds",
     )
-    return 0
 
 
-def show(
-    name: str,
-    split: str,
-    index: int | None,
-    png: Path | None,
-    sheet: Path | None,
-    as_json: bool,
-) -> int:
-    """Prints a task set and the figures of a world, and draws worlds; returns 0.
-
-    Args:
-        name: Name of the set, or path of its `set.yaml`.
-        split: Split of the worlds.
-        index: Number of a world; None for no figures.
-        png: File for a picture of this world, or of world 0.
-        sheet: File for a picture of `ON_A_SHEET` worlds from this one on.
-        as_json: Whether to print JSON.
+def show(options: ShowSetOptions) -> None:
+    """Prints a task set and the figures of a world, and draws worlds.
 
     Raises:
         TaskError: There is no such set or world, or a file does not end in `.png`.
     """
-    for option, path in (("--png", png), ("--sheet", sheet)):
+    split, index, as_json = options.split.value, options.index, options.as_json
+    png, sheet = options.png, options.sheet
+    for flag, path in (("--png", png), ("--sheet", sheet)):
         if path is not None and path.suffix.lower() != ".png":
-            raise TaskError(f"{option} must end in .png, got {path}")
-    tasks, first = load_set(name), index or 0
+            raise TaskError(f"{flag} must end in .png, got {path}")
+    tasks, first = load_set(options.name), index or 0
     wanted = index is not None or png is not None
     shown = tasks.world_and_task(split, first) if wanted else None
     record = _record(tasks)
     if shown is not None:
         record["world"] = _world_record(tasks, *shown, split, first)
     if as_json:
-        _print_json(record)
+        print_json(record)
     else:
         _print_set(Console(), tasks, record)
     if png is not None and shown is not None:
@@ -110,7 +97,6 @@ def show(
         _write(contact_sheet(tasks, worlds, captions), sheet, as_json)
     if not as_json and (png or sheet):
         Console().print(_legend(tasks), style="dim", highlight=False)
-    return 0
 
 
 def _legend(tasks: TaskSet) -> str:
@@ -235,8 +221,8 @@ def _disturbed(file: SetFile) -> str:
     values = file.disturbances.model_dump()
     if isinstance(file.robot, EPuckRobotParams):
         values |= file.robot.errors
-    given = {name: value for name, value in values.items() if value}
-    return ", ".join(f"{name} {value:g}" for name, value in given.items())
+    sizes = {name: value for name, value in values.items() if value}
+    return ", ".join(f"{name} {value:g}" for name, value in sizes.items())
 
 
 def _group(group: MoversOfSet) -> str:
@@ -293,8 +279,4 @@ def _write(image: Image, path: Path, quiet: bool) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data.tobytes())
     if not quiet:
-        Console().print(f"drew {escape(str(path))}", soft_wrap=True)
-
-
-def _print_json(value: dict[str, Any] | Sequence[dict[str, Any]]) -> None:
-    sys.stdout.write(json.dumps(value, indent=2) + "\n")
+        print_plain(Console(), f"drew {path}")

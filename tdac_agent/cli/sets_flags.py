@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Optional
 
 import typer
 
-from tdac_agent.cli.options import Json, file_flag, number_flag
+from tdac_agent.cli.options import Json, json_option
+from tdac_agent.cli.typed_options import typed_options
+from tdac_agent.options import option
 
 sets_app = typer.Typer(help="List and show task sets: worlds new to a controller.")
 app = typer.Typer()
@@ -23,16 +25,33 @@ class Split(StrEnum):
     TEST = "test"
 
 
+@dataclass(frozen=True, slots=True)
+class ShowSetOptions:
+    """The flags of `tdac sets show`."""
+
+    name: str = option(
+        ..., "Task set (`tdac sets` lists them), or set.yaml.", argument=True
+    )
+    split: Split = option(Split.DEV, "train, dev or test.", metavar="NAME")
+    index: int | None = option(
+        None, "Number of a world to show with its figures.", least=0
+    )
+    png: Path | None = option(
+        None, "Draw the world of --index, or world 0, to a PNG file.", metavar="FILE"
+    )
+    sheet: Path | None = option(
+        None, "Draw 24 worlds, from that of --index on, to a PNG file.", metavar="FILE"
+    )
+    as_json: bool = json_option()
+
+
 @sets_app.callback(
     invoke_without_command=True,
     epilog="Examples: `tdac sets`; `tdac sets show unknown --index 3 --png world.png`",
 )
+@typed_options("sets:list_sets")
 def sets_command(context: typer.Context, as_json: Json = False) -> None:
     """List task sets, or show the worlds of one."""
-    if context.invoked_subcommand is None:
-        from tdac_agent.cli import sets
-
-        raise typer.Exit(sets.list_sets(as_json))
 
 
 @sets_app.command(
@@ -40,28 +59,6 @@ def sets_command(context: typer.Context, as_json: Json = False) -> None:
     epilog="Examples: `tdac sets show lost`; `tdac sets show unknown --index 3`; "
     "`tdac sets show my_set.yaml --sheet worlds.png`",
 )
-def show_command(
-    name: Annotated[
-        str, typer.Argument(help="Task set (`tdac sets` lists them), or set.yaml.")
-    ],
-    split: Annotated[
-        Split, typer.Option(metavar="NAME", help="train, dev or test.")
-    ] = Split.DEV,
-    index: Annotated[
-        Optional[int],  # noqa: UP045 - typer reads it at run time
-        number_flag(min=0, help="Number of a world to show with its figures."),
-    ] = None,
-    png: Annotated[
-        Path | None,
-        file_flag(help="Draw the world of --index, or world 0, to a PNG file."),
-    ] = None,
-    sheet: Annotated[
-        Path | None,
-        file_flag(help="Draw 24 worlds, from that of --index on, to a PNG file."),
-    ] = None,
-    as_json: Json = False,
-) -> None:
+@typed_options("sets:show")
+def show_command(options: ShowSetOptions) -> None:
     """Show a task set, and the figures and pictures of its worlds."""
-    from tdac_agent.cli import sets
-
-    raise typer.Exit(sets.show(name, split.value, index, png, sheet, as_json))

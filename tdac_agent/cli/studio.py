@@ -6,11 +6,12 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+from tdac_agent.cli.studio_flags import StudioOptions
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
 
 
-def run(port: int, open_it: bool) -> None:
+def run(options: StudioOptions) -> None:
     """Serves the studio for the current folder until it is interrupted."""
     if find_spec("nicegui") is None:
         raise TaskError(f"the studio needs an extra: {install_command('studio')}")
@@ -26,6 +27,7 @@ def run(port: int, open_it: bool) -> None:
 
     print("starting the studio …", file=sys.stderr, flush=True)
     try:
-        serve(Path(), port, announce, open_it=open_it)
+        serve(Path(), options.port, announce, open_it=options.open_it)
     except OSError as error:
-        raise TaskError(f"--port {port}: {error.strerror}; give another one") from error
+        reason = f"{error.strerror}; give another one"
+        raise TaskError(f"--port {options.port}: {reason}") from error

@@ -1,120 +1,155 @@
-"""The flags that name the task of a command, as one parameter of its function."""
+"""The flags that name a task or a task set, and change its parts.
+
+`tdac_agent.cli.task_choice` loads what they name.
+"""
 
 from __future__ import annotations
 
-import functools
-import inspect
-from collections.abc import Callable, Collection
-from typing import TYPE_CHECKING, Any, Protocol, get_type_hints
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, Literal, Self
 
-from tdac_agent.cli.options import (
-    FrameOption,
-    Goal,
-    Heading,
-    Ignore,
-    Instructions,
-    MapOption,
-    Metres,
-    Movers,
-    Polarity,
-    Radius,
-    RobotImage,
-    Snap,
-    Start,
-    TaskOption,
-    Threshold,
-    WorldOption,
-)
+from tdac_agent.options import option
 
-if TYPE_CHECKING:
-    from tdac_agent.cli.flags import TaskFlags
-
-
-class NamedTask(Protocol):
-    """Type of the parameter `named_task`; a call imports `TaskFlags`, which is slow."""
-
-    def __call__(self) -> TaskFlags:
-        """The flags of the task."""
-
-
-def task_flags(
-    task: TaskOption = None,
-    map_image: MapOption = None,
-    world: WorldOption = None,
-    ignore: Ignore = None,
-    start: Start = None,
-    goal: Goal = None,
-    heading: Heading = None,
-    robot_radius: Radius = None,
-    robot_image: RobotImage = None,
-    movers: Movers = None,
-    snap: Snap = False,
-    frame: FrameOption = None,
-    metres: Metres = False,
-    polarity: Polarity = None,
-    threshold: Threshold = None,
-    instructions: Instructions = None,
-) -> TaskFlags:
-    """The flags that name the task of a command."""
-    from tdac_agent.cli.flags import TaskFlags, frame_of
-
-    return TaskFlags(
-        task=task,
-        map_image=map_image,
-        world=world,
-        ignore=tuple(ignore or ()),
-        start=start,
-        goal=goal,
-        heading=heading,
-        robot_radius=robot_radius,
-        robot_image=robot_image,
-        movers=movers,
-        snap=snap,
-        frame=frame_of(frame, metres),
-        polarity=polarity,
-        threshold=threshold,
-        instructions=instructions,
-    )
-
-
-Command = Callable[..., None]
+TASK = "Bundled task (`maze`, `epuck`, …), task.yaml, or run folder"
+MAP_FILE = "Map image, ROS map.yaml, MovingAI .map, .npy grid"
+WORLD_FILE = "Webots .wbt file"
+SET = "Task set (`tdac sets`) or set.yaml"
+TASKS, SETS = "Task", "Worlds of a task set"
+"""Headings of the help."""
 ONLY_FOR_SYNTH = ("robot_image", "instructions")
 """Task flags that only `tdac synth` has."""
 
 
-def takes_task(
-    *, without: Collection[str] = ONLY_FOR_SYNTH
-) -> Callable[[Command], Command]:
-    """Replaces a command's parameter `named_task` by the flags of `task_flags`.
+@dataclass(frozen=True, slots=True)
+class TaskFlags:
+    """The flags that name a task or a task set; see `tdac synth --help`."""
 
-    Args:
-        without: Names of flags that the command does not have.
-    """
-    flags = [flag for flag in _parameters(task_flags) if flag.name not in without]
+    file: str | None = option(
+        None,
+        "File to drive on: a map, a Webots world, a task.yaml or a set.yaml; the same "
+        "as --map, --world, --task or --set.",
+        argument=True,
+        metavar="FILE",
+    )
+    task: str | None = option(
+        None, f"{TASK}.  [default: maze]", metavar="PATH", panel=TASKS
+    )
+    set_name: str | None = option(
+        None, f"{SET}, instead of a task.", "--set", metavar="NAME", panel=TASKS
+    )
+    map_image: str | None = option(
+        None, f"{MAP_FILE}, or bundled map.", "--map", metavar="PATH", panel=TASKS
+    )
+    world: str | None = option(
+        None,
+        f"{WORLD_FILE} with an e-puck, or bundled world.",
+        metavar="PATH",
+        panel=TASKS,
+    )
+    ignore: tuple[str, ...] = option(
+        (),
+        "Name or type of a world node to ignore although it may be solid; repeatable.",
+        metavar="NAME",
+        panel=TASKS,
+    )
+    start: tuple[float, float] | None = option(
+        None,
+        "Start: px on a map, m in a world, also as X,Y; for YAW, see --heading.",
+        metavar="X Y [YAW]",
+        panel=TASKS,
+    )
+    goal: tuple[float, float] | None = option(
+        None, "Goal: px on a map, m in a world.", metavar="X Y", panel=TASKS
+    )
+    heading: float | None = option(
+        None,
+        "Start heading, rad, from +x towards +y (down on a map, up with --metres).",
+        metavar="YAW",
+        panel=TASKS,
+    )
+    tolerance: float | None = option(
+        None,
+        "Distance at which the goal counts as reached: px on a map, m in a world.  "
+        "[default: 20 px, less on a short path; 0.02 m]",
+        panel=TASKS,
+    )
+    robot_radius: float | None = option(
+        None, "Body radius, px.  [default: 15]", panel=TASKS
+    )
+    max_speed: float | None = option(
+        None, "Full speed of a wheel, px/s.  [default: 75.59]", panel=TASKS
+    )
+    rays: int | None = option(
+        None, "Number of range rays.  [default: 18]", least=1, panel=TASKS
+    )
+    fov: float | None = option(
+        None, "Angle of the fan of rays, degrees.  [default: 110]", panel=TASKS
+    )
+    range_max: float | None = option(
+        None, "Largest range of a ray, px.  [default: 220]", "--range", panel=TASKS
+    )
+    robot_image: Path | None = option(
+        None, "Picture of the robot, nose to the right.", metavar="FILE", panel=TASKS
+    )
+    movers: str | None = option(
+        None,
+        "Moving obstacles on a map: `bounce:5` or `crowd:20`; a task.yaml can describe "
+        "them in detail.  [default: none]",
+        metavar="KIND:COUNT",
+        panel=TASKS,
+    )
+    dt: float | None = option(
+        None,
+        "Duration of a step, s.  [default: 0.05, or the world's basicTimeStep]",
+        panel=TASKS,
+    )
+    snap: bool = option(
+        False,
+        "Move a start or goal that is not free to the nearest free place from which "
+        "the other one can be reached.",
+        panel=TASKS,
+    )
+    frame: Literal["pixels", "metres"] | None = option(
+        None,
+        "Units of places, lengths and headings, given and printed, and of what a "
+        "controller observes: pixels (y down), or metres in the map's frame as in ROS "
+        "(map.yaml; y up). The controllers of an existing run or task keep theirs.  "
+        "[default: pixels]",
+        panel=TASKS,
+    )
+    metres: bool = option(False, "The same as --frame metres.", panel=TASKS)
+    resolution: float | None = option(
+        None, "Metres per pixel of a map image that gives none.", panel=TASKS
+    )
+    polarity: Literal["dark", "light"] | None = option(
+        None,
+        "Obstacle pixels of the map image: dark or light.  [default: detected]",
+        panel=TASKS,
+    )
+    threshold: float | None = option(
+        None,
+        "Luminance above which a map pixel is light, from 0 to below 255.  "
+        "[default: detected]",
+        panel=TASKS,
+    )
+    instructions: str | None = option(
+        None,
+        "Additional instructions for the model: a text, or a file with it.",
+        metavar="TEXT",
+        panel=TASKS,
+    )
 
-    def with_flags(command: Command) -> Command:
-        own = _parameters(command)
-        at = [parameter.name for parameter in own].index("named_task")
+    @property
+    def in_metres(self) -> bool:
+        """Whether the user gives and reads metres."""
+        return self.metres or self.frame == "metres"
 
-        @functools.wraps(command)
-        def called(**given: Any) -> None:
-            named = {flag.name: given.pop(flag.name) for flag in flags}
-            command(**given, named_task=functools.partial(task_flags, **named))
-
-        # Typer reads the signature and the annotations.
-        parameters = [*own[:at], *flags, *own[at + 1 :]]
-        called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        called.__annotations__ = {p.name: p.annotation for p in parameters}
-        return called
-
-    return with_flags
-
-
-def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter]:
-    """The parameters of a function, with evaluated annotations."""
-    # `TaskFlags` is not imported at run time; only the return annotation names it.
-    hints = get_type_hints(function, localns={"TaskFlags": object}, include_extras=True)
-    return [
-        parameter.replace(annotation=hints[name])
-        for name, parameter in inspect.signature(function).parameters.items()
-    ]
+    @property
+    def changes(self) -> Self:
+        """Only the flags that change a task, not those that name one or its units."""
+        own = ("file", "task", "map_image", "world", "set_name", "frame", "metres")
+        rest: dict[str, Any] = {
+            f.name: f.default for f in fields(self) if f.name in own
+        }
+        return replace(self, **rest)

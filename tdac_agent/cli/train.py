@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import itertools
-import json
 import math
 import shlex
-import sys
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any
 
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from tdac_agent.cli.console import Console
+from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.evaluate import wrapper_names
-from tdac_agent.cli.flags import flag
-from tdac_agent.cli.set_flags import check_set
+from tdac_agent.cli.sentences import print_plain
+from tdac_agent.cli.task_choice import check_scope, kind_of_file
+from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.cli.train_flags import TrainOptions
+from tdac_agent.cli.typed_options import flag_name, typed_fields
 from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.training.curve import Point
@@ -32,32 +32,19 @@ from tdac_agent.training.train import check_extra, train
 from tdac_envs.core.errors import TaskError
 
 NOISES = tuple(field.name for field in fields(Disturbance))
+WITH_RESUME = ("resume", "steps", "trust", "as_json")
+PLANNED = ("algo", "steps", "seed", "n_envs", "episodes", "config", "variation")
+"""Flags that are arguments of the plan."""
 LEARNT_AT = 0.95
 """Success rate from which a policy counts as having learnt its tasks."""
 
 
-def run(
-    given: dict[str, Any],
-    steps: int | None,
-    out: Path | None,
-    resume: Path | None,
-    trust: bool,
-    as_json: bool,
-) -> int:
-    """Trains a policy and prints the results; returns 1 if it did not learn, else 0.
-
-    Args:
-        given: Values of the given flags by name, except the following.
-        steps: Training steps of all robots together; None for the default.
-        out: Training folder; the next free one by default.
-        resume: Folder of a training to continue.
-        trust: Whether to load its checkpoint even if it is from elsewhere.
-        as_json: Whether to print JSON.
-    """
+def run(options: TrainOptions) -> int:
+    """Trains a policy and prints the results; returns 1 if it did not learn, else 0."""
     check_extra()
-    console = Console(stderr=as_json)
+    console = Console(stderr=options.as_json)
     with console.status("preparing the tasks …"):
-        plan, folder = _plan_and_folder(given, steps, out, resume)
+        plan, folder = _plan_and_folder(_with_named_files(options))
     console.print(_heading(plan, folder), soft_wrap=True, highlight=False)
     columns = (
         TextColumn("{task.completed:,.0f} steps"),
@@ -69,15 +56,14 @@ def run(
     with Progress(*columns, console=console, transient=True) as bar:
         watch = _Watch(bar, console, plan)
         try:
-            points = train(plan, folder, watch, trust=trust)
+            points = train(plan, folder, watch, trust=options.trust)
         except KeyboardInterrupt:
             command = shlex.join(["tdac", "train", "--resume", str(folder)])
-            console.print(escape(f"to continue: {command}"), soft_wrap=True)
+            print_plain(console, f"to continue: {command}")
             raise
     best = max(points, key=lambda point: point.worth)
-    if as_json:
-        found = {"folder": str(folder), "best": _json(best)}
-        sys.stdout.write(json.dumps(found, indent=2) + "\n")
+    if options.as_json:
+        print_json({"folder": str(folder), "best": _json(best)})
     else:
         _show(plan, folder, best, points[-1], console)
     return 0 if best.success_rate >= _learnt_at(plan) else 1
@@ -108,42 +94,55 @@ class _Watch:
             self._console.print(_line(point, point is best), highlight=False)
 
 
-def _plan_and_folder(
-    given: dict[str, Any], steps: int | None, out: Path | None, resume: Path | None
-) -> tuple[TrainingPlan, Path]:
+def _with_named_files(options: TrainOptions) -> TrainOptions:
+    """The options, with files that have no flag as those of their flags.
+
+    Raises:
+        TaskError: A file is no task and no task set, or there is more than one set.
+    """
+    for file in options.files:
+        kind = kind_of_file(file)
+        if kind == "task":
+            options = replace(options, tasks=(*options.tasks, file))
+        elif kind == "set_name" and options.set_name is None:
+            options = replace(options, set_name=file)
+        else:
+            raise TaskError(f"{file!r}: expected task.yaml files, or one set.yaml")
+    return replace(options, files=())
+
+
+def _plan_and_folder(options: TrainOptions) -> tuple[TrainingPlan, Path]:
     """The training plan and the training folder.
 
     Raises:
         TaskError: Flags contradict each other, or a value is out of range.
     """
-    if resume is not None:
-        refused = [flag(name) for name in given] + ["--out"] * (out is not None)
+    if options.resume is not None:
+        refused = [
+            flag_name(f) for f in typed_fields(options) if f.name not in WITH_RESUME
+        ]
         if refused:
             names = ", ".join(refused)
             raise TaskError(
                 f"--resume continues a training as it was begun: leave out {names}"
             )
-        plan = read_plan(resume)
-        if steps is not None:
-            interval = max(steps // EVALUATIONS, 1)
-            update = {"steps": steps, "evaluate_every": interval}
+        plan = read_plan(options.resume)
+        if options.steps is not None:
+            interval = max(options.steps // EVALUATIONS, 1)
+            update = {"steps": options.steps, "evaluate_every": interval}
             plan = plan.model_copy(update=update)
-        return plan, resume
-    only_tasks = {
-        flag(name): given.get(name) for name in ("task", "variation", *NOISES)
-    }
-    check_set(given.get("set"), {}, only_tasks)
-    wanted = {name: v for name, v in given.items() if name not in NOISES}
-    if "wrapper" in wanted:
-        wanted["wrappers"] = tuple(wrapper_names(wanted.pop("wrapper")))
-    if "set" in wanted:
-        plan = make_set_plan(wanted.pop("set"), steps=steps, **wanted)
-        return plan, out or _next_folder(plan)
-    tasks = tuple(wanted.pop("task", ("maze",)))
-    noise: dict[str, Any] = dict.fromkeys(NOISES, 0)
-    noise |= {name: given[name] for name in NOISES if name in given}
-    plan = make_plan(tasks, steps=steps, disturbance=Disturbance(**noise), **wanted)
-    return plan, out or _next_folder(plan)
+        return plan, options.resume
+    typed = {f.name: getattr(options, f.name) for f in typed_fields(options)}
+    wanted = {name: typed[name] for name in PLANNED if name in typed}
+    if options.wrappers is not None:
+        wanted["wrappers"] = tuple(wrapper_names(options.wrappers))
+    if options.set_name is not None:
+        check_scope(True, TaskFlags(), options)
+        plan = make_set_plan(options.set_name, **wanted)
+    else:
+        noise = Disturbance(**{name: getattr(options, name) for name in NOISES})
+        plan = make_plan(options.tasks or ("maze",), disturbance=noise, **wanted)
+    return plan, options.out or _next_folder(plan)
 
 
 def _next_folder(plan: TrainingPlan) -> Path:
@@ -204,8 +203,7 @@ def _show(
     words += [word for name in plan.tasks for word in ("--task", name)]
     if plan.set is not None:
         words = ["bench", str(file), "builtin", "--set", plan.set]
-    line = escape(f"to compare: {shlex.join(['tdac', *words])}")
-    console.print(line, soft_wrap=True, highlight=False)
+    print_plain(console, f"to compare: {shlex.join(['tdac', *words])}")
 
 
 def _json(point: Point) -> dict[str, float | None]:

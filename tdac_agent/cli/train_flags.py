@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, Optional
+from typing import Literal
 
 import typer
 
@@ -13,20 +14,98 @@ from tdac_agent.cli.options import (
     MOTOR_LAG,
     RANGE_DROPOUT,
     RANGE_NOISE,
-    TASK,
     VARIATION,
     WHEEL_GAINS,
     WHEEL_SLIP,
     WRAPPER,
-    Json,
-    Trust,
-    dir_flag,
-    file_flag,
-    number_flag,
+    Variation,
+    json_option,
+    out_option,
+    trust_option,
+    wrappers_option,
 )
+from tdac_agent.cli.task_flags import SET, TASK
+from tdac_agent.cli.typed_options import typed_options
+from tdac_agent.options import option
 
 app = typer.Typer()
 TRAINING, DISTURBED = "Training", "Variation and noise"
+
+
+@dataclass(frozen=True, slots=True)
+class TrainOptions:
+    """The flags of `tdac train`."""
+
+    files: tuple[str, ...] = option(
+        (),
+        "Tasks or a task set; the same as --task or --set.",
+        argument=True,
+        metavar="FILE...",
+    )
+    tasks: tuple[str, ...] = option(
+        (),
+        f"{TASK}; repeatable, for several maps or several worlds.  [default: maze]",
+        "--task",
+        metavar="PATH",
+        scope="task",
+    )
+    set_name: str | None = option(
+        None,
+        f"{SET}, instead of tasks: train on its worlds of the split train, and "
+        "evaluate on those of dev.",
+        "--set",
+        metavar="NAME",
+    )
+    algo: Literal["ppo", "recurrent-ppo", "sac", "td3"] = option(
+        "ppo", "Algorithm of stable-baselines3."
+    )
+    steps: int | None = option(
+        None,
+        "Training steps of all robots together.  [default: from --config]",
+        least=1,
+    )
+    seed: int = option(0, "Seed of networks, starts and noise.", least=0)
+    out: Path | None = out_option("Training folder.  [default: runs/ALGO-NAME-N]")
+    resume: Path | None = out_option(
+        "Continue the training in this folder with its own settings, from its last "
+        "checkpoint; --steps changes its length."
+    )
+    trust: bool = trust_option()
+    as_json: bool = json_option()
+    wrappers: tuple[str, ...] | None = wrappers_option(
+        f"{WRAPPER}  [default: from --config]", "--wrapper", panel=TRAINING
+    )
+    n_envs: int | None = option(
+        None,
+        "Number of robots driven in parallel.  [default: from --config]",
+        least=1,
+        panel=TRAINING,
+    )
+    episodes: int | None = option(
+        None,
+        "Episodes per evaluation, or worlds.  [default: 100]",
+        least=1,
+        panel=TRAINING,
+    )
+    config: Path | None = option(
+        None,
+        "Hyperparameters in rl-zoo3 format.  [default: bundled, by --algo]",
+        metavar="FILE",
+        panel=TRAINING,
+    )
+    variation: Variation | None = option(
+        None,
+        f"{VARIATION}  [default: from --config for training, jitter for evaluations]",
+        panel=DISTURBED,
+        scope="task",
+    )
+    range_noise: float = option(0.0, RANGE_NOISE, panel=DISTURBED, scope="task")
+    wheel_slip: float = option(0.0, WHEEL_SLIP, panel=DISTURBED, scope="task")
+    motor_lag: float = option(0.0, MOTOR_LAG, panel=DISTURBED, scope="task")
+    delay: int = option(0, DELAY, panel=DISTURBED, scope="task")
+    wheel_gains: float = option(0.0, WHEEL_GAINS, panel=DISTURBED, scope="task")
+    axle_error: float = option(0.0, AXLE_ERROR, panel=DISTURBED, scope="task")
+    range_dropout: float = option(0.0, RANGE_DROPOUT, panel=DISTURBED, scope="task")
 
 
 @app.command(
@@ -34,146 +113,6 @@ TRAINING, DISTURBED = "Training", "Variation and noise"
     "--seed 1`; `tdac train --task maze --task office --variation random`; "
     "`tdac train --set unknown --steps 100000`"
 )
-def train(
-    tasks: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(
-            "--task",
-            metavar="PATH",
-            help=f"{TASK}; repeatable, for several maps or several worlds.  "
-            "[default: maze]",
-        ),
-    ] = None,
-    set_name: Annotated[
-        Optional[str],  # noqa: UP045
-        typer.Option(
-            "--set",
-            metavar="NAME",
-            help="Task set (`tdac sets`) or set.yaml, instead of tasks: train on its "
-            "worlds of the split train, and evaluate on those of dev.",
-        ),
-    ] = None,
-    algo: Annotated[
-        Optional[Literal["ppo", "recurrent-ppo", "sac", "td3"]],  # noqa: UP045
-        typer.Option(help="Algorithm of stable-baselines3.  [default: ppo]"),
-    ] = None,
-    steps: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(
-            min=1,
-            help="Training steps of all robots together.  [default: from --config]",
-        ),
-    ] = None,
-    seed: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(min=0, help="Seed of networks, starts and noise.  [default: 0]"),
-    ] = None,
-    out: Annotated[
-        Optional[Path],  # noqa: UP045
-        dir_flag("--out", help="Training folder.  [default: runs/ALGO-NAME-N]"),
-    ] = None,
-    resume: Annotated[
-        Optional[Path],  # noqa: UP045
-        dir_flag(
-            "--resume",
-            help="Continue the training in this folder with its own settings, from its "
-            "last checkpoint; --steps changes its length.",
-        ),
-    ] = None,
-    wrappers: Annotated[
-        Optional[list[str]],  # noqa: UP045
-        typer.Option(
-            "--wrapper",
-            metavar="NAME",
-            help=f"{WRAPPER}  [default: from --config]",
-            rich_help_panel=TRAINING,
-        ),
-    ] = None,
-    n_envs: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(
-            min=1,
-            help="Number of robots driven in parallel.  [default: from --config]",
-            rich_help_panel=TRAINING,
-        ),
-    ] = None,
-    episodes: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(
-            min=1,
-            help="Episodes per evaluation, or worlds.  [default: 100]",
-            rich_help_panel=TRAINING,
-        ),
-    ] = None,
-    config: Annotated[
-        Optional[Path],  # noqa: UP045
-        file_flag(
-            help="Hyperparameters in rl-zoo3 format.  [default: bundled, by --algo]",
-            rich_help_panel=TRAINING,
-        ),
-    ] = None,
-    variation: Annotated[
-        Optional[Literal["nominal", "jitter", "mixed", "random"]],  # noqa: UP045
-        typer.Option(
-            help=f"{VARIATION}  [default: from --config for training, jitter for "
-            "evaluations]",
-            rich_help_panel=DISTURBED,
-        ),
-    ] = None,
-    range_noise: Annotated[
-        Optional[float],  # noqa: UP045
-        number_flag(help=f"{RANGE_NOISE}  [default: 0]", rich_help_panel=DISTURBED),
-    ] = None,
-    wheel_slip: Annotated[
-        Optional[float],  # noqa: UP045
-        number_flag(help=f"{WHEEL_SLIP}  [default: 0]", rich_help_panel=DISTURBED),
-    ] = None,
-    motor_lag: Annotated[
-        Optional[float],  # noqa: UP045
-        number_flag(help=f"{MOTOR_LAG}  [default: 0]", rich_help_panel=DISTURBED),
-    ] = None,
-    delay: Annotated[
-        Optional[int],  # noqa: UP045
-        number_flag(help=f"{DELAY}  [default: 0]", rich_help_panel=DISTURBED),
-    ] = None,
-    wheel_gains: Annotated[
-        Optional[float],  # noqa: UP045
-        number_flag(help=f"{WHEEL_GAINS}  [default: 0]", rich_help_panel=DISTURBED),
-    ] = None,
-    axle_error: Annotated[
-        Optional[float],  # noqa: UP045
-        number_flag(help=f"{AXLE_ERROR}  [default: 0]", rich_help_panel=DISTURBED),
-    ] = None,
-    range_dropout: Annotated[
-        Optional[float],  # noqa: UP045
-        number_flag(help=f"{RANGE_DROPOUT}  [default: 0]", rich_help_panel=DISTURBED),
-    ] = None,
-    trust: Trust = False,
-    as_json: Json = False,
-) -> None:
+@typed_options("train:run")
+def train(options: TrainOptions) -> None:
     """Train a baseline policy with stable-baselines3 on tasks or a task set."""
-    from tdac_agent.cli import train as command
-
-    noise = {
-        "range_noise": range_noise,
-        "wheel_slip": wheel_slip,
-        "motor_lag": motor_lag,
-        "delay": delay,
-        "wheel_gains": wheel_gains,
-        "axle_error": axle_error,
-        "range_dropout": range_dropout,
-    }
-    given = {
-        "task": tasks,
-        "set": set_name,
-        "algo": algo,
-        "seed": seed,
-        "wrapper": wrappers,
-        "n_envs": n_envs,
-        "episodes": episodes,
-        "config": config,
-        "variation": variation,
-        **noise,
-    }
-    flags = {name: value for name, value in given.items() if value is not None}
-    raise typer.Exit(command.run(flags, steps, out, resume, trust, as_json))

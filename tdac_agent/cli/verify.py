@@ -3,140 +3,249 @@
 from __future__ import annotations
 
 import gc
-import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tdac_agent.cli.flags import TaskFlags, check_tier
-from tdac_agent.cli.robust_flags import RobustFlags
+from tdac_agent.cli.controller_choice import (
+    change_note,
+    controller_and_task,
+    controller_file,
+    with_own_set,
+)
 from tdac_agent.cli.spinner import Spinner
+from tdac_agent.cli.task_choice import check_scope, check_tier
+from tdac_agent.cli.typed_options import require_flag, typed_fields, words_of
 from tdac_agent.errors import ControllerFileError
-from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.task import Task
-from tdac_agent.tasks.task_file import TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
-from tdac_agent.tasks.units import Units
-from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.core.errors import TaskError
 
 if TYPE_CHECKING:
+    from tdac_agent.cli.options import NoiseFlags
+    from tdac_agent.cli.task_flags import TaskFlags
+    from tdac_agent.cli.verify_options import VerifyOptions
+    from tdac_agent.tasks.task import Task
+    from tdac_agent.verification.diagnosis.report import Report
     from tdac_agent.verification.episode_report import EpisodeReport
+    from tdac_envs.ladder.task_sets import TaskSet
 
 
 def run(
-    controller: str,
-    flags: TaskFlags,
-    profile: Profile | None,
-    paper: bool,
-    suite: Path | None,
-    trust: bool,
-    tier: str,
-    seed: int | None,
-    junit: Path | None,
-    out: Path | None,
-    as_json: bool,
-    robust: RobustFlags,
-    child_pool: ChildPool,
+    flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags, child_pool: ChildPool
 ) -> int:
     """Verifies a controller and prints the report; returns the exit code."""
-    check_tier(tier)
-    robust.check()
-    if out is not None:
-        check_folder(out)
-    file, task = _prepared(controller, flags)
-    task = allowed(task, suite, trust=trust)
-    if robust.robust is not None:
-        task.disturbed_options(robust.disturbed.disturbance())
+    check_tier(options.tier)
+    _check_robust(options, noise)
+    if options.out is not None:
+        check_folder(options.out)
+    flags = with_own_set(options.controller, flags)
+    check_scope(flags.set_name is not None, flags, options)
+    if flags.set_name is not None:
+        return _verify_on_set(flags.set_name, options, child_pool)
+    return _verify_on_task(flags, options, noise, child_pool)
+
+
+def _check_robust(options: VerifyOptions, noise: NoiseFlags) -> None:
+    """Checks the flags of a robust verification before anything is run.
+
+    Raises:
+        TaskError: A flag needs another one, or a value is out of range.
+    """
+    if options.robust is None:
+        require_flag("--robust N", typed_fields(noise))
+    elif options.accept_at is not None:
+        SequentialTest(options.accept_at, options.robust, options.margin)
+    noise.disturbance()
+
+
+def _verify_on_task(
+    flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags, child_pool: ChildPool
+) -> int:
+    with Spinner("preparing the task …") as spinner:
+        if typed_fields(flags):  # it is built anew
+            spinner()
+        file, task = controller_and_task(options.controller, flags)
+    task = allowed(task, options.suite, trust=options.trust)
+    if options.robust is not None:
+        task.disturbed_options(noise.disturbance())
+    _freeze()
+    with WarmJudge(child_pool) as judge:
+        report = _report(file, task, options, judge)
+        # Imported late: the judge has worked meanwhile.
+        from tdac_agent.cli.console import Console, print_json
+        from tdac_agent.cli.report_view import show_report
+        from tdac_agent.cli.sentences import print_plain
+
+        console, units = Console(stderr=options.as_json), task.setting.shown
+        if note := change_note(options.controller, flags):
+            print_plain(console, note)
+        if not options.as_json:
+            show_report(report, console, options.out, task.folder, units)
+        robust = None
+        if options.robust is not None and report.passed:
+            robust = _measure(file, task, options, noise, judge)
+    if options.as_json:
+        print_json(_record(report, options, robust))
+    elif robust is not None:
+        from tdac_agent.cli.robust_view import show_robust
+
+        show_robust(robust, console, _replay(flags, options, noise), units)
+    elif options.robust is not None:
+        console.print("robustness not measured: the controller is not verified")
+    return 0 if report.passed and (robust is None or robust.passed) else 1
+
+
+def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) -> Report:
+    # Imported while the judge starts.
+    from tdac_agent.verification.verify import verify
+
+    with Spinner(f"verifying {file.name} on {task.name} …") as spinner:
+        report = verify(
+            file,
+            task,
+            profile=options.profile,
+            paper=options.paper,
+            tier=options.tier,
+            seed=options.seed,
+            out=options.out,
+            judge=judge,
+            meanwhile=spinner,
+        )
+    if report.passed and not report.provenance.paper:
+        about = report.provenance
+        _print_marked(file, about.task_sha256, about.profile)
+    if options.junit is not None:
+        from tdac_agent.cli.junit import write_junit
+
+        write_junit(report, options.junit)
+    return report
+
+
+def _print_marked(file: Path, sha256: str, profile: str) -> None:
+    """Marks a run of an earlier version anew, and says so."""
+    from tdac_agent.runs.ownership import mark_verified
+
+    again = mark_verified(file, sha256, profile)
+    print(again, end="\n" * bool(again), file=sys.stderr)
+
+
+def _freeze() -> None:
+    """Lets the garbage collector work again, except on what was imported."""
     gc.freeze()
     gc.enable()
-    with WarmJudge(child_pool) as judge:
-        # Imported while the judge starts.
-        from tdac_agent.runs.ownership import mark_verified
-        from tdac_agent.verification.verify import verify
 
-        with Spinner(f"verifying {file.name} on {task.name} …") as spinner:
-            report = verify(
+
+def _measure(
+    file: Path, task: Task, options: VerifyOptions, noise: NoiseFlags, judge: WarmJudge
+) -> EpisodeReport:
+    """Runs the disturbed episodes with a progress bar."""
+    from tdac_agent.cli.console import Console
+    from tdac_agent.cli.driving_bar import DrivingBar
+    from tdac_agent.cli.sentences import print_plain
+    from tdac_agent.verification.verify_episodes import verify_episodes
+
+    assert options.robust is not None
+    console = Console(stderr=options.as_json)
+    bar = DrivingBar(console, options.robust, "disturbed episodes", is_long=True)
+    try:
+        with bar:
+            return verify_episodes(
                 file,
                 task,
-                profile=profile,
-                paper=paper,
-                tier=tier,
-                seed=seed,
-                out=out,
+                options.robust,
+                disturbance=noise.disturbance(),
+                first=options.first_seed,
+                accept_at=options.accept_at,
+                margin=options.margin,
+                tier=options.tier,
+                out=options.out,
                 judge=judge,
-                meanwhile=spinner,
+                watch=bar.show,
             )
-        if junit is not None:
-            write_junit(report, junit)
-        if report.passed and not report.provenance.paper:
-            about = report.provenance
-            again = mark_verified(file, about.task_sha256, about.profile)
-            print(again, end="\n" * bool(again), file=sys.stderr)
-        if not as_json:
-            _show(report, out, task)
-        measured = None
-        if robust.robust is not None and report.passed:
-            from tdac_agent.cli.robust import measure
-
-            measured = measure(
-                file, task, robust, tier=tier, out=out, judge=judge, as_json=as_json
-            )
-    if as_json:
-        sys.stdout.write(_json(report, robust, measured) + "\n")
-    elif robust.robust is not None:
-        replay = _replay(controller, flags, robust, tier)
-        _show_robust(measured, replay, task.setting.shown)
-    accepted = measured is None or measured.passed
-    return 0 if report.passed and accepted else 1
+    except KeyboardInterrupt:
+        episodes, successes = bar.counts
+        reached = f"{successes} of {episodes} episodes reached the goal"
+        print_plain(console, f"{reached}; no success rate computed")
+        if options.out is not None:
+            rest = "contains the report of the suite, but no episodes.json"
+            print_plain(console, f"{options.out} {rest}")
+        raise
 
 
-def _prepared(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
-    """The file and its task; shows a status while a task is built from flags."""
-    if flags == TaskFlags():
-        return controller_and_task(controller, flags)
-    from tdac_agent.cli.console import Console
-
-    with Console(stderr=True).status("preparing the task …"):
-        return controller_and_task(controller, flags)
-
-
-def _show(report: Report, out: Path | None, task: Task) -> None:
-    from tdac_agent.cli.console import Console
-    from tdac_agent.cli.report_view import show_report
-
-    show_report(report, Console(), out, task.folder, task.setting.shown)
+def _record(
+    report: Report, options: VerifyOptions, robust: EpisodeReport | None
+) -> Any:
+    """The report; `--robust` adds the key `robust`, null if it was not run."""
+    if options.robust is None:
+        return report
+    added = None if robust is None else robust.model_dump(mode="json")
+    return {**report.model_dump(mode="json"), "robust": added}
 
 
-def _show_robust(
-    measured: EpisodeReport | None, replay: list[str], units: Units
-) -> None:
-    from tdac_agent.cli.console import Console
-    from tdac_agent.cli.robust_view import show_robust
-
-    console = Console()
-    if measured is None:
-        console.print("robustness not measured: the controller is not verified")
-    else:
-        show_robust(measured, console, replay, units)
-
-
-def _json(report: Report, robust: RobustFlags, measured: EpisodeReport | None) -> str:
-    """The report as JSON; `--robust` adds the key `robust`, null if it was not run."""
-    if robust.robust is None:
-        return report.model_dump_json(indent=2)
-    content = report.model_dump(mode="json")
-    added = None if measured is None else measured.model_dump(mode="json")
-    return json.dumps({**content, "robust": added}, indent=2, ensure_ascii=False)
-
-
-def _replay(
-    controller: str, flags: TaskFlags, robust: RobustFlags, tier: str
-) -> list[str]:
+def _replay(flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags) -> list[str]:
     """The command line that plays one of the disturbed episodes, without `--seed`."""
-    words = ["tdac", "play", controller, *flags.words(), *robust.disturbed.words()]
-    return words if tier == "auto" else [*words, "--tier", tier]
+    words = ["tdac", "play", options.controller, *words_of(flags), *words_of(noise)]
+    return words if options.tier == "auto" else [*words, "--tier", options.tier]
+
+
+def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> int:
+    """Drives a controller on a set and prints the report; returns the exit code."""
+    from tdac_agent.cli.console import Console, print_json
+    from tdac_agent.cli.driving_bar import DrivingBar
+    from tdac_agent.cli.set_view import show_next_steps, show_set_report
+    from tdac_agent.verification.verify_episodes import most_worlds, verify_episodes
+    from tdac_envs.ladder.task_sets import load_set
+
+    if options.hidden_folder is not None and options.split != "hidden":
+        raise TaskError("--hidden-folder needs --split hidden")
+    if options.profile == "paper":
+        raise TaskError("--profile paper is for single tasks: leave it out with --set")
+    tasks = load_set(name, options.hidden_folder)
+    file = _controller_on(tasks, options)
+    _freeze()
+    most = options.worlds or most_worlds(tasks, options.split)
+    console = Console(stderr=options.as_json)
+    bar = DrivingBar(console, most, f"worlds of {tasks.name}", is_long=True)
+    with WarmJudge(child_pool) as judge, bar:
+        report = verify_episodes(
+            file,
+            tasks,
+            options.worlds,
+            split=options.split,
+            salt_file=options.salt_file,
+            tier=options.tier,
+            out=options.out,
+            judge=judge,
+            watch=bar.show,
+        )
+    if report.passed and report.sequential is not None:
+        _print_marked(file, report.provenance.sha256, "policy")
+    if options.junit is not None:
+        from tdac_agent.cli.junit import write_set_junit
+
+        write_set_junit(report, options.junit)
+    if options.as_json:
+        print_json(report)
+    else:
+        show_set_report(report, console)
+        show_next_steps(report, name, options.controller, options.out, console)
+    return 0 if report.passed else 1
+
+
+def _controller_on(tasks: TaskSet, options: VerifyOptions) -> Path:
+    """The controller file; also checks that the set has so many worlds."""
+    from tdac_agent.builtin.level import controller_of
+
+    if options.controller == "builtin":
+        file = controller_of(tasks, "give a file")
+    else:
+        file = controller_file(options.controller)
+    if options.worlds is not None:
+        tasks.check_count(options.split, options.worlds, "-n")
+    return file
 
 
 def check_folder(out: Path) -> None:
@@ -149,63 +258,3 @@ def check_folder(out: Path) -> None:
             each.rmdir()
     except OSError as error:
         raise ControllerFileError(f"cannot write to {out}: {error.strerror}") from error
-
-
-def controller_and_task(controller: str, flags: TaskFlags) -> tuple[Path, Task]:
-    """The controller file and its task; a run folder brings its own task."""
-    path, file = Path(controller), controller_file(controller)
-    if path.is_dir():
-        return file, flags.load_beside(path)
-    if (path.parent / TASK_FILE).is_file():
-        return path, flags.load_beside(path.parent)
-    return path, flags.load()
-
-
-def controller_file(controller: str) -> Path:
-    """The controller file of a path, which may be that of a run folder."""
-    path = Path(controller)
-    if path.is_dir():
-        file = path / "controller.py"
-        if not file.is_file():
-            raise ControllerFileError(_without_controller(path))
-        return file
-    if not path.is_file():
-        raise ControllerFileError(f"no controller {controller!r}: no such file")
-    if path.suffix != ".py":
-        raise ControllerFileError(f"{controller!r} is not a controller: expected a .py")
-    return path
-
-
-def _without_controller(folder: Path) -> str:
-    """Why a folder has no controller, and what to do."""
-    from tdac_agent.runs.run_record import RUN_FILE, load_run  # slow to import
-
-    if (folder / RUN_FILE).is_file():
-        from tdac_agent.runs.resume import resume_line
-
-        command = resume_line(load_run(folder), folder)
-        return f"the run {folder} has no controller yet; to continue it: {command}"
-    return f"there is no controller.py in {folder}"
-
-
-def write_junit(report: Report, path: Path) -> None:
-    """Writes a JUnit XML file with a test case per expected test."""
-    from xml.etree import ElementTree
-
-    messages = {failure.test: failure.message for failure in report.failures}
-    suite = ElementTree.Element(
-        "testsuite",
-        name=f"tdac {report.provenance.task}",
-        tests=str(report.verdict.expected),
-        failures=str(report.verdict.failed_tests),
-        time=str(report.seconds),
-    )
-    for name in report.tests:
-        file, _, test = name.partition("::")
-        case = ElementTree.SubElement(suite, "testcase", classname=file, name=test)
-        if name in messages:
-            ElementTree.SubElement(case, "failure", message=messages[name])
-    try:
-        write_atomic(path, ElementTree.tostring(suite, encoding="utf-8"))
-    except OSError as error:
-        raise ControllerFileError(f"cannot write {path}: {error.strerror}") from error

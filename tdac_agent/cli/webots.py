@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
@@ -14,10 +11,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from rich.table import Table
 from rich.text import Text
 
-from tdac_agent.cli.console import Console
+from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.film import film_of
-from tdac_agent.cli.flags import check_finite, check_heading, check_tier
 from tdac_agent.cli.printed import show_printed
+from tdac_agent.cli.task_choice import check_heading, check_tier
+from tdac_agent.cli.webots_flags import WebotsOptions
 from tdac_agent.webots.report import WebotsReport
 from tdac_agent.webots.run import frames, run_controller
 from tdac_envs.core.errors import TaskError
@@ -27,59 +25,43 @@ from tdac_envs.webots.stage import open_stage
 from tdac_envs.worlds.bundled import world_file
 
 
-def run(
-    controller: Path,
-    world: str,
-    steps: int | None,
-    seconds: float | None,
-    start: tuple[float, ...] | None,
-    heading: float | None,
-    goal: tuple[float, float] | None,
-    tolerance: float | None,
-    ignore: tuple[str, ...],
-    webots_sensors: bool,
-    video: Path | None,
-    speed: float | None,
-    tier: str,
-    as_json: bool,
-) -> int:
+def run(options: WebotsOptions) -> int:
     """Runs a controller and prints its report; returns 0 if it passed, else 1."""
-    check_tier(tier)
-    if heading is not None:
-        if start is None:
-            raise TaskError("--heading needs --start X Y")
-        check_heading(heading)
-        start = (*start, heading)
-    limit = None if seconds is None else (seconds,)
-    check_finite(start=start, goal=goal, seconds=limit)
+    check_tier(options.tier)
+    check_heading(options.heading)
+    controller, video, tier = options.controller, options.video, options.tier
     if video is not None and video.suffix.lower() not in SUFFIXES:
         raise TaskError(f"--video must end in .mp4 or .gif, got {video.name!r}")
-    stage = open_stage(world_file(world), goal, ignore, start, controller.stem)
-    options: dict[str, Any] = {
-        "steps": steps,
-        "goal_tolerance": TOLERANCE if tolerance is None else tolerance,
-        "webots_sensors": webots_sensors,
+    start: tuple[float, ...] | None = options.start
+    if start is not None and options.heading is not None:
+        start = (*start, options.heading)
+    file = world_file(options.world)
+    stage = open_stage(file, options.goal, options.ignore, start, controller.stem)
+    tolerance = TOLERANCE if options.tolerance is None else options.tolerance
+    how: dict[str, Any] = {
+        "steps": options.steps,
+        "goal_tolerance": tolerance,
+        "webots_sensors": options.webots_sensors,
     }
-    console = Console(stderr=as_json)
-    env = stage.make_env(**options)
-    if not as_json:
+    console = Console(stderr=options.as_json)
+    env = stage.make_env(**how)
+    if not options.as_json:
         _show_notes(stage.notes, console)
     with _bar(console) as bar:
         watch = _watcher(bar, controller.name, env.nominal.horizon)
         done = run_controller(
-            controller, stage, env, tier=tier, seconds=seconds, watch=watch
+            controller, stage, env, tier=tier, seconds=options.seconds, watch=watch
         )
-    if as_json:
-        record = {"schema_version": 1, **asdict(done.report)}
-        sys.stdout.write(json.dumps(record, indent=2) + "\n")
+    if options.as_json:
+        print_json({"schema_version": 1, **asdict(done.report)})
     else:
         _show(done.report, stage.notes, console)
     if video is not None:
         with console.status(f"drawing {escape(video.name)} …"):
-            env = stage.make_env(**options, render_mode="rgb_array")
-            film = film_of(done.log.steps, env.nominal.dt, speed, video)
+            env = stage.make_env(**how, render_mode="rgb_array")
+            film = film_of(done.log.steps, env.nominal.dt, options.speed, video)
             write_video(frames(env, done.log, film.stride), video, film.fps)
-        if not as_json:
+        if not options.as_json:
             print(f"wrote {video} ({film})")
     return 0 if done.report.passed else 1
 

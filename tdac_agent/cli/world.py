@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
@@ -14,7 +12,8 @@ from rich.box import SIMPLE
 from rich.markup import escape
 from rich.table import Table
 
-from tdac_agent.cli.console import Console
+from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.map_flags import WorldOptions
 from tdac_envs.core.errors import WorldError
 from tdac_envs.worlds.bodies import floor_under
 from tdac_envs.worlds.bundled import world_file
@@ -26,13 +25,13 @@ from tdac_envs.worlds.world import Arena, Obstacle, Unmodelled, World
 SHOWN = 60
 
 
-def run(file: str, png: Path | None, as_json: bool) -> None:
-    """Reads a world, draws it if `png` is given, and prints its contents."""
-    world = load_world(world_file(file))
+def run(options: WorldOptions) -> None:
+    """Reads a world, draws it if a file for it is given, and prints its contents."""
+    world, png = load_world(world_file(options.file)), options.png
     if png is not None:
         _draw(world, png)
-    if as_json:
-        sys.stdout.write(json.dumps(_record(world), indent=2) + "\n")
+    if options.as_json:
+        print_json(_record(world))
         return
     console = Console()
     console.print(f"[bold]{escape(world.source)}[/], Webots {world.version}", end="")

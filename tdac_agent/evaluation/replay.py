@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 from tdac_agent.errors import Fault
 from tdac_agent.evaluation.policies import Entrant
 from tdac_agent.problems.episodes import Part, episodes_of
 from tdac_agent.sandbox import SandboxError
+from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.episode_job import (
@@ -44,9 +46,13 @@ def drive_episode(
     own = episodes_of(problem)
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as name:
         folder, child_pool = Path(name), ChildPool(ahead=False)
+        policy = entrant.policy
+        if entrant.source is not None:
+            policy = replace(policy, file=folder / "controller.py")
+            write_atomic(folder / "controller.py", entrant.source)
         job = EpisodeJob(
-            worlds=own.worlds(part, folder, entrant.policy),
-            policy=entrant.policy,
+            worlds=own.worlds(part, folder, policy),
+            policy=policy,
             numbers=(part.first,),
             tier=tier,
             limits=own.limits,

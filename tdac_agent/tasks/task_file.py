@@ -27,10 +27,11 @@ TASK_FILE = "task.yaml"
 SET_FILE = "set.yaml"
 """File name in the folder of a run on a task set, which has no single task."""
 
-_MAP_FILES = (
+MAP_FILES = (
     *(".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".gif", ".tif", ".tiff", ".webp"),
     *(".map", ".npy"),
 )
+"""Suffixes of maps; a ROS map is a YAML file."""
 
 Profile = Literal["policy", "paper"]
 Steps = Annotated[int, Field(gt=0, le=MOST_STEPS)]
@@ -111,6 +112,9 @@ class TaskFile(StrictModel):
     threshold: float | None = Field(
         None, ge=0, lt=255, description="Luminance above which a pixel is light."
     )
+    resolution: Length | None = Field(
+        None, description="Metres per pixel of a map image that gives none."
+    )
     movers: Annotated[tuple[Spec, ...], BeforeValidator(_movers_of)] = Field(
         (), description="Moving obstacles, as the environment's argument `movers`."
     )
@@ -159,7 +163,7 @@ def read_task_file(path: Path, asked: object) -> TaskFile:
     Raises:
         TaskError: The file cannot be read, or has an invalid or unknown key.
     """
-    if path.suffix.lower() in _MAP_FILES and path.is_file():
+    if path.suffix.lower() in MAP_FILES and path.is_file():
         raise TaskError(_is_map(asked, "map"))
     if path.suffix.lower() == ".wbt" and path.is_file():
         raise TaskError(_is_map(asked, "world"))

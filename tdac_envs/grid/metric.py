@@ -70,6 +70,6 @@ def resolution_of(grid: Framed) -> float:
     if grid.resolution is None:
         raise MapError(
             "this map has no resolution, so lengths in metres cannot be converted; "
-            "give pixels, or a ROS map.yaml with a resolution"
+            "give pixels, a ROS map.yaml, or the resolution"
         )
     return grid.resolution

@@ -65,6 +65,7 @@ def prepare(
     robot_radius: float | None = None,
     snap: bool = False,
     options: ReadingOptions = DEFAULT_OPTIONS,
+    resolution: float | None = None,
     units: MapUnits = PIXELS,
 ) -> Prepared:
     """Reads a map and determines start, goal, heading and body radius.
@@ -79,6 +80,7 @@ def prepare(
         robot_radius: Body radius, px; from the params if None, else 15.
         snap: Whether to move start and goal to the nearest place where the body fits.
         options: Polarity and threshold of an image, where the user gave them.
+        resolution: Metres per pixel of an image that gives none.
         units: Units of messages and notes, from `units_of`.
 
     Raises:
@@ -87,9 +89,11 @@ def prepare(
     """
     if robot_radius is not None:
         robot_radius = positive("robot_radius", robot_radius)
-    given = _TaskOptions.of(start, goal, heading, robot_radius, snap, options, units)
+    given = _TaskOptions.of(
+        start, goal, heading, robot_radius, snap, options, resolution, units
+    )
     if not isinstance(source, str | Path):
-        _refuse(options, "a grid")
+        _refuse(given, "a grid")
         return _with_task(_from_cells(_as_cells(source), "array"), given)
     # To load a folder with the name of a bundled map, write `./maze`.
     if isinstance(source, str) and source in bundled_maps():
@@ -98,10 +102,10 @@ def prepare(
     path = Path(source)
     if path.is_dir():
         _check_is_map_folder(path)
-        _refuse(options, str(path))
+        _refuse(given, str(path))
         return _with_task(_from_folder(path), given)
     if path.suffix == ".npy":
-        _refuse(options, str(path))
+        _refuse(given, str(path))
         return _with_task(_from_npy(path), given)
     check_exists(path)
     return _from_image(path, given)
@@ -117,6 +121,7 @@ class _TaskOptions:
     robot_radius: float | None
     snap: bool
     options: ReadingOptions
+    resolution: float | None
     units: MapUnits = PIXELS
 
     @classmethod
@@ -128,6 +133,7 @@ class _TaskOptions:
         robot_radius: float | None,
         snap: bool,
         options: ReadingOptions,
+        resolution: float | None,
         units: MapUnits,
     ) -> _TaskOptions:
         at = end = None
@@ -140,7 +146,7 @@ class _TaskOptions:
             end = finite_point("goal", goal)
         if heading is not None:
             heading = finite("heading", heading)
-        return cls(at, end, heading, robot_radius, snap, options, units)
+        return cls(at, end, heading, robot_radius, snap, options, resolution, units)
 
     def or_else(self, bundled: BundledMap) -> _TaskOptions:
         """These options, with the values of a bundled map instead of None."""
@@ -151,6 +157,7 @@ class _TaskOptions:
             self.robot_radius or bundled.robot_radius,
             self.snap,
             self.options,
+            self.resolution,
             self.units,
         )
 
@@ -190,12 +197,15 @@ def _snapped(grid: OccupancyGrid, params: MapParams, units: MapUnits) -> MapPara
     return params.model_copy(update=changes)
 
 
-def units_of(source: MapSource, frame: str) -> MapUnits:
+def units_of(
+    source: MapSource, frame: str, resolution: float | None = None
+) -> MapUnits:
     """The units of places and lengths on a map: pixels, or metres in its frame.
 
     Args:
         source: As for `prepare`.
         frame: `"pixels"` or `"metres"`: what the user gives and reads.
+        resolution: As for `prepare`.
 
     Raises:
         TaskError: There is no such frame, or the map can have no metres.
@@ -213,7 +223,7 @@ def units_of(source: MapSource, frame: str) -> MapUnits:
     if path.is_dir():
         _check_is_map_folder(path)
         return MapUnits.metres(_from_folder(path).grid)
-    return MapUnits.metres(load_image(path))
+    return MapUnits.metres(load_image(path, resolution))
 
 
 def _from_image(image: Path, given: _TaskOptions) -> Prepared:
@@ -221,11 +231,11 @@ def _from_image(image: Path, given: _TaskOptions) -> Prepared:
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
     radius = given.robot_radius or RobotParams().radius
     ends = given.start, given.goal
-    how = given.snap, given.options, given.units
+    how = given.snap, given.options, given.resolution, given.units
     prepared = read(image, sha256_of(read_bytes(image)), *ends, radius, *how)
     # Preprocessing has already snapped the points.
     start, goal = (None, None) if given.snap else (given.start, given.goal)
-    rest = (given.heading, radius, False, DEFAULT_OPTIONS, given.units)
+    rest = (given.heading, radius, False, DEFAULT_OPTIONS, None, given.units)
     return _with_task(prepared, _TaskOptions(start, goal, *rest))
 
 
@@ -239,6 +249,7 @@ def _read_image(
     radius: float,
     snap: bool,
     options: ReadingOptions,
+    resolution: float | None,
     units: MapUnits,
 ) -> Prepared:
     # Imported late: grids need no preprocessing.
@@ -249,17 +260,20 @@ def _read_image(
         "threshold": options.threshold,
         "units": units,
     }
-    grid, params = preprocess(image, start, goal, radius, snap=snap, **how)
+    picture = load_image(image, resolution)
+    grid, params = preprocess(picture, start, goal, radius, snap=snap, **how)
     return Prepared(grid, params, image)
 
 
-def _refuse(options: ReadingOptions, what: str) -> None:
+def _refuse(given: _TaskOptions, what: str) -> None:
     """Refuses image options for a map that is not an image."""
-    if options != DEFAULT_OPTIONS:
+    if given.options != DEFAULT_OPTIONS:
         raise TaskError(
             f"{what} already defines which cells are obstacles; leave out polarity and "
             "threshold"
         )
+    if given.resolution is not None:
+        raise TaskError(f"{what}: leave out the resolution, which is for images")
 
 
 def _as_cells(source: NDArray[Any] | Sequence[Sequence[Any]]) -> NDArray[Any]:

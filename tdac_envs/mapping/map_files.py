@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,13 +25,31 @@ from tdac_envs.mapping.image import (
 from tdac_envs.mapping.ros_rule import RosMapFile, ros_cells, ros_notes
 
 
-def load_image(path: str | Path) -> MapImage:
+def load_image(path: str | Path, resolution: float | None = None) -> MapImage:
     """Reads a picture, a ROS `map.yaml`, a MovingAI `.map` or a `.npy` grid.
 
+    Args:
+        path: The file.
+        resolution: Metres per pixel, if the file gives none.
+
     Raises:
-        MapError: The file is missing, unreadable, too large or of a single colour.
+        MapError: The file is missing, unreadable, too large or of a single colour, or
+            it gives another resolution.
     """
-    path = Path(path)
+    image = _read(Path(path))
+    if resolution is None or resolution == image.resolution:
+        return image
+    if not 0.0 < resolution < math.inf:
+        raise MapError(f"resolution: expected metres per pixel, got {resolution:g}")
+    if image.resolution is not None:
+        raise MapError(
+            f"{image.name} gives {image.resolution:g} m per px: leave out the "
+            f"resolution {resolution:g}"
+        )
+    return replace(image, resolution=resolution)
+
+
+def _read(path: Path) -> MapImage:
     suffix = path.suffix.lower()
     if suffix in {".yaml", ".yml"}:
         return read_ros_yaml(path)

@@ -118,6 +118,30 @@ def tdac(monkeypatch, capsys, tmp_path):
 
 
 @pytest.fixture
+def done(tdac):
+    """Runs a command that succeeds; gives its stdout."""
+
+    def run(*words):
+        code, out, err = tdac(*words)
+        assert code == 0, err
+        return out
+
+    return run
+
+
+@pytest.fixture
+def refused(tdac):
+    """Runs a command that is a mistake; gives the one line on stderr."""
+
+    def run(*words):
+        code, out, err = tdac(*words)
+        assert (code, out, err.count("\n")) == (2, "", 1), err
+        return err
+
+    return run
+
+
+@pytest.fixture
 def good(tmp_path, good_source):
     """A folder with the small task and a controller that solves it."""
     folder = write_small_task(tmp_path / "task")

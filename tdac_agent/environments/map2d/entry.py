@@ -27,7 +27,10 @@ class Map2DEnvironment(Environment):
     id = "TDAC-Map2D-v0"
     folder = Path(__file__).parent
     units = PIXELS
-    keys = ("map", "robot", "movers", "snap", "frame", "polarity", "threshold")
+    keys = (
+        *("map", "robot", "movers", "snap", "frame"),
+        *("polarity", "threshold", "resolution"),
+    )
     names = Names(
         constants=(
             *("MAP_IMG", "PARAMS_JSON", "ROBOT_IMG", "AXLE_LENGTH_PX"),

@@ -237,7 +237,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     source = spec.map if bundled else str(base / spec.map)
     check_frame(spec.frame, spec.profile)
     typed = None if spec.start is None else (spec.start[0], spec.start[1])
-    units = units_of(source, spec.frame).with_typed(typed, spec.goal)
+    units = units_of(source, spec.frame, spec.resolution).with_typed(typed, spec.goal)
     spec = _in_pixels(spec, units)
     prepared = prepare(
         source,
@@ -246,6 +246,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         robot_radius=spec.robot.radius,
         snap=spec.snap,
         options=ReadingOptions(spec.polarity, spec.threshold),
+        resolution=spec.resolution,
         units=units,
     )
     params = _with_robot(prepared.params, spec.robot)
@@ -286,7 +287,7 @@ def robot_text(robot: RobotParams, units: MapUnits) -> str:
     return (
         f"robot: radius {units.length(robot.radius)}, full speed "
         f"{units.length(robot.max_wheel_speed, 0)}/s (to change them: --robot-radius, "
-        "and robot: {max_wheel_speed: …} in a task.yaml)"
+        "--max-speed)"
     )
 
 

@@ -1,6 +1,6 @@
 """The command line: exit codes, one clear line for each mistake, clean JSON."""
 
-import inspect
+import dataclasses
 import json
 import os
 import re
@@ -17,9 +17,12 @@ import pytest
 import typer
 from small import SHORT, small_cells, write_small_task
 
+from tdac_agent import load_task
 from tdac_agent.cli.main import PARTS, command_line
-from tdac_agent.cli.task_flags import task_flags
+from tdac_agent.cli.task_changes import changed_task
+from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, TaskFlags
 from tdac_agent.runs.resume import resume_arguments
+from tdac_agent.tasks.task import lay_out
 from tdac_envs.mapping.bundled import bundled_map
 
 COMMANDS = [
@@ -50,27 +53,25 @@ def black_png(width, height):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_help_has_an_example(tdac, command):
+def test_every_help_has_an_example(done, command):
     """`--help` of each command shows how it is called."""
-    code, out, _ = tdac(*command.split(), "--help")
-    assert code == 0
+    out = done(*command.split(), "--help")
     assert re.search(rf"Examples?: .*tdac {command}", re.sub(r"\s+", " ", out))
 
 
-def test_help_and_version(tdac):
+def test_help_and_version(done):
     """Without a command the help; `--version` in one line."""
-    code, out, _ = tdac("--help")
-    assert code == 0
+    out = done("--help")
     assert all(command in out for command in " ".join(COMMANDS).split())
-    code, out, _ = tdac("--version")
-    assert code == 0
+    out = done("--version")
     assert re.fullmatch(r"tdac \d+\.\d+\.\d+\n", out)
 
 
 def test_a_command_reads_no_flags_of_another():
     """Its own part of the command line alone is built; any other word gets them all."""
-    for words in (command.split() for command in COMMANDS):
-        assert len(command_line(words).registered_groups) == 1
+    for own in PARTS.values():
+        for word in own:
+            assert set(typer.main.get_command(command_line([word])).commands) == {*own}
     for words in ([], ["--help"], ["verfy"]):
         assert len(command_line(words).registered_groups) == len(PARTS)
 
@@ -91,20 +92,14 @@ def test_the_list_of_commands_is_made_without_their_flags():
 
 def test_a_task_is_named_by_the_same_flags_everywhere():
     """All commands on one task have them in one order; `synth` two more, for models."""
-    told_to_models = ["robot_image", "instructions"]
-    shared = [
-        name
-        for name in inspect.signature(task_flags).parameters
-        if name not in told_to_models
-    ]
-    for command in ("synth", "verify", "play", "check-suite"):
+    names = [field.name for field in dataclasses.fields(TaskFlags)]
+    shared = [each for each in names if each not in {*ONLY_FOR_SYNTH, "file"}]
+    for command in ("synth", "verify", "play", "mcp"):
         group = typer.main.get_command(command_line([command]))
-        names = [parameter.name for parameter in group.commands[command].params]
-        at = names.index("task")
-        flags = [name for name in names[at:] if name in {*shared, *told_to_models}]
-        assert [name for name in flags if name not in told_to_models] == shared
-        extra = [name for name in flags if name in told_to_models]
-        assert extra == (told_to_models if command == "synth" else [])
+        flags = [parameter.name for parameter in group.commands[command].params]
+        assert [each for each in flags if each in shared] == shared
+        extra = [each for each in flags if each in ONLY_FOR_SYNTH]
+        assert extra == ([*ONLY_FOR_SYNTH] if command == "synth" else [])
 
 
 def test_ctrl_c_while_the_command_line_is_loaded_is_one_line(tmp_path):
@@ -154,10 +149,9 @@ def test_the_help_is_quick():
         ("verify", "Missing argument 'CONTROLLER'; see tdac verify --help"),
     ],
 )
-def test_words_that_are_not_understood(tdac, words, expected):
+def test_words_that_are_not_understood(refused, words, expected):
     """The option that may be meant, and the help of the command it was typed for."""
-    code, _, err = tdac(*words.split())
-    assert code == 2
+    err = refused(*words.split())
     assert err.startswith("error: ")
     assert expected in err
     assert err.count("\n") == 1
@@ -239,7 +233,7 @@ PLACES = {
     "unknown optimizer": ([*ENDS, "--optimizer", "gpt"], "unknown model 'gpt'"),
     "from a missing file": ([*ENDS, "--from", "no.py"], "'no.py'"),
     "no iterations": ([*ENDS, "-K", 0], "-K"),
-    "instructions": ([*ENDS, "--task", "maze"], "--task already defines the task"),
+    "two tasks": ([*ENDS, "--task", "maze"], "--task already defines the task"),
 }
 
 
@@ -356,10 +350,9 @@ def test_task_files_that_cannot_be_used(tdac, good, name):
 
 
 @pytest.mark.slow
-def test_verify_says_yes_and_no(tdac, good):
+def test_verify_says_yes_and_no(tdac, done, good):
     """Exit 0 for a verified controller, 1 for another; a table for people."""
-    code, out, _ = tdac("verify", good, "--profile", "policy", "--paper")
-    assert code == 0
+    out = done("verify", good, "--profile", "policy", "--paper")
     assert "verified: 16 of 16 tests passed" in out
     (good / "controller.py").write_text("def policy(obs):\n    return 1, 1\n")
     code, out, _ = tdac("verify", good / "controller.py", "--profile", "policy")
@@ -384,11 +377,10 @@ def test_verify_as_json_and_junit(tdac, good, tmp_path):
     assert int(root.get("failures")) == len(root.findall("testcase/failure"))
 
 
-def test_a_junit_file_that_cannot_be_written(tdac, good):
+def test_a_junit_file_that_cannot_be_written(refused, good):
     """One clear line."""
     bad = good / "controller.py" / "x.xml"
-    code, _, err = tdac("verify", good, "--profile", "policy", "--junit", bad)
-    assert code == 2
+    err = refused("verify", good, "--profile", "policy", "--junit", bad)
     assert err.splitlines()[-1].startswith("error: cannot write")
 
 
@@ -430,11 +422,10 @@ def test_a_misspelt_fixture_is_a_fault_of_the_suite(tdac, good, tmp_path, comman
 
 
 @pytest.mark.slow
-def test_check_suite_says_yes(tdac, tmp_path):
+def test_check_suite_says_yes(done, tmp_path):
     """Exit 0 and a table of the controllers."""
     folder = write_small_task(tmp_path / "short", profile="policy", **SHORT)
-    code, out, _ = tdac("check-suite", "--task", folder, "--repeats", 1)
-    assert code == 0
+    out = done("check-suite", "--task", folder, "--repeats", 1)
     for name in ("reference", "do-nothing", "constant", "random", "raising", "slow"):
         assert name in out
     assert re.search(r"proven: map2d on small \(map .*\), profile policy, seed \d", out)
@@ -464,23 +455,21 @@ def test_check_suite_of_a_broken_suite(tdac, good, tmp_path):
     assert err.splitlines()[-1].startswith("infrastructure fault: the suite is broken")
 
 
-def test_synth_writes_a_run(tdac, good):
+def test_synth_writes_a_run(done, good):
     """Exit 0, a run folder; with --json the record alone on stdout."""
     (good / "controller.py").unlink()
-    code, out, _ = tdac("synth", "--task", good, "--out", "a", "--json")
-    assert code == 0
+    out = done("synth", "--task", good, "--out", "a", "--json")
     run = json.loads(out)
     assert run["status"] == "verified"
     assert Path("a/controller.py").is_file()
 
 
 @pytest.mark.slow
-def test_synth_keeps_the_profile_and_takes_a_tier(tdac, good):
+def test_synth_keeps_the_profile_and_takes_a_tier(tdac, done, good):
     """The profile is part of the run and of its task; a run asks for no tier."""
     (good / "controller.py").unlink()
     words = ["synth", "--task", good, "--out", "a", "--profile", "policy"]
-    code, out, _ = tdac(*words, "--json", "--tier", "rlimits")
-    assert code == 0
+    out = done(*words, "--json", "--tier", "rlimits")
     assert json.loads(out)["profile"] == "policy"
     about = json.loads(Path("a/report.json").read_text())["provenance"]
     assert (about["profile"], about["sandbox"]) == ("policy", "rlimits")
@@ -506,11 +495,66 @@ def test_usage_names_arguments_without_braces(tdac):
 
 @pytest.mark.parametrize("command", [["verify"], ["play", "--video", "a.gif"]])
 @pytest.mark.parametrize("target", [".", "controller.py"])
-def test_a_folder_keeps_its_own_task(tdac, good, command, target):
-    """Flags that would change it are refused; another task can be named."""
-    code, _, errors = tdac(*command, good / target, "--start", "60", "35")
-    assert code == 2
-    assert re.fullmatch(r"error: \S+ brings its own task: leave out --start\n", errors)
+def test_flags_change_the_task_of_a_folder(tdac, good, command, target):
+    """The note says that the verdict is not the folder's own."""
+    (good / "controller.py").write_text("def policy(obs):\n    return 0.0, 0.0\n")
+    words = (*command, good / target, "--start", "60", "35", "--robot-radius", "4")
+    code, out, _ = tdac(*words)
+    assert code == 1
+    assert out.startswith(
+        "judged as another task: start 60 35, robot-radius 4; this is not the verdict "
+        f"of {good}\n"
+    )
+
+
+def changed(folder, **flags):
+    """The task of a folder with these flags."""
+    return changed_task(load_task(folder), TaskFlags(**flags))
+
+
+def test_what_follows_from_start_and_goal_is_not_kept(good, tmp_path):
+    """The task file of a run has a horizon, which a longer way must not exceed."""
+    file, fixing = good / "task.yaml", "horizon: 400\n"
+    text = file.read_text()
+    file.write_text(text.replace(fixing, ""))
+    run = lay_out(load_task(good), tmp_path / "run")
+    fixed = load_task(run)
+    nearer = changed(run, goal=(100.0, 30.0), max_speed=0.5, rays=5)
+    assert nearer.nominal.horizon > 2 * fixed.nominal.horizon
+    assert nearer.nominal.robot.n_rays == 5
+    assert nearer.nominal.robot.radius == fixed.nominal.robot.radius
+    assert changed(run, tolerance=3.5).nominal.goal_tolerance == 3.5
+    wider = changed(run, robot_radius=7.0).nominal.robot
+    assert (wider.radius, wider.axle_length) == (7.0, 14.0)
+    turned = changed(run, heading=0.5).nominal.start
+    assert turned == (*fixed.nominal.start[:2], 0.5)
+    assert changed(run).sha256() == fixed.sha256()
+    file.write_text(text)
+    assert changed(good, goal=(100.0, 30.0)).nominal.horizon == 400
+
+
+def test_changes_keep_whose_tests_may_run(good):
+    """A suite from elsewhere is not trusted because a flag changes the start."""
+    (good / "mine").mkdir()
+    (good / "mine" / "test_mine.py").write_text("def test_mine():\n    pass\n")
+    (good / "task.yaml").write_text((good / "task.yaml").read_text() + "suite: mine\n")
+    before, after = load_task(good), changed(good, goal=(100.0, 30.0))
+    assert not before.trusted
+    assert (after.trusted, after.suite, after.name) == (
+        False,
+        before.suite,
+        before.name,
+    )
+
+
+def test_a_run_that_is_not_there(refused):
+    """The nearest one is named."""
+    Path("runs/maze-1").mkdir(parents=True)
+    err = refused("play", "runs/nothing", "--video", "a.gif")
+    assert err == (
+        "error: there is no run or controller 'runs/nothing'; the nearest is "
+        "runs/maze-1\n"
+    )
 
 
 @pytest.mark.slow
@@ -526,37 +570,33 @@ def test_synth_says_no(tdac, tmp_path):
     assert Path("runs/small-1/run.json").is_file()
 
 
-def test_map_prints_json(tdac, image):
+def test_map_prints_json(done, image):
     """The parameters, all candidates and the files that were written."""
-    code, out, _ = tdac("map", image, *ENDS, "--json")
-    assert code == 0
+    out = done("map", image, *ENDS, "--json")
     record = json.loads(out)
     assert record["params"]["start"] == [30, 30]
     assert all(Path(file).is_file() for file in record["files"])
 
 
-def test_a_bundled_map_brings_its_own_heading(tdac):
+def test_a_bundled_map_brings_its_own_heading(done):
     """As the environment of its name has it."""
-    code, out, _ = tdac("map", "maze", "--json")
-    assert code == 0
+    out = done("map", "maze", "--json")
     heading = bundled_map("maze").heading
     assert heading != 0.0
     assert json.loads(out)["params"]["heading"] == heading
 
 
-def test_map_without_places(tdac, image):
+def test_map_without_places(done, image):
     """A preview with rulers, and what to do next."""
-    code, out, _ = tdac("map", image)
-    assert code == 0
+    out = done("map", image)
     assert "then give --start X Y --goal X Y" in out
     assert Path("plan-map/preview.png").is_file()
 
 
-def test_map_says_its_reading_once(tdac, image):
+def test_map_says_its_reading_once(done, image):
     """With a task and without: how the picture was read, and where the files are."""
     for ends in (ENDS, []):
-        code, out, _ = tdac("map", image, *ends)
-        assert code == 0
+        out = done("map", image, *ends)
         assert out.count("obstacles are dark pixels") == 1
         assert " ".join(out.split()).count("look at plan-map/preview.png") == 1
 
@@ -571,12 +611,11 @@ def chessboard(tmp_path):
 
 
 @pytest.mark.parametrize("command", ["map", "synth"])
-def test_a_close_call_shows_both_readings(tdac, chessboard, command):
+def test_a_close_call_shows_both_readings(refused, chessboard, command):
     """Exit 2 with one line that names them, the flag that settles it, the previews."""
     where = [chessboard] if command == "map" else ["--map", chessboard]
     ends = ["--start", 20, 20, "--goal", 60, 20, "--robot-radius", 5]
-    code, _, err = tdac(command, *where, *ends)
-    assert code == 2
+    err = refused(command, *where, *ends)
     (line,) = err.splitlines()
     assert "dark obstacles leave" in line
     assert "light obstacles leave" in line
@@ -586,29 +625,24 @@ def test_a_close_call_shows_both_readings(tdac, chessboard, command):
         assert Path(f"board-map/preview-{polarity}.png").is_file()
 
 
-def test_polarity_and_threshold_are_flags_and_keys(tdac, image, chessboard, tmp_path):
+def test_polarity_and_threshold_are_flags_and_keys(
+    done, refused, image, chessboard, tmp_path
+):
     """What was said is in the parameters; a task file says it, too."""
-    code, out, _ = tdac("map", chessboard, "--polarity", "light", "--json")
-    assert code == 0
+    out = done("map", chessboard, "--polarity", "light", "--json")
     assert json.loads(out)["params"]["polarity"] == "light"
-    code, out, _ = tdac("map", image, *ENDS, "--threshold", 100, "--json")
-    assert code == 0
+    out = done("map", image, *ENDS, "--threshold", 100, "--json")
     assert json.loads(out)["params"]["threshold"] == 100
     task = f"map: {image}\nstart: [30, 30]\ngoal: [130, 30]\nrobot: {{radius: 6}}\n"
     (tmp_path / "task.yaml").write_text(f"{task}polarity: light\n")
-    code, _, err = tdac("synth", "--task", tmp_path / "task.yaml", "--dry-run")
-    assert code == 2
+    err = refused("synth", "--task", tmp_path / "task.yaml", "--dry-run")
     assert "lies in an obstacle" in err
-    code, _, err = tdac("synth", "--task", "maze", "--polarity", "dark")
-    assert code == 2
-    assert "leave out --polarity" in err
 
 
 @pytest.mark.parametrize("suffix", ["mp4", "gif"])
-def test_play_writes_a_film(tdac, good, suffix):
+def test_play_writes_a_film(done, good, suffix):
     """Exit 0 where the goal was reached; the speed of the film is told."""
-    code, out, _ = tdac("play", good, "--video", f"a.{suffix}", "--speed", "20")
-    assert code == 0
+    out = done("play", good, "--video", f"a.{suffix}", "--speed", "20")
     assert f"wrote a.{suffix} (at 20 times real time, " in out
     assert "reached after" in out
     assert Path(f"a.{suffix}").stat().st_size > 1000

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,9 +12,11 @@ import pytest
 from small import small_cells
 
 from tdac_agent import load_task
-from tdac_agent.cli.flags import TaskFlags
-from tdac_agent.cli.places import with_places
-from tdac_envs.core.errors import RefusedError, TaskError
+from tdac_agent.cli.coordinates import with_coordinates
+from tdac_agent.cli.task_choice import chosen_task, kind_of_file
+from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.tasks.task import lay_out
+from tdac_envs.core.errors import MapError, RefusedError, TaskError
 
 # The small map is a ROS map of 0.1 m per px with its corner at (-2, -3) m.
 START, GOAL, RADIUS = ("1.05", "5.95"), ("11.05", "5.95"), ("--robot-radius", "0.6")
@@ -66,10 +69,9 @@ def test_metres_in_and_out(tdac, ros):
         ),
     ],
 )
-def test_refusals_are_in_metres(tdac, ros, command, start, reason):
+def test_refusals_are_in_metres(refused, ros, command, start, reason):
     words = ("--metres", "--start", *start, "--goal", *GOAL, *RADIUS)
-    code, _, err = tdac(*command.split(), ros, *words)
-    assert code == 2
+    err = refused(*command.split(), ros, *words)
     assert re.search(f"(?m)^error: plan.yaml: {reason}", err), err
     assert " px" not in err
     assert err.endswith("; look at plan-map/refused.png\n")
@@ -90,7 +92,8 @@ def test_a_task_in_metres_is_the_one_in_pixels(ros):
     """Start, heading, goal, radius and tolerance are converted; words stay metres."""
     flags = {"map_image": str(ros), "frame": "metres"}
     ends = {"start": (1.05, 5.95), "goal": (11.05, 5.95)}
-    task = TaskFlags(**flags, **ends, heading=math.pi / 2, robot_radius=0.6).load()
+    wanted = TaskFlags(**flags, **ends, heading=math.pi / 2, robot_radius=0.6)
+    task = chosen_task(wanted)
     assert task.nominal.start == pytest.approx((30, 30, -math.pi / 2))
     assert task.nominal.goal == pytest.approx((130, 30))
     assert task.nominal.body_radius == pytest.approx(6.0)
@@ -98,7 +101,7 @@ def test_a_task_in_metres_is_the_one_in_pixels(ros):
     assert task.setting.length_text(length) == f"{round(0.1 * length, 2):g} m"
     assert "metres" not in task.setting.portable()
     with pytest.raises(RefusedError, match=r"radius of \d\.\d+ m") as caught:
-        TaskFlags(**flags, **ends, robot_radius=4.0).load()
+        chosen_task(TaskFlags(**flags, **ends, robot_radius=4.0))
     assert " px" not in str(caught.value)
 
 
@@ -133,20 +136,18 @@ def test_a_heading_of_the_map_command(tdac, ros):
     assert (code, err) == (2, "error: --heading needs --start X Y\n")
 
 
-def test_a_numpy_grid(tdac, tmp_path):
+def test_a_numpy_grid(tdac, done, refused, tmp_path):
     """What `gym.make` and `synth` read, `map` reads, too."""
     np.save(tmp_path / "grid.npy", small_cells())
     ends = ("--start", "30,30", "--goal=130,30", "--robot-radius", "6")
-    code, out, _ = tdac("map", tmp_path / "grid.npy", *ends)
-    assert code == 0
+    out = done("map", tmp_path / "grid.npy", *ends)
     assert out.startswith("grid.npy, 160 x 120 px: obstacles are those of the grid")
     np.testing.assert_array_equal(np.load("grid-map/occupancy.npy"), small_cells())
     np.save(tmp_path / "whole.npy", small_cells().astype(np.int64))
     assert tdac("map", tmp_path / "whole.npy", *ends)[0] == 0
     np.testing.assert_array_equal(np.load("whole-map/occupancy.npy"), small_cells())
     np.save(tmp_path / "grey.npy", small_cells().astype(np.uint8) * 255)
-    code, _, err = tdac("map", tmp_path / "grey.npy", *ends)
-    assert (code, err.count("\n")) == (2, 1)
+    err = refused("map", tmp_path / "grey.npy", *ends)
     assert "(True = occupied) or integers 0 and 1, got uint8" in err
 
 
@@ -162,7 +163,7 @@ def test_a_numpy_grid(tdac, tmp_path):
     ],
 )
 def test_places_as_people_type_them(typed, understood):
-    assert with_places(typed.split()) == understood.split()
+    assert with_coordinates(typed.split()) == understood.split()
 
 
 @pytest.mark.parametrize(
@@ -188,32 +189,30 @@ def test_places_as_people_type_them(typed, understood):
 def test_places_that_are_none(typed, message):
     """Quoted as typed, with what is expected."""
     with pytest.raises(TaskError, match=f"^{re.escape(message)}"):
-        with_places(typed.split())
+        with_coordinates(typed.split())
 
 
 @pytest.mark.parametrize("start", ["30 30 --heading 90", "30 30 90", "30,30,90"])
-def test_a_heading_in_degrees(tdac, ros, start):
+def test_a_heading_in_degrees(refused, ros, start):
     """More than a full turn is refused with the radians that may be meant."""
     ends = ("--start", *start.split(), "--goal", "130", "30")
-    code, _, err = tdac("map", ros.parent / "plan.png", *ends)
-    assert (code, err.count("\n")) == (2, 1)
+    err = refused("map", ros.parent / "plan.png", *ends)
     assert "90 is more than a full turn: did you mean 1.571 (90 degrees)?" in err
 
 
-def test_a_number_that_is_none(tdac):
+def test_a_number_that_is_none(refused):
     """The flag, the word as typed, and what is expected."""
     for words, message in (
         ("map x.png --robot-radius abc", "--robot-radius abc: expected a number"),
         ("evaluate random --episodes 1.5x", "--episodes 1.5x: expected a whole number"),
         ("evaluate random --episodes 0", "greater than or equal to 1, got 0"),
     ):
-        code, _, err = tdac(*words.split())
-        assert (code, err.count("\n")) == (2, 1)
+        err = refused(*words.split())
         assert message in err
 
 
 def test_a_place_in_one_word():
-    assert with_places(["--start", "90, 302", "c.py"]) == [
+    assert with_coordinates(["--start", "90, 302", "c.py"]) == [
         "--start",
         "90",
         "302",
@@ -222,34 +221,67 @@ def test_a_place_in_one_word():
 
 
 @pytest.mark.parametrize(
-    "words",
+    ("words", "message"),
     [
-        ["--snap"],
-        ["--polarity", "dark"],
-        ["--threshold", "3"],
-        ["--robot-radius", "3"],
-        ["--robot-image", "robot.png"],
-        ["--instructions", "Slowly."],
-        ["--map", "office"],
+        ("--map office", "--task already defines the task: leave out --map"),
+        ("--world maze", "--task already defines the task: leave out --world"),
+        ("--set known", "--set brings its own tasks; leave out --task"),
+        ("office", "give office or --task, not both"),
+        ("--ignore Tree", "not of TDAC-EPuck-v0: leave out --ignore"),
+        ("--robot-image no.png", "no robot image"),
+        ("--rays 5000", "--rays: "),
+        ("--fov 400", "--fov: "),
+        ("--max-speed -1", "--max-speed: "),
+        ("--resolution 0.1 --map maze", "leave out --map"),
     ],
-    ids=" ".join,
 )
-def test_flags_beside_a_task_are_refused(tdac, words):
-    """One line names the flag, which would have no effect."""
-    code, out, err = tdac("synth", "--task", "maze", *words)
-    assert (code, out) == (2, "")
-    assert err == f"error: --task already defines the task: leave out {words[0]}\n"
+def test_flags_that_do_not_fit_a_task(refused, words, message):
+    """One line names the flag."""
+    err = refused("synth", "--task", "maze", *words.split())
+    assert message in err
 
 
-@pytest.mark.parametrize("words", [["--snap"], ["--polarity", "dark"]])
-def test_flags_beside_a_run_folder_are_refused(tdac, tmp_path, words):
-    (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "controller.py").write_text("x = 1\n")
-    (tmp_path / "run" / "task.yaml").write_text("map: maze\n")
-    code, _, err = tdac("verify", tmp_path / "run", *words)
-    assert code == 2
-    assert err.endswith(f"brings its own task: leave out {words[0]}\n")
-    assert err.count("\n") == 1
+@pytest.mark.parametrize(
+    ("file", "field"),
+    [
+        *(("plan.png", "map_image"), ("plan.yaml", "map_image"), ("a.wbt", "world")),
+        *(("task.yaml", "task"), ("set.yaml", "set_name"), ("run", "task")),
+        *(("set", "set_name"), ("office", "task"), ("unknown", "set_name")),
+        *(("a.py", None), ("nosuch", None), (".", None)),
+    ],
+)
+def test_a_file_is_what_it_looks_like(ros, monkeypatch, file, field):
+    """A map, a world, a task or a task set, also by name, needs no flag."""
+    monkeypatch.chdir(ros.parent)
+    for name, text in (("task", "map: plan.png\n"), ("set", "name: a\nworlds: []\n")):
+        Path(f"{name}.yaml").write_text(text)
+        folder = Path("run" if name == "task" else name)
+        folder.mkdir()
+        (folder / f"{name}.yaml").write_text(text)
+    (ros.parent / "empty").mkdir()
+    monkeypatch.chdir(ros.parent / "empty" if file == "." else ros.parent)
+    assert kind_of_file(file) == field
+
+
+def test_a_picture_with_a_resolution(ros):
+    """It is the ROS map with this resolution, but for its origin."""
+    ends = {"start": (3.05, 8.95), "goal": (13.05, 8.95), "robot_radius": 0.6}
+    flags = TaskFlags(map_image=str(ros.parent / "plan.png"), metres=True, **ends)
+    with pytest.raises(MapError, match="no resolution"):
+        chosen_task(flags)
+    task = chosen_task(replace(flags, resolution=0.1))
+    assert task.nominal.start[:2] == pytest.approx((30, 30))
+    assert task.nominal.body_radius == pytest.approx(6.0)
+    with pytest.raises(MapError, match=r"plan.yaml gives 0.1 m per px"):
+        chosen_task(replace(flags, map_image=str(ros), resolution=0.2))
+    file = ros.parent / "task.yaml"
+    file.write_text(
+        "map: plan.png\nresolution: 0.1\nframe: metres\nstart: [3.05, 8.95]\n"
+        "goal: [13.05, 8.95]\nrobot: {radius: 0.6}\n"
+    )
+    assert load_task(file).sha256() == task.sha256()
+    again = lay_out(task, ros.parent / "run")
+    assert load_task(again).sha256() == task.sha256()
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -276,11 +308,40 @@ def test_the_grid_as_a_ros_map(tdac, tmp_path):
     ("words", "message"),
     [
         (["office", "--yaml"], "gives no resolution; add --resolution METRES"),
-        (["office", "--resolution", 0.05], "--resolution needs --yaml"),
+        (["office", "--metres"], "metres"),
         (["office", "--yaml", "--resolution", 0], "expected metres per pixel, got 0"),
     ],
 )
-def test_a_ros_map_without_a_scale(tdac, words, message):
-    code, _, errors = tdac("map", *words)
-    assert code == 2
+def test_a_ros_map_without_a_scale(refused, words, message):
+    errors = refused("map", *words)
     assert message in errors
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--robot-radius 3", "not of TDAC-Map2D-v0: leave out --robot-radius"),
+        ("--movers crowd:3", "leave out --movers"),
+        ("--metres", "--metres is for maps; a world is in metres anyway"),
+        ("--map office", "--world defines an e-puck task: leave out --map"),
+        ("--heading 1", "--heading needs --start X Y"),
+    ],
+)
+def test_flags_that_do_not_fit_a_world(refused, words, message):
+    assert message in refused("synth", "--world", "arena", *words.split())
+
+
+def test_flags_of_the_robot(tmp_path):
+    """Each is a key of the task file, also next to a task with movers."""
+    flags = TaskFlags(
+        max_speed=40.0, rays=9, fov=90.0, range_max=100.0, tolerance=5.0, dt=0.1
+    )
+    for task in (chosen_task(flags), chosen_task(replace(flags, task="maze"))):
+        robot, nominal = task.nominal.robot, task.nominal
+        assert (robot.max_wheel_speed, robot.n_rays) == (40.0, 9)
+        assert (robot.field_of_view_deg, robot.range_max) == (90.0, 100.0)
+        assert (nominal.goal_tolerance, nominal.dt) == (5.0, 0.1)
+    (tmp_path / "task.yaml").write_text("map: office\nmovers: bounce:2\n")
+    file = str(tmp_path / "task.yaml")
+    plain = chosen_task(TaskFlags(task=file))
+    assert chosen_task(TaskFlags(task=file, rays=18)).sha256() == plain.sha256()

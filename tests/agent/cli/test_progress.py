@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from tdac_agent.cli.progress import Progress
+from tdac_agent.cli.progress import SynthProgress
 from tdac_agent.cli.run_view import list_tests, show_run
 from tdac_agent.runs.run_record import Attempt, Run, Status
 
@@ -18,7 +18,7 @@ TESTS = tuple(f"test_end_to_end.py::test_number_{n}_of_many" for n in range(9))
 def shown(*records):
     """The lines that records leave on the screen, and all of their words."""
     console = Console(file=io.StringIO(), width=80)
-    with Progress(console, "task: what it is") as progress:
+    with SynthProgress(console, "task: what it is") as progress:
         for record in records:
             progress(record)
     return told(console)
@@ -152,7 +152,7 @@ def test_a_run_that_the_budget_has_stopped():
 
 
 @pytest.mark.parametrize("columns", [80, 120])
-def test_runs_in_a_table(tdac, monkeypatch, columns):
+def test_runs_in_a_table(done, monkeypatch, columns):
     """Each run in one line, its folder and its status whole."""
     monkeypatch.setenv("COLUMNS", str(columns))
     names = ["runs/epuck-clutter-12", "runs/maze-1"]
@@ -160,8 +160,7 @@ def test_runs_in_a_table(tdac, monkeypatch, columns):
         run = run_with(name, "interrupted", tokens_in=1_234_567)
         Path(name).mkdir(parents=True)
         (Path(name) / "run.json").write_text(run.model_dump_json())
-    code, out, _ = tdac("runs")
-    assert code == 0
+    out = done("runs")
     rows = [line for line in out.splitlines() if line.split()[:1] == ["runs/maze-1"]]
     (row,) = rows
     for words in ("interrupted", "0/1", "1234567", "unknown", "command:"):
@@ -182,7 +181,7 @@ def test_an_iteration_that_was_cut_off_is_counted(tdac):
     assert "3/20" in tdac("runs")[1]
 
 
-def test_runs_of_a_campaign_are_found(tdac, monkeypatch):
+def test_runs_of_a_campaign_are_found(tdac, done, monkeypatch):
     """Three levels below its folder; not in hidden folders, nor below another run."""
     record = run_with("x", "interrupted").model_dump_json()
     names = [f"campaigns/mine/runs/a-kind-of-run-{'x' * 20}/r000{n}" for n in (1, 2)]
@@ -190,8 +189,7 @@ def test_runs_of_a_campaign_are_found(tdac, monkeypatch):
     for name in (*names, hidden, inside):
         Path(name).mkdir(parents=True)
         (Path(name) / "run.json").write_text(record)
-    code, out, _ = tdac("runs", "campaigns", "--json")
-    assert code == 0
+    out = done("runs", "campaigns", "--json")
     assert sorted(row["run"] for row in json.loads(out)) == names
     monkeypatch.setenv("COLUMNS", "80")
     out = tdac("runs", "campaigns/mine")[1]

@@ -1,6 +1,8 @@
 """`tdac sets`: a list, the figures of a world, pictures, one line for each mistake."""
 
 import json
+from pathlib import Path
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
@@ -40,10 +42,9 @@ def test_it_shows_a_set(tdac):
     assert "gap" not in out
 
 
-def test_it_shows_a_world(tdac):
+def test_it_shows_a_world(tdac, done):
     """With its figures; the same world that the environment drives on."""
-    code, out, _ = tdac("sets", "show", "unknown", "--index", "2", "--split", "test")
-    assert code == 0
+    out = done("sets", "show", "unknown", "--index", "2", "--split", "test")
     assert "test 2" in out
     assert "caves, 220 x 220 px" in out
     words = ("sets", "show", "unknown", "--index", "2", "--split", "test", "--json")
@@ -91,9 +92,8 @@ def test_sets_of_ones_own(tdac, tmp_path):
         (("known", "--split", "hidden"), "--split"),
     ],
 )
-def test_mistakes_are_one_line(tdac, words, message):
-    code, out, err = tdac("sets", "show", *words)
-    assert (code, out) == (2, "")
+def test_mistakes_are_one_line(refused, words, message):
+    err = refused("sets", "show", *words)
     assert message in err
     assert err.startswith("error: ")
     assert len(err.splitlines()) == 1
@@ -157,3 +157,44 @@ def test_mistakes_with_sets_are_one_line(tdac, of_maps, tmp_path, words, message
     assert message in err
     assert err.startswith("error: ")
     assert len(err.splitlines()) == 1
+
+
+def test_a_junit_file_of_a_set(tdac, tmp_path):
+    """A case for each test, and for each world; here a test fails before any world."""
+    (tmp_path / "bad.py").write_text("def drive(obs):\n    return 0.0, 0.0\n")
+    words = ("verify", tmp_path / "bad.py", "unknown", "-n", "3", "--junit", "a.xml")
+    code, out, err = tdac(*words)
+    assert (code, err) == (1, "")
+    assert "so no world was driven" in out
+    root = ElementTree.parse("a.xml").getroot()
+    assert int(root.get("tests")) == len(root) > 0
+    assert 0 < int(root.get("failures")) == len(root.findall("testcase/failure"))
+    assert {case.get("classname") for case in root} == {"static"}
+    assert all(case.get("name") for case in root)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("verify a.py --set unknown --paper", "--set brings its own tasks; leave out "),
+        ("verify a.py unknown --start 1 2", "leave out --start"),
+        ("verify a.py unknown --profile paper", "--profile paper is for single tasks"),
+        ("verify a.py -n 3", "-n needs --set NAME"),
+        ("play a.py unknown --episode nominal", "leave out --episode"),
+        ("evaluate random unknown --seed 3", "leave out --seed"),
+        ("evaluate random --split dev", "--split needs --set NAME"),
+        ("evaluate unknown", "no policy: give files, run folders, or names such as"),
+        ("evaluate random unknown lost", "give lost or --set, not both"),
+        ("synth unknown --suite tests", "leave out --suite"),
+        ("synth --then-verify", "--then-verify needs --set NAME"),
+        ("check-suite unknown", "unknown is a task set; this command needs a single"),
+        ("train maze unknown", "--set brings its own tasks; leave out --task"),
+    ],
+)
+def test_flags_of_tasks_and_of_sets(refused, words, message):
+    """One line names the flag."""
+    if words.startswith("train"):
+        pytest.importorskip("stable_baselines3")
+    Path("a.py").write_text("def policy(obs):\n    return 0.0, 0.0\n")
+    err = refused(*words.split())
+    assert message in err

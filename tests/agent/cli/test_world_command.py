@@ -1,12 +1,11 @@
 """`tdac world`: a table, a picture, clean JSON, one clear line for each mistake."""
 
 import json
-import signal
+from pathlib import Path
 
 import cv2
 import pytest
 
-from tdac_agent.cli.main import main
 from tdac_envs import read_world
 from tdac_envs.worlds.bundled import bundled_worlds, world_file
 from tdac_envs.worlds.wbt.reader import load_world
@@ -21,28 +20,15 @@ DEF GOAL Solid { translation 0.5 0.2 0 }
 """
 
 
-@pytest.fixture
-def tdac(monkeypatch, capsys, tmp_path):
-    """Runs `tdac world`; gives exit code, stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    (tmp_path / "small.wbt").write_text(WORLD)
-    handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGHUP)}
-
-    def run(*words):
-        monkeypatch.setattr("sys.argv", ["tdac", "world", *words])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return (ended.value.code, *capsys.readouterr())
-
-    yield run
-    for number, handler in handlers.items():
-        signal.signal(number, handler)
+@pytest.fixture(autouse=True)
+def small(tdac):
+    """The world, in the folder of the command."""
+    Path("small.wbt").write_text(WORLD)
 
 
 def test_it_shows_what_is_in_a_world(tdac):
     """Robot, goal, arena, obstacles, and what is not modelled with its line."""
-    code, out, err = tdac("small.wbt")
+    code, out, err = tdac("world", "small.wbt")
     assert (code, err) == (0, "")
     for said in (
         "Webots R2025a, step 16 ms", "(-0.4, 0.1), heading 0.5 rad, version 1",
@@ -56,7 +42,7 @@ def test_it_shows_what_is_in_a_world(tdac):
 def test_a_thing_has_a_line(tdac, monkeypatch, world):
     """In a terminal of 80 columns, too."""
     monkeypatch.setenv("COLUMNS", "80")
-    _, out, _ = tdac(world)
+    _, out, _ = tdac("world", world)
     _, _, table = out.partition("obstacles (m, rad, kg)")
     _, _, *rows, mark = [line for line in table.splitlines() if line.strip()]
     assert mark.strip() == "* visible but not solid"
@@ -64,17 +50,16 @@ def test_a_thing_has_a_line(tdac, monkeypatch, world):
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_it_draws(tdac, tmp_path):
+def test_it_draws(done, tmp_path):
     """A PNG, in a folder that is made if need be."""
-    code, out, _ = tdac("small.wbt", "--png", "new/small.png")
-    assert code == 0
+    out = done("world", "small.wbt", "--png", "new/small.png")
     assert "new/small.png" in out
-    assert cv2.imread(str(tmp_path / "new" / "small.png")).shape[2] == 3
+    assert cv2.imread("new/small.png").shape[2] == 3
 
 
 def test_its_json_is_complete(tdac):
     """All numbers of the world, and nothing else on stdout."""
-    code, out, _ = tdac("small.wbt", "--json")
+    code, out, _ = tdac("world", "small.wbt", "--json")
     record, world = json.loads(out), read_world(WORLD)
     assert code == 0
     assert record["goal"] == [0.5, 0.2]
@@ -98,26 +83,18 @@ def test_its_json_is_complete(tdac):
         (["small.wbt", "--png", "x.jpg"], "error: --png must end in .png, got x.jpg"),
     ],
 )
-def test_mistakes_are_one_line(tdac, tmp_path, words, said):
+def test_mistakes_are_one_line(refused, tmp_path, words, said):
     """Exit 2, nothing on stdout."""
-    (tmp_path / "broken.wbt").write_text("WorldInfo {")
-    code, out, err = tdac(*words)
-    assert (code, out) == (2, "")
+    Path("broken.wbt").write_text("WorldInfo {")
+    err = refused("world", *words)
     assert err.startswith(said)
     assert err.count("\n") == 1
-
-
-def test_help_has_an_example(tdac):
-    """`--help` shows how it is called."""
-    code, out, _ = tdac("--help")
-    assert code == 0
-    assert "Example: tdac world maze.wbt --png maze.png" in " ".join(out.split())
 
 
 @pytest.mark.parametrize("name", ["arena", "arena.wbt"])
 def test_a_bundled_world(tdac, name):
     """It goes by its name, and by that of its file where there is no such file."""
-    code, out, err = tdac(name)
+    code, out, err = tdac("world", name)
     assert (code, err) == (0, "")
     assert "arena.wbt" in out
     assert "WoodenBox" in out

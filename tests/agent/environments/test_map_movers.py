@@ -95,13 +95,14 @@ def test_worlds_have_none(tdac, tmp_path):
 
 
 def test_the_flag(tdac):
-    """It is the key of a task on a map, and does not change one that is given."""
+    """It is the key of a task on a map, and adds movers to one that has a name."""
     code, _, err = tdac("synth", "--map", "maze", "--movers", "crwd:3")
     assert code == 2
     assert "--movers: unknown kind 'crwd'" in err
-    code, _, err = tdac("synth", "--task", "maze", "--movers", "crowd:3")
-    assert code == 2
-    assert "--task already defines the task: leave out --movers" in err
+    words = ("synth", "--task", "maze", "--movers", "crowd:3", "--dry-run")
+    code, out, _ = tdac(*words)
+    assert code == 0
+    assert "a crowd of 3 people" in out
 
 
 def test_movers_in_metres():

@@ -626,7 +626,7 @@ def test_who_only_crashes_is_exit_1(tdac, controllers, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["plan.png"], "'plan.png' is not a controller: expected a .py"),
+        (["plan.png"], "no policy: give files, run folders"),
         (["syntax.py"], r"'syntax.py' is not a controller: .*'\(' was never closed"),
         (["image.py"], "'image.py' is not a controller: the source does not parse"),
         (["none.py"], "'none.py' is not a controller: it defines no function policy"),

@@ -8,7 +8,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 import tomllib
 import zipfile
 from pathlib import Path
@@ -17,7 +16,6 @@ import pytest
 from small import write_small_task
 
 from tdac_agent import load_task
-from tdac_agent.cli import export_harbor
 from tdac_agent.errors import RunError
 from tdac_agent.harbor.folder import export_set, export_task
 from tdac_agent.harbor.judge import main, problem_in
@@ -168,21 +166,18 @@ def test_a_folder_that_is_not_empty_is_refused(tmp_path):
     assert not (tmp_path / "barn").exists()
 
 
-@pytest.mark.slow
-def test_the_command_says_what_is_missing(tmp_path):
-    for task, name, worlds, why in (
-        (None, None, None, "give a task with --task NAME, or a task set"),
-        ("maze", "unknown", None, "leave out --task"),
-        ("maze", None, 3, "-n needs --set NAME"),
-    ):
-        with pytest.raises(TaskError, match=why):
-            export_harbor.run(task, name, worlds, tmp_path / "x", False)
-    words = [sys.executable, "-m", "tdac_agent", "export", "harbor", "--out", "x"]
-    done = subprocess.run(
-        words, capture_output=True, text=True, check=False, cwd=tmp_path
-    )
-    assert done.returncode == 2
-    assert done.stderr.startswith("error: give a task with --task")
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("", "give a task with --task NAME, or a task set"),
+        ("--task maze --set unknown", "leave out --task"),
+        ("--task maze -n 3", "-n needs --set NAME"),
+    ],
+)
+def test_the_command_says_what_is_missing(tdac, words, why):
+    code, _, err = tdac("export", "harbor", "--out", "x", *words.split())
+    assert (code, err.count("\n")) == (2, 1)
+    assert why in err
 
 
 def test_the_wheel_is_the_same_each_time(tmp_path):

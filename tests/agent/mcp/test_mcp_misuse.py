@@ -173,7 +173,7 @@ def test_two_servers_on_one_folder(serve, small_task, out, tdac):
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--task", "maze", "--set", "known"], "--task or --set"),
+        (["--task", "maze", "--set", "known"], "leave out --task"),
         (["--port", "0"], "--port needs --http"),
         (["--episodes", "5"], "episodes"),
         (["--set", "barn"], "files"),

@@ -85,7 +85,7 @@ def test_a_level_without_a_built_in_controller(tdac, tmp_path):
     ("words", "message"),
     [
         (("--episodes", "8"), "--episodes needs --set NAME"),
-        (("--feedback-episodes", "8"), "--feedback-episodes needs --set NAME"),
+        (("--feedback-episodes", "4"), "--feedback-episodes needs --set NAME"),
         (("--then-verify",), "--then-verify needs --set NAME"),
         (("--set", "knwn"), "did you mean 'known'?"),
         (("--set", "known", "--task", "maze"), "leave out --task"),

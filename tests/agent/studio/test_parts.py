@@ -22,7 +22,8 @@ from nicegui import Client
 from nicegui.page import page
 
 import tdac_agent
-from tdac_agent.cli.flags import TaskFlags
+from tdac_agent.cli.task_choice import chosen_task
+from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.models.budget import Enough
 from tdac_agent.runs.ownership import sign
 from tdac_agent.runs.replay import DEMO
@@ -100,7 +101,7 @@ def test_a_draft_is_the_task_of_its_command(kind, source, tmp_path):
     draft = TaskDraft.of(view, source)
     checked = check(draft, view, tmp_path)
     assert checked.problem == ""
-    assert flags_of(draft.words()).load().sha256() == checked.task.sha256()
+    assert chosen_task(flags_of(draft.words())).sha256() == checked.task.sha256()
     assert checked.narrowest.width > 2.0 * (view.radius or BODY_RADIUS)
 
 

@@ -470,7 +470,7 @@ def test_the_decision_is_the_exit_code(tdac, good):
         (["verify", "--robust", "9", "--first-seed", "-1"], "first-seed"),
         (["play", "--delay", "1"], "--delay needs --seed"),
         (["play", "--seed", "1", "--episode", "nominal"], "not both"),
-        (["play", "--seed", "1", "--wheel-slip", "nan"], "wheel slip"),
+        (["play", "--seed", "1", "--wheel-slip", "nan"], "--wheel-slip must be finite"),
         (["play", "--episode", "jitter 9"], "expected one of nominal, jitter 1"),
     ],
     ids=" ".join,

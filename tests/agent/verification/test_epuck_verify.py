@@ -195,7 +195,7 @@ def test_command_line_lists_what_is_left_out(tdac, controller, tmp_path):
         (["--world", "crates", "--map", "maze"], "leave out --map"),
         (["--world", "crates", "--robot-radius", "3"], "leave out --robot-radius"),
         (["--world", "crates", "--heading", "1"], "--heading needs --start"),
-        (["--task", "epuck", "--goal", "0", "0"], "leave out --goal"),
+        (["--task", "epuck", "--goal", "9", "9"], "goal \\(9, 9\\)"),
         (["--task", "epuck-crate"], "did you mean 'epuck-crates'"),
         (["--map", "maze", "--ignore", "x"], "leave out --ignore"),
         (["--world", "crates", "--ignore", "x"], "no node called 'x' to ignore"),

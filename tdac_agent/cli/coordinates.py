@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-PLACES = {
+EXPECTED = {
     "--start": "two numbers X Y, or three X Y YAW, as in --start 90 302",
     "--goal": "two numbers X Y, as in --goal 178 386",
 }
@@ -12,7 +12,7 @@ PLACES = {
 HEADING = "--heading"
 
 
-def with_places(words: list[str]) -> list[str]:
+def with_coordinates(words: list[str]) -> list[str]:
     """The words with each place as `--goal X Y` or `--start X Y --heading YAW`.
 
     Understands `--start X Y YAW`, `--start X,Y`, `--start "X, Y"`, `--start=X,Y` and
@@ -28,12 +28,12 @@ def with_places(words: list[str]) -> list[str]:
         flag, is_joined, value = rest[0].partition("=")
         del rest[0]
         done.append(f"{flag}{is_joined}{value}")
-        if flag not in PLACES:
+        if flag not in EXPECTED:
             continue
         typed = [value, *rest] if is_joined else rest
         numbers, used = _numbers(typed)
         if len(numbers) < 2 or (len(numbers) == 3 and flag == "--goal"):
-            _refuse_place(flag, typed, max(used, 2))
+            _refuse_coordinates(flag, typed, max(used, 2))
         if len(numbers) == 3:
             _refuse_two_headings(words, numbers)
         yaw = [HEADING, numbers[2]] if len(numbers) == 3 else []
@@ -42,7 +42,7 @@ def with_places(words: list[str]) -> list[str]:
     return done
 
 
-def _refuse_place(flag: str, typed: list[str], count: int) -> NoReturn:
+def _refuse_coordinates(flag: str, typed: list[str], count: int) -> NoReturn:
     """Refuses a place; quotes up to `count` words, without the next option.
 
     Raises:
@@ -52,7 +52,7 @@ def _refuse_place(flag: str, typed: list[str], count: int) -> NoReturn:
 
     ends = [n for n, word in enumerate(typed) if word.startswith("--")]
     quoted = " ".join([flag, *typed[: min([count, *ends])]])
-    raise TaskError(f"{quoted}: expected {PLACES[flag]}")
+    raise TaskError(f"{quoted}: expected {EXPECTED[flag]}")
 
 
 def _refuse_two_headings(words: list[str], numbers: list[str]) -> None:

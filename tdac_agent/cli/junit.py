@@ -1,0 +1,60 @@
+"""Reports as JUnit XML files, for the pages of a continuous integration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+from tdac_agent.errors import ControllerFileError
+from tdac_agent.storage.files import write_atomic
+
+if TYPE_CHECKING:
+    from tdac_agent.verification.diagnosis.report import Report
+    from tdac_agent.verification.episode_report import EpisodeReport
+
+
+def write_junit(report: Report, path: Path) -> None:
+    """Writes a JUnit XML file with a test case per expected test."""
+    messages = {failure.test: failure.message for failure in report.failures}
+    cases = {name: messages.get(name) for name in report.tests}
+    _write_cases(f"tdac {report.provenance.task}", cases, report.seconds, path)
+
+
+def write_set_junit(report: EpisodeReport, path: Path) -> None:
+    """Writes a JUnit XML file with a test case per test and per public world."""
+    split = report.provenance.split
+    failed = "; ".join(report.told) or "failed"
+    cases = {
+        f"static::{name}": failed if result == "failed" else None
+        for name, result in report.tests.items()
+    }
+    for each in report.episodes:
+        reason = each.text or each.cause or each.outcome
+        cases[f"{split}::world {each.index}"] = None if each.success else reason
+    if report.sequential is not None:
+        decision = report.sequential.decision
+        cases[f"{split}::decision"] = None if decision == "accepted" else decision
+    _write_cases(f"tdac {report.provenance.name}", cases, report.seconds, path)
+
+
+def _write_cases(
+    title: str, cases: dict[str, str | None], seconds: float, path: Path
+) -> None:
+    """Writes a JUnit XML file; a failed case has a message."""
+    suite = ElementTree.Element(
+        "testsuite",
+        name=title,
+        tests=str(len(cases)),
+        failures=str(sum(message is not None for message in cases.values())),
+        time=str(seconds),
+    )
+    for name, message in cases.items():
+        file, _, test = name.partition("::")
+        case = ElementTree.SubElement(suite, "testcase", classname=file, name=test)
+        if message is not None:
+            ElementTree.SubElement(case, "failure", message=message)
+    try:
+        write_atomic(path, ElementTree.tostring(suite, encoding="utf-8"))
+    except OSError as error:
+        raise ControllerFileError(f"cannot write {path}: {error.strerror}") from error

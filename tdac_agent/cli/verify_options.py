@@ -1,0 +1,99 @@
+"""Options of a verification, on a task or a task set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from tdac_agent.cli.options import (
+    CONTROLLER,
+    Profile,
+    json_option,
+    out_option,
+    profile_option,
+    seed_option,
+    suite_option,
+    tier_option,
+    trust_option,
+)
+from tdac_agent.cli.task_flags import SETS
+from tdac_agent.options import option
+
+ROBUST = "Robustness"
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyOptions:
+    """The further flags of `tdac verify`."""
+
+    controller: str = option(..., CONTROLLER, argument=True)
+    profile: Profile | None = profile_option()
+    paper: bool = option(
+        False, "Run only the nominal episode, as in the paper.", scope="task"
+    )
+    suite: Path | None = suite_option(scope="task")
+    trust: bool = trust_option(scope="task")
+    tier: str = tier_option()
+    seed: int | None = seed_option(scope="task")
+    junit: Path | None = option(None, "Write a JUnit XML report.", metavar="FILE")
+    out: Path | None = out_option(
+        "Folder for report.json (and robust.json; or set.json), the trajectories and a "
+        "picture of each failed episode."
+    )
+    as_json: bool = json_option()
+    split: str = option(
+        "test", "dev, test or hidden.", metavar="NAME", panel=SETS, scope="set"
+    )
+    worlds: int | None = option(
+        None,
+        "Drive on N worlds and print the scores, without a verdict.",
+        "-n",
+        "--worlds",
+        least=1,
+        panel=SETS,
+        scope="set",
+    )
+    salt_file: Path | None = option(
+        None,
+        "File with the salt of the hidden split, 16 bytes or more.",
+        metavar="FILE",
+        panel=SETS,
+        scope="set",
+    )
+    hidden_folder: Path | None = option(
+        None,
+        "For a set of real maps: a folder of held-out maps with an index.json; needs "
+        "--split hidden.",
+        metavar="DIR",
+        panel=SETS,
+        scope="set",
+    )
+    robust: int | None = option(
+        None,
+        "If the controller is verified, run N disturbed episodes and print their "
+        "success rate.",
+        least=1,
+        panel=ROBUST,
+        scope="task",
+    )
+    first_seed: int | None = option(
+        None,
+        "Seed of the first disturbed episode.  [default: as for --seed]",
+        least=0,
+        panel=ROBUST,
+        needs="--robust N",
+    )
+    accept_at: float | None = option(
+        None,
+        "Stop as soon as a sequential test decides between this success rate and one "
+        "lower by --margin; exit 0 only if it accepts this one.",
+        metavar="RATE",
+        panel=ROBUST,
+        needs="--robust N",
+    )
+    margin: float = option(
+        0.05,
+        "Difference between the two rates of --accept-at.",
+        panel=ROBUST,
+        needs="--accept-at RATE",
+    )
