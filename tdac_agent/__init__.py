@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from tdac_agent.runs.history import RunHistory, gather_run
     from tdac_agent.runs.ownership import load_task
     from tdac_agent.runs.run_record import Run, load_run
-    from tdac_agent.synthesis.loop import synthesize
+    from tdac_agent.synthesis.synthesize import synthesize
     from tdac_agent.tasks.disturbance import Disturbance
     from tdac_agent.tasks.task import Task
     from tdac_agent.verification.diagnosis.report import Report
@@ -49,7 +49,7 @@ _MODULE_OF = {
     "load_controller": "evaluation.policy",
     "load_run": "runs.run_record",
     "load_task": "runs.ownership",
-    "synthesize": "synthesis.loop",
+    "synthesize": "synthesis.synthesize",
     "verify": "verification.verify",
     "verify_on_set": "evaluation.set_verify",
     "verify_robust": "evaluation.robust",

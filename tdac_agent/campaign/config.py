@@ -11,14 +11,15 @@ from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.choice import OFFLINE, check_name
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.runs.run_record import Setting
-from tdac_agent.set_synthesis.synthesize import EPISODES, FEEDBACK_EPISODES
-from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.storage.shipped import shipped, shipped_names
 from tdac_agent.storage.yaml_file import read_yaml
+from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.workload import MOST_EPISODES
 
 SAME = "same"
 """Optimizer name for the learner itself."""
 Keep = Literal["all", "records"]
+_USUAL = SynthOptions()
 _VARIED = ("learners", "optimizers", "settings", "prompts")
 
 
@@ -58,10 +59,13 @@ class CampaignConfig(BaseModel):
         "may request: K·(J + 2).",
     )
     episodes: int = Field(
-        EPISODES, ge=2, le=MOST_EPISODES, description="As for --episodes, on sets."
+        _USUAL.episodes,
+        ge=2,
+        le=MOST_EPISODES,
+        description="As for --episodes, on sets.",
     )
     feedback_episodes: int = Field(
-        FEEDBACK_EPISODES,
+        _USUAL.feedback_episodes,
         ge=1,
         le=MOST_EPISODES,
         description="As for --feedback-episodes, on sets.",

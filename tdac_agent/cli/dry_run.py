@@ -15,8 +15,9 @@ from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
 from tdac_agent.prompting.prompt import generate_prompt, load_template
 from tdac_agent.prompting.rules import RepairRule, RuleBook
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
+from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.setup import checked_vision
-from tdac_agent.synthesis.workload import most_variations
+from tdac_agent.synthesis.workload import shares
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.task_file import Profile
 from tdac_envs.ladder.task_sets import TaskSet
@@ -80,7 +81,8 @@ def show(
     terms = dict(loop)
     improve = terms.pop("improve")
     checked_vision(loop["vision"], names[1], loop["patience"], improve)
-    varied = most_variations(improve, on_set=isinstance(setting, TaskSet))
+    episodes = SynthOptions().episodes if isinstance(setting, TaskSet) else None
+    varied = shares(episodes, improve).asked
     options = Options(setting, models["base_url"], models["key_over_http"])
     missing = [line for each in names for line in missing_for_name(each, options)]
     limits = ("base_url", "max_output", "max_cost", "max_tokens")

@@ -17,6 +17,7 @@ from tdac_agent.cli.run_view import show_run
 from tdac_agent.errors import ControllerFileError, Fault, RunError
 from tdac_agent.library.listing import next_folder
 from tdac_agent.models.ready import check_ready
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.resume import (
     check_own,
@@ -25,8 +26,8 @@ from tdac_agent.runs.resume import (
     resume_line,
 )
 from tdac_agent.runs.run_record import AGENT, Run, load_run
-from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.setup import checked_vision
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, Profile
 from tdac_agent.tasks.trust import allowed
@@ -66,7 +67,7 @@ def run(
     with console.status("preparing the task …"):
         task = allowed(flags.load().with_profile(profile), suite, trust=trust)
     folder = out if out is not None else next_folder(task.name)
-    wanted = {**wanted, "task": task, "out": folder, "start_from": source}
+    wanted = {**wanted, "problem": task, "out": folder, "start_from": source}
     return synthesise_and_show(wanted, console)
 
 
@@ -149,9 +150,9 @@ def synthesise_and_show(wanted: dict[str, Any], console: Console) -> int:
         console: Console to print to; if it is stderr, the run record goes to stdout as
             JSON.
     """
-    task, folder = wanted["task"], wanted["out"]
-    optimizer = wanted["optimizer"]
-    heading = _heading(task, wanted["learner"], optimizer)
+    task, folder = problem_of(wanted["problem"]).task, wanted["out"]
+    assert task is not None
+    heading = _heading(task, wanted["learner"], wanted["optimizer"])
     before = existing_run(folder)
     try:
         with Progress(console, heading) as progress:

@@ -23,10 +23,11 @@ from tdac_agent.errors import Fault
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.library.listing import next_folder
 from tdac_agent.models.choice import check_name
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.runs.improvement_record import NOT_SHOWN, is_shown
-from tdac_agent.runs.resume import check_own, existing_run
+from tdac_agent.runs.resume import check_own, existing_run, resume_arguments
 from tdac_agent.runs.run_record import Run
 from tdac_agent.runs.selection_record import (
     HIDDEN_FILE,
@@ -34,11 +35,10 @@ from tdac_agent.runs.selection_record import (
     Improvement,
     Selection,
 )
-from tdac_agent.set_synthesis.resume import resume_set_arguments
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_envs.core.intake import RECORD_BYTES, read_file
-from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.ladder.task_sets import load_set
 
 FINAL = frozenset({"validation", "comparison"})
 """Purposes of worlds whose results are printed."""
@@ -102,7 +102,7 @@ def run(
 
     Args:
         flags: Flags that concern task sets.
-        wanted: Further arguments of `synthesize_on_set`.
+        wanted: Further arguments of `synthesize`.
         out: Run folder; the next free one by default.
         start_from: Controller to begin with.
         as_json: Whether to print the run record as JSON.
@@ -113,7 +113,7 @@ def run(
     tasks = load_set(flags.name)
     source = None if start_from is None else read_text(start_from)
     folder = out if out is not None else next_folder(tasks.name)
-    own = {"tasks": tasks, "out": folder, "start_from": source}
+    own = {"problem": tasks, "out": folder, "start_from": source}
     return _write({**wanted, **flags.settings(), **own}, Console(stderr=as_json))
 
 
@@ -135,7 +135,7 @@ def resume(
         check_own(before)
         return _show(before, console, before=before)
     check_ready_again(before, given)
-    wanted = resume_set_arguments(before, given, trust=trust)
+    wanted = resume_arguments(before.folder, given, trust=trust)
     return _write({**wanted, "then_verify": then_verify}, console)
 
 
@@ -164,7 +164,7 @@ def _write(wanted: dict[str, Any], console: Console) -> int:
     before = existing_run(folder)
     try:
         with SetProgress(console, _heading(wanted)) as progress:
-            result = synthesize_on_set(**wanted, on_event=progress)
+            result = synthesize(**wanted, on_event=progress)
     except (KeyboardInterrupt, Fault, OSError):
         console.print(_so_far(folder), soft_wrap=True)
         raise
@@ -180,7 +180,8 @@ def _so_far(folder: Path) -> str:
 
 
 def _heading(wanted: dict[str, Any]) -> str:
-    tasks: TaskSet = wanted["tasks"]
+    tasks = problem_of(wanted["problem"]).tasks
+    assert tasks is not None
     learner, optimizer = wanted["learner"], wanted["optimizer"]
     model = " (no language model)" if learner == "builtin" else ""
     if optimizer not in (None, learner):

@@ -40,7 +40,7 @@ class SynthSetFlags:
             raise TaskError(f"--set brings its own tasks; leave out {words[0]}")
 
     def settings(self) -> dict[str, object]:
-        """Arguments of `synthesize_on_set` that were given, by name."""
+        """Arguments of `synthesize` that were given, by name."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {
             name: value for name, value in values.items() if value and name != "name"

@@ -18,7 +18,7 @@ from tdac_agent.episodes.sb3_file import (
 )
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.controller_file import check_controller
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file

@@ -14,11 +14,9 @@ from tdac_agent.prompting.prompt import VARIANTS
 from tdac_agent.runs.run_record import PROMPT_FILE, Run, load_run
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import Task, read_task
-from tdac_agent.tasks.task_file import TaskFile
+from tdac_agent.tasks.task_file import OWN_SUITE, TaskFile
 from tdac_agent.tasks.trust import Wish, asking, file_sha256, suite_wish, tree_sha256
 
-OWN_SUITE = "suite"
-"""Subfolder of a run with the tests of its task."""
 OURS = "builtin"
 """The learner that needs no permission."""
 

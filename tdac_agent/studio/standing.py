@@ -9,11 +9,11 @@ from typing import Any
 from tdac_agent.evaluation.kept_sets import ROWS_FILE, UNFINISHED
 from tdac_agent.html_report.names import candidate_name
 from tdac_agent.library.listing import variations_text
-from tdac_agent.runs.ownership import OWN_SUITE, is_own_folder, wishes_of
+from tdac_agent.runs.ownership import is_own_folder, wishes_of
 from tdac_agent.runs.run_record import JOURNAL, Run, at_work, load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.studio.folder import lines_in
-from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
+from tdac_agent.tasks.task_file import OWN_SUITE, SET_FILE, TASK_FILE
 from tdac_envs.core.errors import TdacError
 
 COUNTED = "feedback", "validation", "improve"

@@ -1,26 +1,26 @@
-"""Drives verified candidates in disturbed episodes, and counts these."""
+"""Disturbed episodes of candidates for a task, and their record."""
 
 from __future__ import annotations
 
 import hashlib
 import tempfile
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Callable
 from pathlib import Path
 
 from pydantic import ConfigDict, Field, ValidationError
 
 from tdac_agent.prompting.feedback import cut
 from tdac_agent.runs.improvement_record import goals_text
-from tdac_agent.runs.recorder import Recorder
+from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
-from tdac_agent.synthesis.archive import Candidate
-from tdac_agent.synthesis.candidates import Tests
-from tdac_agent.synthesis.workload import Shares
+from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.provenance import sha256_of, versions
+from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.seeded import ScoredEpisode
+from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.seeded_run import controller_job, run_seeds
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
@@ -30,7 +30,6 @@ FIRST_SEED = 2**33
 """Greater than the seeds that `tdac verify --robust` chooses by default."""
 SEEDS = 2**32
 """Number of seeds for each purpose."""
-MOST_EPISODES = 100_000
 MOST_TOLD = 3
 """Failures whose diagnosis is told."""
 EPISODES_FILE = "disturbed.json"
@@ -41,6 +40,14 @@ FAILURES = "failures"
 def named(number: int) -> str:
     """Name of an episode in texts and pictures, by its number from 1."""
     return f"disturbed episode {number}"
+
+
+def seeds_for(run: Run, purpose: str, count: int) -> range:
+    """The seeds of the episodes of a run for a purpose."""
+    digest = hashlib.sha256(f"disturbed|{run.seed}|{run.index}".encode()).digest()
+    first = int.from_bytes(digest[:8], "big") % (SEEDS - MOST_EPISODES)
+    first += FIRST_SEED + PURPOSES.index(purpose) * SEEDS
+    return range(first, first + count)
 
 
 class DisturbedEpisodes(PrintableRecord):
@@ -78,135 +85,85 @@ class DisturbedEpisodes(PrintableRecord):
         return goals_text(self.reached, len(self.episodes))
 
     @property
-    def failed(self) -> dict[str, int]:
-        """Number of failures by cause."""
-        failed = (each for each in self.episodes if not each.success)
-        causes = Counter(str(each.cause or each.outcome) for each in failed)
-        return dict(causes.most_common())
-
-    @property
     def feedback(self) -> str | None:
         """Causes of failures, and diagnoses of some; None without a failure."""
-        causes = [f"{count} {cause}" for cause, count in self.failed.items()]
+        failed = (each for each in self.episodes if not each.success)
+        causes = Counter(str(each.cause or each.outcome) for each in failed)
         if not causes:
             return None
+        counts = ", ".join(f"{count} {cause}" for cause, count in causes.most_common())
         texts = [
             each.diagnosis.text.replace(f"seed {each.seed}", named(number), 1)
             for number, each in enumerate(self.episodes, 1)
             if each.diagnosis
         ]
-        parts = [f"{self.told[0].upper()}{self.told[1:]}; {', '.join(causes)}."]
+        parts = [f"{self.told[0].upper()}{self.told[1:]}; {counts}."]
         parts += [f"{n}. {cut(text)}" for n, text in enumerate(texts[:MOST_TOLD], 1)]
         return "\n\n".join(parts)
 
 
-@dataclass(slots=True)
-class DisturbedTrials:
-    """Drives candidates; all of them have the same seeds.
+def drive_disturbed(
+    source: bytes,
+    task: Task,
+    seeds: range,
+    out: Path,
+    *,
+    judge: WarmJudge,
+    tier: str,
+    watch: Callable[[int, int], None],
+) -> DisturbedEpisodes:
+    """Drives disturbed episodes, and keeps them in a folder.
 
-    Attributes:
-        recorder: Records the run.
-        tests: The task, the judge and the sandbox tier.
-        shares: How the episodes are divided.
-        used: Number of episodes that were driven.
+    Args:
+        source: Source of the controller.
+        task: The task.
+        seeds: A seed for each episode.
+        out: The folder.
+        judge: A warm judge.
+        tier: Sandbox tier.
+        watch: Called repeatedly with the numbers of episodes and successes so far.
     """
-
-    recorder: Recorder
-    tests: Tests
-    shares: Shares
-    used: int = 0
-
-    @property
-    def can_explore(self) -> bool:
-        """Whether there are episodes for another variation."""
-        return self.used + self.shares.block <= self.shares.explore
-
-    def explore(self, candidate: Candidate) -> DisturbedEpisodes:
-        """Drives the episodes for variations."""
-        return self._drive(candidate, "improve", self.shares.block)
-
-    def compare(self, candidate: Candidate) -> DisturbedEpisodes:
-        """Drives the episodes of the comparison at the end, which decide nothing."""
-        return self._drive(candidate, "comparison", self.shares.comparison)
-
-    def first_seed(self, purpose: str) -> int:
-        """Seed of the first episode for a purpose; the others count up from it."""
-        run = self.recorder.run
-        digest = hashlib.sha256(f"disturbed|{run.seed}|{run.index}".encode()).digest()
-        first = int.from_bytes(digest[:8], "big") % (SEEDS - MOST_EPISODES)
-        return FIRST_SEED + PURPOSES.index(purpose) * SEEDS + first
-
-    def _drive(
-        self, candidate: Candidate, purpose: str, count: int
-    ) -> DisturbedEpisodes:
-        """Drives episodes; those on record are reused."""
-        about = {"k": candidate.k, "j": candidate.j, "what": purpose, "episodes": count}
-        self.recorder.event("drive.start", **about)
-        out, first = candidate.folder / purpose, self.first_seed(purpose)
-        # The record of another installation's run is not trusted.
-        found = None
-        if self.recorder.run.mark:
-            found = self._kept(out, candidate, first, count)
-        if found is None:
-            found = self._driven(candidate, out, range(first, first + count), about)
-        self.used += count
-        self.recorder.event("drive.end", **about, reached=found.reached)
-        return found
-
-    def _driven(
-        self, candidate: Candidate, out: Path, seeds: range, about: dict[str, object]
-    ) -> DisturbedEpisodes:
-        task = self.tests.task
-        source = candidate.source.encode("utf-8", "surrogatepass")
-        out.mkdir(exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix="tdac-improve-") as name:
-            job = controller_job(
-                Path(name),
-                source,
-                task,
-                Disturbance(),
-                seeds,
-                tier=self.tests.tier,
-                failures=(out / FAILURES).resolve(),
-            )
-            ended, ending = run_seeds(
-                job,
-                task.nominal,
-                ScoredEpisode,
-                self.tests.judge,
-                lambda done, reached: self.recorder.tell(
-                    {"event": "drive.step", **about, "done": done, "reached": reached}
-                ),
-            )
-        found = DisturbedEpisodes(
-            task_sha256=task.sha256(),
-            controller_sha256=sha256_of(source),
-            disturbance=job.disturbance,
-            first_seed=seeds.start,
-            sandbox=ending.tier,
-            versions=dict(versions()),
-            episodes=tuple(ended),
+    out.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="tdac-improve-") as name:
+        job = controller_job(
+            Path(name),
+            source,
+            task,
+            Disturbance(),
+            seeds,
+            tier=tier,
+            failures=(out / FAILURES).resolve(),
         )
-        write_atomic(out / EPISODES_FILE, found.model_dump_json(indent=2) + "\n")
-        return found
+        ended, ending = run_seeds(job, task.nominal, ScoredEpisode, judge, watch)
+    found = DisturbedEpisodes(
+        task_sha256=task.sha256(),
+        controller_sha256=sha256_of(source),
+        disturbance=job.disturbance,
+        first_seed=seeds.start,
+        sandbox=ending.tier,
+        versions=dict(versions()),
+        episodes=tuple(ended),
+    )
+    write_atomic(out / EPISODES_FILE, found.model_dump_json(indent=2) + "\n")
+    return found
 
-    def _kept(
-        self, out: Path, candidate: Candidate, first: int, count: int
-    ) -> DisturbedEpisodes | None:
-        """The episodes in a folder if they are complete and of this candidate."""
-        try:
-            content = parse_json(read_file(out / EPISODES_FILE, RECORD_BYTES))
-            found = DisturbedEpisodes.model_validate(content)
-        except (OSError, ValueError, ValidationError):
-            return None
-        source = candidate.source.encode("utf-8", "surrogatepass")
-        wanted = {
-            "task_sha256": self.tests.task.sha256(),
-            "controller_sha256": sha256_of(source),
-            "disturbance": Disturbance(),
-            "first_seed": first,
-            "versions": dict(versions()),
-        }
-        same = all(getattr(found, name) == value for name, value in wanted.items())
-        seeds = [each.seed for each in found.episodes]
-        return found if same and seeds == list(range(first, first + count)) else None
+
+def kept_disturbed(
+    folder: Path, source: bytes, task: Task, seeds: range
+) -> DisturbedEpisodes | None:
+    """The episodes in a folder if they are complete, and of this controller."""
+    try:
+        content = parse_json(read_file(folder / EPISODES_FILE, RECORD_BYTES))
+        found = DisturbedEpisodes.model_validate(content)
+    except (OSError, ValueError, ValidationError):
+        return None
+    wanted = {
+        "task_sha256": task.sha256(),
+        "controller_sha256": sha256_of(source),
+        "disturbance": Disturbance(),
+        "first_seed": seeds.start,
+        "versions": dict(versions()),
+    }
+    same = all(getattr(found, name) == value for name, value in wanted.items())
+    own = [each.seed for each in found.episodes]
+    return found if same and own == list(seeds) else None

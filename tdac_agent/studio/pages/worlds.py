@@ -14,8 +14,6 @@ from nicegui import ui
 from tdac_agent.bench.rivals import rival_names
 from tdac_agent.evaluation.set_play import SHOWN
 from tdac_agent.html_report.scene import data_address
-from tdac_agent.set_synthesis.synthesize import EPISODES
-from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.studio.driving import Drive
 from tdac_agent.studio.folder import FILES, STATE, as_word, keep, made_within
 from tdac_agent.studio.jobs import free_folder, start
@@ -27,6 +25,8 @@ from tdac_agent.studio.pages.layout import (
     shown_first,
 )
 from tdac_agent.studio.pages.writers import Writers
+from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_envs.core.errors import TdacError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.ladder.picture import draw_world
@@ -230,7 +230,7 @@ class Looking:
 
             writers = Writers(self._place, changed)
             episodes = ui.number(
-                "episodes at most", value=EPISODES, min=LEAST, max=MOST_EPISODES,
+                "episodes at most", value=SynthOptions().episodes, min=LEAST, max=MOST_EPISODES,
                 precision=0, on_change=changed,
             ).classes("w-40")  # fmt: skip
             command = ShownCommand()

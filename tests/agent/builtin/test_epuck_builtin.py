@@ -29,7 +29,7 @@ from tdac_agent.models.provider import Request
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.prompting.rule_answer import MAX_OPERATIONS, apply, parse_operations
 from tdac_agent.prompting.rules import RuleBook
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.diagnosis.report import Diagnosis, Failure, Report
 from tdac_agent.verification.suite import contract

@@ -21,7 +21,7 @@ from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.locks import LOCK_FILE, hold
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 

@@ -23,7 +23,7 @@ from tdac_agent.prompting.prompt import generate_prompt
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.synthesis.dialogue import Dialogue
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.side_by_side import side_by_side
 from tdac_agent.synthesis.workload import whole
 from tdac_envs import load_set

@@ -21,7 +21,7 @@ from tdac_agent.prompting.given_rules import (
 from tdac_agent.prompting.prompt import PromptError
 from tdac_agent.prompting.rules import MAX_RULE_TOKENS, RuleBook
 from tdac_agent.runs.run_record import load_rules, load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 LEARNT = [

@@ -21,7 +21,7 @@ from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.disturbed import DisturbedEpisodes
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import (
     LEAST_IMPROVE,
     most_variations,

@@ -11,7 +11,7 @@ from small import write_small_task
 from tdac_agent import load_task
 from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
 from tdac_agent.runs.run_record import Attempt, Run, load_rules, load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 PROGRAM = Path(__file__).parents[1] / "scripted_model.py"
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"

@@ -17,7 +17,7 @@ from tdac_agent.errors import Fault, ProviderError, RunError
 from tdac_agent.models.provider import PermanentFault, ProviderFault, Reply
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.verify import verify
 
 AT_ONCE = RetryPolicy(first_wait=0.0)

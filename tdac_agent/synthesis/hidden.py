@@ -9,47 +9,39 @@ from pydantic import ValidationError
 from tdac_agent.evaluation.salt import SEALED, drawn_salt
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
-from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.provenance import sha256_of
-from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.terms import Terms
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet
 
 
-def verify_hidden(
-    tasks: TaskSet, recorder: Recorder, source: str, judge: WarmJudge, tier: str
-) -> SetReport:
+def hidden_report(tasks: TaskSet, candidate: Candidate, terms: Terms) -> SetReport:
     """The verdict of a sequential test on hidden worlds; the recorded one, if any.
 
     The controller and the set are on record before the salt is drawn.
 
     Args:
         tasks: The task set.
-        recorder: Records the run.
-        source: Source of the selected controller.
-        judge: A warm judge.
-        tier: Sandbox tier.
+        candidate: The selected candidate.
+        terms: What the trials share.
     """
-    folder, raw = recorder.run.folder, source.encode("utf-8", "surrogatepass")
-    about = {"controller_sha256": sha256_of(raw), "set_sha256": tasks.sha256}
+    recorder, folder = terms.recorder, terms.folder
+    about = {"controller_sha256": candidate.sha256, "set_sha256": tasks.sha256}
     recorder.event("hidden.start", **about)
-    report = _recorded(folder / HIDDEN_FILE, about) if recorder.run.mark else None
+    report = _recorded(folder / HIDDEN_FILE, about) if terms.trusts_record else None
     if report is None:
         report = verify_on_set(
-            raw,
+            candidate.raw,
             tasks,
             "hidden",
             # A salt in a folder from elsewhere may be known.
-            salt_file=drawn_salt(folder / SEALED, reuse=bool(recorder.run.mark)),
+            salt_file=drawn_salt(folder / SEALED, reuse=terms.trusts_record),
             lineage=recorder.run.id,
-            tier=tier,
-            judge=judge,
-            watch=lambda done, reached: recorder.tell(
-                {"event": "drive.step", "what": "hidden", "done": done}
-                | {"reached": reached}
-            ),
+            tier=terms.tier,
+            judge=terms.judge,
+            watch=terms.watch(what="hidden"),
         )
         write_atomic(folder / HIDDEN_FILE, report.model_dump_json(indent=2) + "\n")
     recorder.event("hidden.end", passed=report.passed, worlds=report.worlds, **about)

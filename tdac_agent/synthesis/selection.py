@@ -5,14 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from tdac_agent.evaluation.set_report import scores_of
-from tdac_agent.runs.selection_record import Scores
-from tdac_agent.set_synthesis.trials import Candidate
-
-
-def scores_of_selected(candidate: Candidate) -> Scores | None:
-    """The scores of a candidate on validation worlds; None without any."""
-    return scores_of(candidate.validation) if candidate.validation else None
+from tdac_agent.synthesis.candidates import Candidate
 
 
 def select(

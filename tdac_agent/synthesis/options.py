@@ -1,0 +1,160 @@
+"""The options of a synthesis: flags of `tdac synth`, and keywords of `synthesize`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tdac_agent.options import option
+
+if TYPE_CHECKING:
+    from tdac_agent.models.provider import Provider
+    from tdac_agent.prompting.rules import RuleBook
+
+MODELS, BUDGET, SETS = "Models", "Budget", "Task set"
+"""Headings of the help."""
+
+
+@dataclass(frozen=True, slots=True)
+class SynthOptions:
+    """How a controller is written; see `tdac synth --help`.
+
+    `learner` and `optimizer` may also be providers, `rules` a rule book, and
+    `start_from` the source of a controller.
+    """
+
+    iterations: int = option(20, "Maximum iterations.", "-K", "--iterations", least=1)
+    patience: int = option(
+        1, "Maximum edits per iteration.", "-J", "--patience", least=0
+    )
+    candidates: int = option(
+        1,
+        "Number of new controllers to request at the same time; the best one is "
+        "repaired. Each counts as an iteration.",
+        *("-N", "--candidates"),
+        least=1,
+    )
+    improve: int = option(
+        0,
+        "After a success, try variations of the controllers that work, in N further "
+        "simulated episodes (disturbed ones on a task), and deliver the best; 0 for "
+        "none, otherwise at least 32.",
+        least=0,
+    )
+    start_from: str | Path | None = option(
+        None, "Controller to begin with.", "--from", metavar="FILE", type=Path
+    )
+    prompt: str = option(
+        "full",
+        "Prompt template: `full`, `underspecified`, or a file.",
+        metavar="NAME",
+    )
+    refine: bool = option(
+        True,
+        "Turn failures into rules in the prompt, or keep the prompt as it is.",
+        "--refine/--no-refine",
+    )
+    rules: Path | RuleBook | None = option(
+        None,
+        "Rules for the prompt: of earlier runs (`tdac rules export`), or your own.",
+        metavar="FILE",
+        type=Path,
+    )
+    vision: bool = option(
+        False, "Show the optimizer a picture of the failure that it is to repair."
+    )
+    seed: int | None = option(
+        None,
+        "Seed of the jittered starts, or of the choice of worlds on a task set.  "
+        "[default: derived from a secret of this installation]",
+        least=0,
+    )
+    tier: str = option(
+        "auto", "Sandbox tier; `tdac doctor` lists them.", metavar="NAME"
+    )
+    learner: str | Provider = option(
+        "builtin",
+        "Model that writes controllers: `builtin` (a template, no language model), "
+        "`anthropic:MODEL`, `openai:MODEL`, `command:PROGRAM`, `manual:DIR`, "
+        "`replay:RUN` or `scripted:SCRIPT`.",
+        metavar="MODEL",
+        panel=MODELS,
+        type=str,
+    )
+    optimizer: str | Provider | None = option(
+        None,
+        "Model that repairs failed controllers and writes rules.  [default: the "
+        "learner]",
+        metavar="MODEL",
+        panel=MODELS,
+        type=str,
+    )
+    base_url: str | None = option(
+        None,
+        "Server of the `openai:` or `anthropic:` models (vLLM, Ollama, LM Studio, …), "
+        "for example http://localhost:8000/v1.",
+        metavar="URL",
+        panel=MODELS,
+    )
+    key_over_http: bool = option(
+        False,
+        "Allow sending an API key unencrypted to a server on another machine.",
+        panel=MODELS,
+    )
+    max_output: int = option(
+        16_000,
+        "Token limit of an answer, thinking included; doubled after an answer that "
+        "was cut off.",
+        least=1,
+        panel=MODELS,
+    )
+    max_cost: float | None = option(
+        None,
+        "Cost limit of the whole run; the worst case of each question is reserved "
+        "before it is asked.  [default: 2]",
+        least=0,
+        metavar="USD",
+        panel=BUDGET,
+    )
+    max_tokens: int | None = option(
+        None,
+        "Token limit of the whole run, input plus output.  [default: none; 1000000 "
+        "for a server with unknown prices]",
+        least=0,
+        panel=BUDGET,
+    )
+    episodes: int = option(
+        128,
+        "Maximum number of simulated episodes of all candidates together: half for "
+        "feedback, half for the selection.",
+        least=2,
+        panel=SETS,
+    )
+    feedback_episodes: int = option(
+        8,
+        "Maximum number of episodes in each test of a candidate.",
+        least=1,
+        panel=SETS,
+    )
+    then_verify: bool = option(
+        False,
+        "Drive the selected controller, once, on hidden worlds drawn with a new salt; "
+        "exit 0 only if a sequential test accepts it.",
+        panel=SETS,
+    )
+
+    def changed(self, **values: Any) -> SynthOptions:
+        """The same with other values.
+
+        Raises:
+            TypeError: There is no such option.
+        """
+        known = {each.name for each in fields(self)}
+        unknown = [name for name in values if name not in known]
+        if unknown:
+            raise TypeError(
+                f"synthesize has no option {unknown[0]!r}; the options are "
+                f"{', '.join(sorted(known))}"
+            )
+        return replace(self, **values)
