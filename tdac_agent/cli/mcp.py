@@ -19,7 +19,7 @@ from tdac_envs.core.extras import install_command
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 if TYPE_CHECKING:
-    from tdac_agent.mcp.desk import Desk
+    from tdac_agent.mcp.session import Session
 
 DEFAULT = "maze"
 
@@ -46,26 +46,26 @@ def run(
     if port is not None and not http:
         raise TaskError("--port needs --http")
     from tdac_agent.mcp.gate import given_token
-    from tdac_agent.mcp.opening import EPISODES, begun, open_desk
+    from tdac_agent.mcp.opening import EPISODES, begun, open_session
     from tdac_agent.mcp.serve import serve_stdio
 
     known = None
     if out is not None and task is None and set_name is None:
         known = begun(out)
-    about = known.about if known else _named(task, set_name)
+    about = known.problem if known else _named(task, set_name)
     most = episodes or (known.episodes if known else EPISODES)
     folder = out if out is not None else next_folder(about.name)
     agent: Agent = "over HTTP" if http else "unconfined"
     token = given_token() if http else None
     try:
-        with open_desk(about, folder, most, agent) as desk:
+        with open_session(about, folder, most, agent) as session:
             try:
                 if http:
-                    _serve_http(desk, port or 0, token)
+                    _serve_http(session, port or 0, token)
                 else:
-                    serve_stdio(desk)
+                    serve_stdio(session)
             finally:
-                if out is None and not desk.submissions:
+                if out is None and not session.submissions:
                     shutil.rmtree(folder)
     except KeyboardInterrupt:
         if http:
@@ -82,7 +82,7 @@ def _named(task: str | None, set_name: str | None) -> Task | TaskSet:
     return allowed(load_task(task or DEFAULT), None, trust=False)
 
 
-def _serve_http(desk: Desk, port: int, token: str | None) -> None:
+def _serve_http(session: Session, port: int, token: str | None) -> None:
     """Serves over HTTP; prints the address, and on stderr a token that was drawn."""
     from tdac_agent.loopback import listen
     from tdac_agent.mcp.gate import drawn_token
@@ -100,4 +100,4 @@ def _serve_http(desk: Desk, port: int, token: str | None) -> None:
     except OSError as error:
         raise TaskError(f"--port {port}: {error.strerror}; give another one") from error
     with opened:
-        serve_http(desk, opened, secret, announce)
+        serve_http(session, opened, secret, announce)

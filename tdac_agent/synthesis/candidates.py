@@ -9,6 +9,7 @@ from statistics import fmean
 
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.prompting.feedback import Feedback
+from tdac_agent.runs.run_record import Attempt
 from tdac_agent.tasks.provenance import sha256_of
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.diagnosis.report import Report
@@ -46,6 +47,21 @@ class Result:
     def works(self) -> bool:
         """Whether it is good for something."""
         return self.rank[0] > 0.0
+
+    def attempt(
+        self, k: int, j: int, notes: tuple[str, ...], *, new: bool = True
+    ) -> Attempt:
+        """The record of an answer with this result; `new` is whether its code is."""
+        return Attempt(
+            k=k,
+            j=j,
+            valid=True,
+            passed=self.passed,
+            failed_tests=self.failed,
+            seed=self.seed,
+            notes=notes,
+            unchanged=not new,
+        )
 
 
 @dataclass(frozen=True, slots=True)

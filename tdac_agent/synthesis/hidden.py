@@ -30,7 +30,7 @@ def hidden_report(tasks: TaskSet, candidate: Candidate, terms: Terms) -> SetRepo
     recorder, folder = terms.recorder, terms.folder
     about = {"controller_sha256": candidate.sha256, "set_sha256": tasks.sha256}
     recorder.event("hidden.start", **about)
-    report = _recorded(folder / HIDDEN_FILE, about) if terms.trusts_record else None
+    report = _recorded(folder, about) if terms.trusts_record else None
     if report is None:
         report = verify_on_set(
             candidate.raw,
@@ -48,9 +48,20 @@ def hidden_report(tasks: TaskSet, candidate: Candidate, terms: Terms) -> SetRepo
     return report
 
 
-def _recorded(path: Path, about: dict[str, str]) -> SetReport | None:
+def read_hidden_report(folder: Path) -> SetReport:
+    """The verdict in a run folder.
+
+    Raises:
+        OSError: There is none.
+        ValueError: It is damaged.
+    """
+    content = parse_json(read_file(folder / HIDDEN_FILE, RECORD_BYTES))
+    return SetReport.model_validate(content)
+
+
+def _recorded(folder: Path, about: dict[str, str]) -> SetReport | None:
     try:
-        report = SetReport.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+        report = read_hidden_report(folder)
     except (OSError, ValueError, ValidationError):
         return None
     known = report.provenance

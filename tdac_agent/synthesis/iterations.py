@@ -102,7 +102,8 @@ class Iterations:
         if self._is_last(at.candidate):
             return f"{self._dialogue.learner.name} has one controller"
         result = self._trials.result(at.candidate)
-        if result.passed or result.failure is None or not self._trials.can_test:
+        spent = self._trials.tests_left == 0
+        if result.passed or result.failure is None or spent:
             return self._trials.ended
         return None
 
@@ -176,18 +177,9 @@ class Iterations:
         """Records the result of an answer."""
         candidate, result = answered.candidate, self._trials.result(answered.candidate)
         said = result.said if answered.new else same_as(candidate.k, candidate.j)
-        self._recorder.attempted(
-            Attempt(
-                k=answered.k,
-                j=answered.j,
-                valid=True,
-                passed=result.passed,
-                failed_tests=result.failed,
-                seed=result.seed,
-                notes=(*answered.notes, said) if said else answered.notes,
-                unchanged=not answered.new,
-            )
-        )
+        notes = (*answered.notes, said) if said else answered.notes
+        attempt = result.attempt(answered.k, answered.j, notes, new=answered.new)
+        self._recorder.attempted(attempt)
 
     def _see(self, answered: _Answered, parent: Candidate | None = None) -> None:
         """Notes the result of an answer for later questions."""

@@ -64,7 +64,7 @@ class SuiteTrials:
     status: Status = "verified"
     ended = ""
     needs_new_code = False
-    can_test = True
+    tests_left = None
     aim = (
         "Raise the number of goals that it reaches in disturbed episodes that nobody "
         "has seen yet, and then its mean time score. It must still pass all tests."

@@ -34,8 +34,8 @@ class Trials(Protocol):
     aim: str
 
     @property
-    def can_test(self) -> bool:
-        """Whether a further candidate can be tested."""
+    def tests_left(self) -> int | None:
+        """Episodes that are left for tests; None if tests take none of a budget."""
 
     def prove(self) -> None:
         """Checks the tests before an answer is paid for, once per run.

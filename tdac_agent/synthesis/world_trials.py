@@ -72,14 +72,9 @@ class WorldTrials:
         self.used = dict.fromkeys(PURPOSES, 0)
 
     @property
-    def feedback_left(self) -> int:
-        """Episodes that are left for tests."""
-        return self.terms.shares.feedback - self.used["feedback"]
-
-    @property
-    def can_test(self) -> bool:
+    def tests_left(self) -> int:
         """See `Trials`."""
-        return self.feedback_left > 0
+        return self.terms.shares.feedback - self.used["feedback"]
 
     def prove(self) -> None:
         """See `Trials`: there is no suite."""
@@ -91,17 +86,17 @@ class WorldTrials:
         """
         if not candidates:
             return
-        count = min(self.terms.block, max(1, self.feedback_left // len(candidates)))
+        count = min(self.terms.block, max(1, self.tests_left // len(candidates)))
         first = self.first_for("feedback") + self.used["feedback"]
         for candidate in candidates:
-            if self.feedback_left >= count:
+            if self.tests_left >= count:
                 out = FEEDBACK.format(len(candidate.feedback) + 1)
                 report = self._drive(candidate, "feedback", first, count, out)
                 candidate.feedback.append(report)
 
     def go_on(self, candidate: Candidate) -> None:
         """See `Trials`: it drives on the next worlds."""
-        while self.can_test and candidate.first_failure is None:
+        while self.tests_left and candidate.first_failure is None:
             self.test([candidate])
 
     def recall(self, candidate: Candidate) -> None:

@@ -34,6 +34,7 @@ from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
 
+EPISODES = SynthOptions().episodes
 LEAST = 2
 """Episodes of a run on a set: one for a test, one for the selection."""
 SECONDS = 0.05
@@ -230,7 +231,7 @@ class Looking:
 
             writers = Writers(self._place, changed)
             episodes = ui.number(
-                "episodes at most", value=SynthOptions().episodes, min=LEAST, max=MOST_EPISODES,
+                "episodes at most", value=EPISODES, min=LEAST, max=MOST_EPISODES,
                 precision=0, on_change=changed,
             ).classes("w-40")  # fmt: skip
             command = ShownCommand()

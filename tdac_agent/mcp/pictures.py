@@ -1,0 +1,120 @@
+"""Pictures of episodes of submissions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tdac_agent.environments.epuck import pictures as on_worlds
+from tdac_agent.environments.map2d import pictures as on_maps
+from tdac_agent.episodes.pictures import pictures_of
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.errors import RunError
+from tdac_agent.evaluation.kept_sets import TRAJECTORIES
+from tdac_agent.mcp.answers import Refused
+from tdac_agent.problems.problem import Problem
+from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.figures import contact_of, file_stem
+from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_envs.core.intake import IMAGE_BYTES, read_file
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.drawing.closeup import Event, run_picture
+from tdac_envs.ladder.task_sets import AnyTask, TaskSet
+from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.mapping.map_folder import png
+
+FEEDBACK = "feedback-1"
+"""Subfolder with the episodes of a submission for a task set."""
+MAX_FACT = 240
+
+
+def draw(problem: Problem, submission: Candidate, episode: str) -> bytes:
+    """A PNG of an episode.
+
+    Args:
+        problem: What the submission is for.
+        submission: The submission.
+        episode: Name of the episode, in the words of an agent.
+
+    Raises:
+        Refused: There is no such episode, or it is not shown.
+    """
+    if problem.task is not None:
+        return _of_task(problem.task, submission, episode)
+    assert problem.tasks is not None
+    return _of_world(problem.tasks, submission, episode)
+
+
+def _of_task(task: Task, submission: Candidate, episode: str) -> bytes:
+    report, name = submission.report, episode.strip().lower().replace("_", " ")
+    assert report is not None
+    driven = {each.name: each for each in report.episodes if each.outcome != "not run"}
+    known = [each.name for each in driven.values() if not each.held_out]
+    if name in driven and name not in known:
+        raise Refused(f"{name} is a held-out start: only whether it passed is told")
+    if name not in known:
+        raise _unknown(episode, known)
+    folder = submission.folder / "trajectories"
+    drawn = folder / f"{file_stem(name)}.png"
+    if drawn.is_file():  # of each failed episode
+        return read_file(drawn, IMAGE_BYTES)
+    trajectory = _trajectory(folder / f"{file_stem(name)}.npz", name)
+    pictures, movers = pictures_of(task.setting), trajectory.ghosts(trajectory.steps)
+    outcome = driven[name].outcome
+    return png(pictures.trajectories([trajectory.poses], [outcome], [name], movers))
+
+
+def _of_world(tasks: TaskSet, submission: Candidate, episode: str) -> bytes:
+    episodes = [each for report in submission.feedback for each in report.episodes]
+    known = {str(each.index): each for each in episodes}
+    figures = known.get(episode.strip().lower().removeprefix("world").strip())
+    if figures is None:
+        raise _unknown(episode, list(known))
+    place = submission.folder / FEEDBACK / TRAJECTORIES / f"{figures.index}.npz"
+    trajectory = _trajectory(place, f"world {figures.index}")
+    return png(_picture(tasks.task("dev", figures.index), trajectory, figures))
+
+
+def _trajectory(path: Path, name: str) -> Trajectory:
+    try:
+        return Trajectory.load(path)
+    except RunError as error:
+        raise Refused(f"there is no record of {name}") from error
+
+
+def _unknown(episode: str, known: list[str]) -> Refused:
+    if not known:
+        return Refused("there is no picture: no episode was driven")
+    names = ", ".join(known)
+    return Refused(f"there is no episode {episode[:80]!r}; expected one of {names}")
+
+
+def _picture(task: AnyTask, trajectory: Trajectory, figures: WorldEpisode) -> Image:
+    """The world with the robot's path; for a failure, also a close-up of its end."""
+    name = f"world {figures.index}"
+    if figures.success:
+        return _whole(task, trajectory, figures.outcome, name)
+    text = (figures.text or figures.error or "").replace("°", " deg")
+    title = f"{name}: {figures.cause or figures.outcome}"
+    fact = text.removeprefix(f"{title}: ").partition(". ")[0]
+    fact = fact.encode("ascii", "replace").decode()[:MAX_FACT]
+    event = Event(
+        title=title,
+        facts=(fact, f"ended in step {trajectory.steps}"),
+        where=np.asarray(trajectory.poses[-1:, :2]),
+        contact=contact_of(task, trajectory, figures.outcome),
+        movers=trajectory.ghosts(trajectory.steps),
+    )
+    if isinstance(task, Map2DTask):
+        return run_picture(on_maps.backdrop_of(task), trajectory.poses, event)
+    return run_picture(on_worlds.backdrop_of(task), trajectory.poses, event)
+
+
+def _whole(task: AnyTask, trajectory: Trajectory, outcome: str, name: str) -> Image:
+    poses, ended, names = [trajectory.poses], [outcome], [name]
+    if isinstance(task, Map2DTask):
+        movers = trajectory.ghosts(trajectory.steps)
+        return on_maps.trajectories_of(task, poses, ended, names, movers)
+    return on_worlds.trajectories_of(task, poses, ended, names)
