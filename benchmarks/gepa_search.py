@@ -57,7 +57,7 @@ from tdac_agent.metrics.paired import bootstrap
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import Run
 from tdac_agent.set_synthesis.improve import SetExplorer, finalists, founders
-from tdac_agent.set_synthesis.selection import select
+from tdac_agent.synthesis.selection import select
 from tdac_agent.set_synthesis.trials import (
     BLOCKS,
     PURPOSES,

@@ -20,7 +20,7 @@ from tdac_agent import load_task
 from tdac_agent.cli import export_harbor
 from tdac_agent.errors import RunError
 from tdac_agent.harbor.folder import export_set, export_task
-from tdac_agent.harbor.judge import main, exam_in
+from tdac_agent.harbor.judge import exam_in, main
 from tdac_agent.harbor.wheel import write_wheel
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import load_set

@@ -43,7 +43,7 @@ def serve(out):
 
     def run(about, conversation, episodes=128):
         with (
-            open_session(about, out, episodes, "unconfined") as desk,
+            open_session(about, out, episodes, "unconfined") as session,
             contextlib.closing(Counter(session)) as counter,
         ):
             return converse(counter.server(), conversation)

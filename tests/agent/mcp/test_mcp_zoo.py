@@ -69,7 +69,7 @@ def check(cases, task, seed, out):
     with (
         tempfile.TemporaryDirectory(prefix="zoo-") as name,
         Canaries(name) as around,
-        open_session(task, out, episodes, "unconfined") as desk,
+        open_session(task, out, episodes, "unconfined") as session,
         contextlib.closing(Counter(session)) as counter,
     ):
         # Weak controllers fail with the zoo's seed, not with each one.

@@ -24,8 +24,8 @@ from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.studio.standing import is_from_elsewhere
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.setup import hold_folder
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import lasting_secret
 from tdac_agent.tasks.task import display_name
 from tdac_agent.tasks.task_file import TaskFile

@@ -15,16 +15,19 @@ from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.history import gather_run
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.runs.selection_record import read_selection
-from tdac_agent.set_synthesis.improve import SetFigures, base_of, finalists
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
-from tdac_agent.set_synthesis.trials import Candidate
 from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.candidates import Candidate, Figures
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_envs.core.errors import TaskError
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 scores = st.floats(0.0, 1.0)
-figures = st.builds(SetFigures, scores, scores, scores, scores)
+names = ("time", "path", "success", "worst")
+figures = st.builds(
+    lambda *values: Figures(dict(zip(names, values, strict=True)), {"time": "time"}),
+    *[scores] * 4,
+)
 
 
 @st.composite
@@ -43,15 +46,15 @@ def test_the_front_is_what_nobody_beats(archive):
     front = archive.front()
     assert front
     for each in archive.members:
-        beaten = any(other.beats(each) for other in archive.members)
+        beaten = any(one.figures.beats(each.figures) for one in archive.members)
         assert beaten == (not any(each is one for one in front))
     assert archive.best().figures.time == max(m.figures.time for m in archive.members)
 
 
 @given(archives())
 def test_the_best_founder_is_a_finalist(archive):
-    chosen = finalists(archive)
-    assert any(base_of(archive) is each for each in chosen)
+    chosen = archive.finalists(4)
+    assert any(archive.base is each for each in chosen)
     assert len(chosen) <= 5
     assert [each.k for each in chosen] == sorted({each.k for each in chosen})
 
@@ -73,7 +76,7 @@ def write(few, tmp_path, warm):
     def run(model, **values):
         given = {"episodes": 4, "feedback_episodes": 2, "seed": 3, "judge": warm}
         given |= {"out": tmp_path / "run", "retry": AT_ONCE, "improve": 32, **values}
-        return synthesize_on_set(few, model, **given)
+        return synthesize(few, model, **given)
 
     return run
 
@@ -129,10 +132,10 @@ def test_the_built_in_learner_searches_the_same_way_twice(few, tmp_path, warm):
         if record["event"] == "drive.end" and record.get("k") == 22:
             raise Stop
 
-    one = synthesize_on_set(few, out=tmp_path / "a", judge=warm, **given)
+    one = synthesize(few, out=tmp_path / "a", judge=warm, **given)
     with pytest.raises(Stop):
-        synthesize_on_set(few, out=tmp_path / "b", judge=warm, on_event=stop, **given)
-    other = synthesize_on_set(few, out=tmp_path / "b", judge=warm, **given)
+        synthesize(few, out=tmp_path / "b", judge=warm, on_event=stop, **given)
+    other = synthesize(few, out=tmp_path / "b", judge=warm, **given)
     assert one.status == other.status == "selected"
     for name in ("controller.py", "report.json"):
         assert (tmp_path / "a" / name).read_bytes() == (
@@ -150,9 +153,7 @@ def test_the_built_in_learner_searches_the_same_way_twice(few, tmp_path, warm):
     assert one.attempts == other.attempts
     assert load_run(tmp_path / "b").improve == 32
     with pytest.raises(RunError, match="number of improving episodes 32 instead of 40"):
-        synthesize_on_set(
-            few, out=tmp_path / "b", judge=warm, **given | {"improve": 40}
-        )
+        synthesize(few, out=tmp_path / "b", judge=warm, **given | {"improve": 40})
 
 
 def test_too_few_episodes_are_refused(write):

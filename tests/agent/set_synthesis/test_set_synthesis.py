@@ -16,7 +16,7 @@ from tdac_agent.models.provider import PermanentFault
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.runs.selection_record import Selection
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
@@ -37,7 +37,7 @@ def write(few, out, warm):
         model = model or Script(*answers)
         given = {"episodes": 12, "feedback_episodes": 2, "seed": 3, "judge": warm}
         given |= {"out": out, "retry": AT_ONCE, "iterations": 3, **values}
-        return model, synthesize_on_set(few, model, **given)
+        return model, synthesize(few, model, **given)
 
     return run
 
@@ -91,9 +91,9 @@ def test_a_replay_asks_no_more_than_the_recorded_run(tmp_path, out, warm):
     horizon = {"factor": 1, "least": 20, "most": 20}
     short = load_set(write_set(tmp_path / "short.yaml", horizon=horizon))
     given = {"episodes": 8, "feedback_episodes": 2, "seed": 3, "judge": warm}
-    run = synthesize_on_set(short, "builtin", out=out, **given)
+    run = synthesize(short, "builtin", out=out, **given)
     assert (run.status, len(run.attempts)) == ("not verified", 1)
-    again = synthesize_on_set(short, f"replay:{out}", out=tmp_path / "again", **given)
+    again = synthesize(short, f"replay:{out}", out=tmp_path / "again", **given)
     assert (again.status, again.attempts) == (run.status, run.attempts)
 
 

@@ -5,7 +5,6 @@ import json
 import re
 import sys
 import threading
-from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -19,12 +18,11 @@ from tdac_agent.html_report.page import make_page
 from tdac_agent.metrics import frames_of
 from tdac_agent.models.provider import PermanentFault
 from tdac_agent.models.retry import RetryPolicy
-from tdac_agent.prompting.prompt import generate_prompt
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.synthesis.dialogue import Dialogue
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.side_by_side import side_by_side
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import whole
 from tdac_envs import load_set
 
@@ -184,7 +182,7 @@ def test_on_a_set_all_drive_on_the_same_worlds(tmp_path, warm):
         ("generate", 3, 0): code(STILL),
     }
     model = Table(answers, together=3)
-    run = synthesize_on_set(
+    run = synthesize(
         few,
         model,
         out=tmp_path / "run",
@@ -259,7 +257,7 @@ def test_threads_do_not_parse_at_the_same_time(task):
     sys.setswitchinterval(1e-6)
     try:
         for _ in range(5):
-            dialogue = Dialogue(partial(generate_prompt, task), model, model, Calls())
+            dialogue = Dialogue(problem_of(task), model, model, Calls())
             answers = dialogue.generate_all(range(1, 9))
             assert all(source == STILL * 100 for source, _ in answers)
     finally:

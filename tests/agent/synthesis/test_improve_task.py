@@ -22,11 +22,7 @@ from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.disturbed import DisturbedEpisodes
 from tdac_agent.synthesis.synthesize import synthesize
-from tdac_agent.synthesis.workload import (
-    LEAST_IMPROVE,
-    most_variations,
-    task_shares,
-)
+from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TaskError
 
@@ -88,12 +84,12 @@ def report_of(folder):
 @given(st.integers(LEAST_IMPROVE, 10_000))
 def test_the_shares_of_a_task_are_all_episodes(improve):
     """And there are at least some variations."""
-    parts = task_shares(improve)
+    parts = shares(None, improve)
     assert parts.explore + 2 * parts.comparison == improve
     assert parts.variations >= 4
     assert (parts.variations + 1) * parts.block <= parts.explore
-    assert most_variations(improve, on_set=False) == 2 * parts.variations
-    assert most_variations(0, on_set=False) == 0
+    assert parts.asked == 2 * parts.variations
+    assert shares(None).asked == 0
 
 
 @pytest.mark.slow
@@ -367,7 +363,7 @@ def test_the_command_improves_a_task(tdac, tmp_path, good_source):
     code_, out, err = tdac(*words, "--dry-run", "--json")
     assert (code_, err) == (0, "")
     told = json.loads(out)
-    assert told["variations"] == most_variations(32, on_set=False) == 10
+    assert told["variations"] == shares(None, 32).asked == 10
     assert told["questions"] == 20 * 3 + 10
     code_, out, err = tdac(*words, "--out", "run")
     assert (code_, err) == (0, "")
