@@ -117,8 +117,8 @@ def test_two_exports_have_different_worlds(unknown, tmp_path):
     other = export_set(load_set("unknown"), tmp_path / "other", 2)
     assert (other / "tests/salt").read_bytes() != (unknown / "tests/salt").read_bytes()
     hidden = [exam_in(each / "tests") for each in (unknown, other)]
-    assert {problem.split for problem in hidden} == {"hidden"}
-    assert hidden[0].tasks.sha256 == load_set("unknown").sha256
+    assert {exam.split for exam in hidden} == {"hidden"}
+    assert hidden[0].problem.sha256 == load_set("unknown").sha256
 
 
 @pytest.mark.slow
