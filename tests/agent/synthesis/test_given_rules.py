@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 from script import NO_RULES, STILL, Script, code
-from small import write_small_task
 
-from tdac_agent import load_task
 from tdac_agent.html_report import make_page
 from tdac_agent.models.provider import Reply
 from tdac_agent.models.retry import RetryPolicy
@@ -34,11 +32,6 @@ LEARNT = [
 def answer(rules):
     operations = [{"op": "add", "scope": s, "text": t} for s, t in rules]
     return Reply(f"```json\n{json.dumps(operations)}\n```")
-
-
-@pytest.fixture
-def task(tmp_path):
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
 
 
 @pytest.fixture

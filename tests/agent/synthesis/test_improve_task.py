@@ -11,17 +11,14 @@ from hypothesis import strategies as st
 from script import STILL, Script, code
 from small import write_small_task
 
-from tdac_agent import load_task
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.robust import verify_robust
 from tdac_agent.html_report.page import make_page
 from tdac_agent.library.listing import row_of, variations_text
 from tdac_agent.metrics import frames_of
-from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.disturbed import DisturbedEpisodes
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.errors import TaskError
@@ -58,21 +55,15 @@ ENOUGH_FOR_ONE = 40_000
 
 
 @pytest.fixture
-def task(tmp_path):
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
-
-
-@pytest.fixture
 def fragile(good_source):
     return good_source.replace("def policy(", "def drive(") + FRAGILE
 
 
 @pytest.fixture
-def write(task, tmp_path, warm):
+def improve(write, on_task):
     def run(model="builtin", **values):
-        given = {"out": tmp_path / "run", "judge": warm, "improve": 32, "seed": 3}
-        given["retry"] = RetryPolicy(first_wait=0.0)
-        return synthesize(task, model, iterations=6, **given | values)
+        given = {"improve": 32, "seed": 3, "iterations": 6} | values
+        return write(on_task, model=model, **given)[1]
 
     return run
 
@@ -94,12 +85,12 @@ def test_the_shares_of_a_task_are_all_episodes(improve):
 
 @pytest.mark.slow
 def test_a_more_robust_variation_is_asked_for_and_delivered(
-    write, fragile, good_source, tmp_path
+    improve, fragile, good_source, tmp_path
 ):
     """The model sees the parent, its figures, and what was tried with it."""
     answers = (fragile, STILL, fragile, good_source, STILL, STILL, STILL)
     model = Script(*map(code, answers))
-    run = write(model)
+    run = improve(model)
     out = tmp_path / "run"
     assert model.asked() == [
         ("generate", 1, 0),
@@ -176,10 +167,12 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
 
 
 @pytest.mark.slow
-def test_models_that_see_get_a_picture_of_a_failed_episode(write, fragile, good_source):
+def test_models_that_see_get_a_picture_of_a_failure(
+    improve, fragile, good_source
+):
     """None if all goals were reached."""
     model = Script(*map(code, (fragile, good_source, *[STILL] * 12)))
-    write(model, vision=True)
+    improve(model, vision=True)
     generated, first, *others = model.requests
     assert generated.images == ()
     (picture,) = first.images
@@ -193,7 +186,7 @@ def test_models_that_see_get_a_picture_of_a_failed_episode(write, fragile, good_
 
 @pytest.mark.slow
 def test_without_a_better_one_the_first_stays(
-    write, task, fragile, good_source, tmp_path, warm
+    improve, task, fragile, good_source, tmp_path, warm
 ):
     """It is delivered before the search begins, and has driven as in `--robust`."""
     model = Script(*map(code, (good_source, fragile, *[STILL] * 4)))
@@ -203,7 +196,7 @@ def test_without_a_better_one_the_first_stays(
         if record["event"] == "drive.start":
             seen.append((tmp_path / "run" / "controller.py").read_text())
 
-    run = write(model, on_event=watch)
+    run = improve(model, on_event=watch)
     assert set(seen) == {good_source}
     assert (run.folder / "controller.py").read_text() == good_source
     found = read_improvement(run.folder)
@@ -223,11 +216,11 @@ def test_without_a_better_one_the_first_stays(
 
 @pytest.mark.slow
 def test_all_verified_candidates_of_a_group_found_the_archive(
-    write, fragile, good_source
+    improve, fragile, good_source
 ):
     """The run is still compared with its first one."""
     answers = (fragile, good_source, fragile, *[STILL] * 4)
-    run = write(Script(*map(code, answers)), candidates=3)
+    run = improve(Script(*map(code, answers)), candidates=3)
     found = read_improvement(run.folder)
     assert [(each.k, each.parent) for each in found.members] == [(1, None), (2, None)]
     assert (found.first, found.selected, run.tau) == ((1, 0), (2, 0), 1)
@@ -235,11 +228,11 @@ def test_all_verified_candidates_of_a_group_found_the_archive(
 
 
 @pytest.mark.slow
-def test_the_end_of_the_budget_ends_the_search_alone(write, good_source):
+def test_the_end_of_the_budget_ends_the_search_alone(improve, good_source):
     """The verified controller stays verified."""
     model = Script(code(good_source))
     model.paid = True
-    run = write(model, max_tokens=ENOUGH_FOR_ONE)
+    run = improve(model, max_tokens=ENOUGH_FOR_ONE)
     assert (run.status, run.tau) == ("verified", 1)
     assert model.asked() == [("generate", 1, 0)]
     assert "tokens" in run.reason
@@ -249,7 +242,7 @@ def test_the_end_of_the_budget_ends_the_search_alone(write, good_source):
 
 
 @pytest.mark.slow
-def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
+def test_the_built_in_learner_varies_the_same_way_twice(improve, tmp_path):
     """With one seed, folders agree but for clocks: after a break, and as a replay."""
 
     class Stop(Exception):
@@ -259,14 +252,14 @@ def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
         if record["event"] == "drive.end" and record["k"] == 8:
             raise Stop
 
-    one = write(out=tmp_path / "a")
+    one = improve(out=tmp_path / "a")
     with pytest.raises(Stop):
-        write(out=tmp_path / "b", on_event=stop)
+        improve(out=tmp_path / "b", on_event=stop)
     broken = load_run(tmp_path / "b")
     assert (broken.status, broken.tau, broken.censored) == ("fault", 1, False)
     assert frames_of([broken]).runs["censored"].tolist() == [False]
-    other = write(out=tmp_path / "b")
-    again = write(f"replay:{tmp_path / 'a'}", out=tmp_path / "c")
+    other = improve(out=tmp_path / "b")
+    again = improve(f"replay:{tmp_path / 'a'}", out=tmp_path / "c")
     for run in (other, again):
         assert run.verified
         assert run.attempts == one.attempts
@@ -274,18 +267,18 @@ def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
         assert sources(run.folder) == sources(one.folder)
     assert len(sources(one.folder)) > 4
     with pytest.raises(RunError, match="number of improving episodes 32 instead of 40"):
-        write(out=tmp_path / "b", improve=40)
+        improve(out=tmp_path / "b", improve=40)
 
 
 @pytest.mark.slow
 def test_an_interrupted_search_leaves_a_verified_run(
-    write, good_source, tmp_path, tdac
+    improve, good_source, tmp_path, tdac
 ):
     """All places say so, and how to go on; also after a break in resuming it."""
     out = tmp_path / "run"
     model = Script(code(good_source), code(STILL), KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
-        write(model)
+        improve(model)
 
     def check():
         run = load_run(out)
@@ -309,9 +302,9 @@ def test_an_interrupted_search_leaves_a_verified_run(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write(Script(), on_event=interrupt)
+        improve(Script(), on_event=interrupt)
     check()
-    run = write(Script(*[code(STILL)] * 3))
+    run = improve(Script(*[code(STILL)] * 3))
     assert (run.status, len(run.attempts)) == ("verified", 5)
 
 
@@ -339,14 +332,14 @@ def sources(folder):
     }
 
 
-def test_too_few_episodes_on_a_task_are_refused(write):
+def test_too_few_episodes_on_a_task_are_refused(improve):
     with pytest.raises(TaskError, match="improve"):
-        write(improve=31)
+        improve(improve=31)
 
 
-def test_a_seed_is_drawn_for_a_search(write, good_source):
+def test_a_seed_is_drawn_for_a_search(improve, good_source):
     """So that its record says which episodes it drove."""
-    run = write(Script(code(good_source), *[code(good_source)] * 3), seed=None)
+    run = improve(Script(code(good_source), *[code(good_source)] * 3), seed=None)
     assert isinstance(run.seed, int)
     found = read_improvement(run.folder)
     assert found.first_seed > 2**33
