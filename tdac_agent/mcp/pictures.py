@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from tdac_agent.environments.epuck import pictures as on_worlds
 from tdac_agent.environments.map2d import pictures as on_maps
 from tdac_agent.episodes.pictures import pictures_of
@@ -13,21 +11,19 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.kept_sets import TRAJECTORIES
 from tdac_agent.mcp.answers import Refused
+from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.problems.problem import Problem
+from tdac_agent.runs.world_pictures import failure_pictures
 from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.figures import contact_of, file_stem
-from tdac_agent.verification.judge.set_job import WorldEpisode
+from tdac_agent.verification.diagnosis.figures import file_stem
 from tdac_envs.core.intake import IMAGE_BYTES, read_file
-from tdac_envs.drawing.canvas import Image
-from tdac_envs.drawing.closeup import Event, run_picture
-from tdac_envs.ladder.task_sets import AnyTask, TaskSet
+from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.mapping.map_folder import png
 
 FEEDBACK = "feedback-1"
 """Subfolder with the episodes of a submission for a task set."""
-MAX_FACT = 240
 
 
 def draw(problem: Problem, submission: Candidate, episode: str) -> bytes:
@@ -67,14 +63,24 @@ def _of_task(task: Task, submission: Candidate, episode: str) -> bytes:
 
 
 def _of_world(tasks: TaskSet, submission: Candidate, episode: str) -> bytes:
+    """A failure as models see it; a success with its whole path."""
     episodes = [each for report in submission.feedback for each in report.episodes]
     known = {str(each.index): each for each in episodes}
     figures = known.get(episode.strip().lower().removeprefix("world").strip())
     if figures is None:
         raise _unknown(episode, list(known))
-    place = submission.folder / FEEDBACK / TRAJECTORIES / f"{figures.index}.npz"
-    trajectory = _trajectory(place, f"world {figures.index}")
-    return png(_picture(tasks.task("dev", figures.index), trajectory, figures))
+    name, folder = f"world {figures.index}", submission.folder / FEEDBACK / TRAJECTORIES
+    failed = failure_pictures(tasks, [(name, figures)], folder, LARGEST_SIDE)
+    drawn = next((picture.png for _, picture in failed), None)
+    if drawn is not None:
+        return drawn
+    trajectory = _trajectory(folder / f"{figures.index}.npz", name)
+    poses, ended = [trajectory.poses], [figures.outcome]
+    task = tasks.task("dev", figures.index)
+    if isinstance(task, Map2DTask):
+        movers = trajectory.ghosts(trajectory.steps)
+        return png(on_maps.trajectories_of(task, poses, ended, [name], movers))
+    return png(on_worlds.trajectories_of(task, poses, ended, [name]))
 
 
 def _trajectory(path: Path, name: str) -> Trajectory:
@@ -89,32 +95,3 @@ def _unknown(episode: str, known: list[str]) -> Refused:
         return Refused("there is no picture: no episode was driven")
     names = ", ".join(known)
     return Refused(f"there is no episode {episode[:80]!r}; expected one of {names}")
-
-
-def _picture(task: AnyTask, trajectory: Trajectory, figures: WorldEpisode) -> Image:
-    """The world with the robot's path; for a failure, also a close-up of its end."""
-    name = f"world {figures.index}"
-    if figures.success:
-        return _whole(task, trajectory, figures.outcome, name)
-    text = (figures.text or figures.error or "").replace("°", " deg")
-    title = f"{name}: {figures.cause or figures.outcome}"
-    fact = text.removeprefix(f"{title}: ").partition(". ")[0]
-    fact = fact.encode("ascii", "replace").decode()[:MAX_FACT]
-    event = Event(
-        title=title,
-        facts=(fact, f"ended in step {trajectory.steps}"),
-        where=np.asarray(trajectory.poses[-1:, :2]),
-        contact=contact_of(task, trajectory, figures.outcome),
-        movers=trajectory.ghosts(trajectory.steps),
-    )
-    if isinstance(task, Map2DTask):
-        return run_picture(on_maps.backdrop_of(task), trajectory.poses, event)
-    return run_picture(on_worlds.backdrop_of(task), trajectory.poses, event)
-
-
-def _whole(task: AnyTask, trajectory: Trajectory, outcome: str, name: str) -> Image:
-    poses, ended, names = [trajectory.poses], [outcome], [name]
-    if isinstance(task, Map2DTask):
-        movers = trajectory.ghosts(trajectory.steps)
-        return on_maps.trajectories_of(task, poses, ended, names, movers)
-    return on_worlds.trajectories_of(task, poses, ended, names)

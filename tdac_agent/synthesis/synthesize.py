@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -160,7 +159,7 @@ def synthesize(
         parts = shares(run.episodes, wanted.improve)
         block = wanted.feedback_episodes
         terms = Terms(recorder, warm, wanted.tier, parts, block)
-        return _run(_Writing(dialogue, trials_of(about, terms), source))
+        return _run(dialogue, trials_of(about, terms), source)
 
 
 def _check(wanted: SynthOptions, problem: Problem) -> None:
@@ -224,26 +223,11 @@ def _is_over(before: Run, now: Run) -> bool:
     return before.finished and not (now.then_verify and before.status == "selected")
 
 
-@dataclass(frozen=True, slots=True)
-class _Writing:
-    """A run at work.
-
-    Attributes:
-        dialogue: The models.
-        trials: Tests candidates.
-        given: Source of an initial controller, if there is one.
-    """
-
-    dialogue: Dialogue
-    trials: Trials
-    given: str | None
-
-
-def _run(writing: _Writing) -> Run:
+def _run(dialogue: Dialogue, trials: Trials, given: str | None) -> Run:
     """Writes and delivers, and records how it ended."""
-    recorder = writing.trials.terms.recorder
+    recorder = trials.terms.recorder
     try:
-        _write(writing)
+        _write(dialogue, trials, given)
     except OutOfBudget as error:
         facts = {"reason": str(error), "outlook": error.outlook}
         recorder.finish("budget", error.way_on, **facts)
@@ -258,12 +242,11 @@ def _run(writing: _Writing) -> Run:
     return recorder.run
 
 
-def _write(writing: _Writing) -> None:
+def _write(dialogue: Dialogue, trials: Trials, given: str | None) -> None:
     """Algorithm 2: the iterations, the search for improvements, the selection."""
-    dialogue, trials = writing.dialogue, writing.trials
     if dialogue.learner.paid or dialogue.optimizer.paid:
         trials.prove()
-    loop = Iterations(dialogue, trials, writing.given)
+    loop = Iterations(dialogue, trials, given)
     written, stopped = loop.written, ""
     try:
         stopped = loop.run()
