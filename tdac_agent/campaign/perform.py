@@ -38,7 +38,7 @@ REPORTED_EVENTS = frozenset(
     {"call.intent", "call.fault", "verify.start", "drive.start", "hidden.start"}
 )
 REPORTED_KEYS = ("event", "kind", "k", "j", "fault", "what", "worlds")
-SETTINGS = (*("iterations", "patience", "refine", "base_url", "prompt", "max_output"),)
+SETTINGS = "iterations", "patience", "refine", "base_url", "prompt", "max_output"
 """Options of `synthesize` that a cell has by the same names."""
 RUNS = "runs"
 """Folder of the runs, inside the campaign folder."""

@@ -237,8 +237,8 @@ def test_a_folder_knows_how_it_was_begun(tmp_path, name, warm):
     template.unlink()
     known = resume_arguments(out)
     assert {key: known[key] for key in wanted} == wanted
-    assert known["task"].sha256() == task.sha256()
-    assert generate_prompt(known["task"], ()) == generate_prompt(task, ())
+    assert known["problem"].sha256 == task.sha256()
+    assert known["problem"].question() == generate_prompt(task, ())
     model = Script(PermanentFault("gone again"))
     with pytest.raises(Fault, match="gone again"):
         synthesize(**{**known, "learner": model, "optimizer": None}, judge=warm)

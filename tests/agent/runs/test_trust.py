@@ -237,6 +237,18 @@ def test_a_limit_to_go_on_with_is_marked(run):
     assert not is_own_folder(more)
 
 
+class Written:
+    """A problem of which only the files matter."""
+
+    file, text = "task.yaml", "name: x\n"
+
+    def __init__(self, write, suite=None):
+        self.write_files, self.suite = write, suite
+
+    def write_originals(self, folder):
+        pass
+
+
 def test_a_run_that_begins_is_known(tmp_path):
     """From its first file on; one that was left unfinished by others is not."""
     begun = load_run(DEMO).model_copy(update={"folder": tmp_path, "mark": ""})
@@ -246,7 +258,7 @@ def test_a_run_that_begins_is_known(tmp_path):
         seen.append(is_own_folder(load_run(folder)))
 
     template = load_template("full")
-    Recorder(begun).begin(write, ("task.yaml", "name: x\n"), template, None)
+    Recorder(begun).begin(Written(write), template, None)
     assert [*seen, is_own_folder(load_run(tmp_path))] == [True, True]
 
 
@@ -263,9 +275,7 @@ def test_a_run_that_begins_with_tests_and_a_template_is_known(tmp_path):
 
     template = PromptTemplate("mine.j2", "text")
     with hold_folder(folder):
-        Recorder(begun).begin(
-            write, ("task.yaml", "name: x\n"), template, None, folder / "suite"
-        )
+        Recorder(begun).begin(Written(write, folder / "suite"), template, None)
     assert seen == [False]
     assert is_own_folder(load_run(folder))
     for unfinished in ("task.yaml", "prompt.j2"):

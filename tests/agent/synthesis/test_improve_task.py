@@ -167,9 +167,7 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
 
 
 @pytest.mark.slow
-def test_models_that_see_get_a_picture_of_a_failure(
-    improve, fragile, good_source
-):
+def test_models_that_see_get_a_picture_of_a_failure(improve, fragile, good_source):
     """None if all goals were reached."""
     model = Script(*map(code, (fragile, good_source, *[STILL] * 12)))
     improve(model, vision=True)
