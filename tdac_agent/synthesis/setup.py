@@ -176,7 +176,6 @@ def open_record(
     run: Run,
     before: Run | None,
     account: Account,
-    *,
     template: PromptTemplate = FULL,
     given: str | None = None,
     on_event: Event | None = None,

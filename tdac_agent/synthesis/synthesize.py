@@ -107,17 +107,9 @@ def synthesize(
     wanted = (options or SynthOptions()).changed(**keywords, **given)
     about = problem_of(problem)
     _check(wanted, about)
-    models = choose_models(
-        wanted.learner,
-        wanted.optimizer,
-        about.setting,
-        wanted.base_url,
-        key_over_http=wanted.key_over_http,
-    )
-    template, rules = load_template(wanted.prompt), wanted.rules
-    book = read_given(rules) if isinstance(rules, Path) else rules or RuleBook()
-    source = _source(wanted.start_from)
-    before = existing_run(out)
+    models = _models(wanted, about)
+    template, book = load_template(wanted.prompt), _book(wanted.rules)
+    source, before = _source(wanted.start_from), existing_run(out)
     run = new_run(
         about,
         models,
@@ -132,34 +124,33 @@ def synthesize(
     account = account_of(models, before, *limits, budget)
     with hold_folder(out), ExitStack() as stack:
         before = existing_run(out)
-        if before is not None:
-            check_same(before, run)
-            if _is_over(before, run):
-                check_own(before)
-                return before
-        recorder = open_record(
-            about,
-            run,
-            before,
-            account,
-            template=template,
-            given=source,
-            on_event=on_event,
-        )
-        calls = Calls(
-            recorder,
-            account.budget,
-            account.tariffs,
-            retry or RetryPolicy(),
-            wanted.max_output,
-        )
+        if before is not None and _is_over(before, run):
+            return before
+        recorder = open_record(about, run, before, account, template, source, on_event)
+        asking = account.budget, account.tariffs, retry or RetryPolicy()
+        calls = Calls(recorder, *asking, wanted.max_output)
         dialogue = Dialogue(about, *models, calls, book, template)
         dialogue.begin()
         warm = judge or stack.enter_context(WarmJudge(task=about.task))
-        parts = shares(run.episodes, wanted.improve)
-        block = wanted.feedback_episodes
+        parts, block = shares(run.episodes, wanted.improve), wanted.feedback_episodes
         terms = Terms(recorder, warm, wanted.tier, parts, block)
         return _run(dialogue, trials_of(about, terms), source)
+
+
+def _models(wanted: SynthOptions, problem: Problem) -> tuple[Provider, Provider]:
+    """The learner and the optimizer."""
+    return choose_models(
+        wanted.learner,
+        wanted.optimizer,
+        problem.setting,
+        wanted.base_url,
+        key_over_http=wanted.key_over_http,
+    )
+
+
+def _book(rules: RuleBook | Path | None) -> RuleBook:
+    """The rules to begin with: given, in a file, or none."""
+    return read_given(rules) if isinstance(rules, Path) else rules or RuleBook()
 
 
 def _check(wanted: SynthOptions, problem: Problem) -> None:
@@ -219,8 +210,16 @@ def _source(given: str | Path | None) -> str | None:
 
 
 def _is_over(before: Run, now: Run) -> bool:
-    """Whether nothing is left to do in a run; a selected one may be verified later."""
-    return before.finished and not (now.then_verify and before.status == "selected")
+    """Whether nothing is left to do in a run; a selected one may be verified later.
+
+    Raises:
+        RunError: It is another run, or one that this installation did not begin.
+    """
+    check_same(before, now)
+    over = before.finished and not (now.then_verify and before.status == "selected")
+    if over:
+        check_own(before)
+    return over
 
 
 def _run(dialogue: Dialogue, trials: Trials, given: str | None) -> Run:

@@ -1,4 +1,4 @@
-"""The options of a synthesis: declared once, for the command, the library, the record."""
+"""The options of a synthesis: declared once, for command, library and record."""
 
 import subprocess
 import sys
