@@ -19,7 +19,7 @@ from tdac_agent.problems.choice import problem_of
 from tdac_agent.problems.problem import Judged, Poll, Problem
 from tdac_agent.prompting.feedback import render_feedback
 from tdac_agent.runs.ownership import load_task
-from tdac_agent.synthesis.set_feedback import set_feedback, summary_of
+from tdac_agent.synthesis.set_reports import set_feedback, summary_of
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.synthesis.world_trials import BLOCKS

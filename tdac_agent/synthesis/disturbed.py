@@ -7,22 +7,35 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from statistics import fmean
 
 from pydantic import ConfigDict, Field, ValidationError
 
+from tdac_agent.episodes.trajectory import Trajectory
+from tdac_agent.errors import RunError
+from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.prompting.feedback import cut
 from tdac_agent.runs.improvement_record import goals_text
 from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
+from tdac_agent.synthesis.candidates import Figures
 from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.figures import EpisodeFigures
+from tdac_agent.verification.diagnosis.measures import least_steps
+from tdac_agent.verification.diagnosis.model_picture import (
+    FailurePicture,
+    episode_picture,
+)
+from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.judge.seeded import ScoredEpisode
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.seeded_run import controller_job, run_seeds
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.ladder.scores import time_score
 
 PURPOSES = ("improve", "comparison")
 """What the episodes are for, in the order of their seeds."""
@@ -33,6 +46,7 @@ SEEDS = 2**32
 MOST_TOLD = 3
 """Failures whose diagnosis is told."""
 EPISODES_FILE = "disturbed.json"
+RANKED = {"robustness": "goals reached", "time": "mean time score"}
 FAILURES = "failures"
 """Folder with the trajectories of failed episodes."""
 
@@ -167,3 +181,38 @@ def kept_disturbed(
     same = all(getattr(found, name) == value for name, value in wanted.items())
     own = [each.seed for each in found.episodes]
     return found if same and own == list(seeds) else None
+
+
+def task_figures(task: Task, report: Report, driven: DisturbedEpisodes) -> Figures:
+    """Share of goals, mean time score, time of the nominal episode, clearance.
+
+    Args:
+        task: The task.
+        report: The report that verified the candidate.
+        driven: Its disturbed episodes.
+    """
+    nominal = next(each for each in report.episodes if each.name == "nominal")
+    least = least_steps(task.nominal)
+    figures = {
+        "robustness": fmean(driven.successes),
+        "time": fmean(driven.times),
+        "nominal": time_score(nominal.outcome == "reached", nominal.steps, least),
+        "clearance": fmean(each.clearance for each in driven.episodes),
+    }
+    return Figures(figures, RANKED)
+
+
+def failed_picture(
+    task: Task, driven: DisturbedEpisodes, folder: Path
+) -> FailurePicture | None:
+    """A picture of the first failed episode that drove; None if there is none."""
+    for number, each in enumerate(driven.episodes, 1):
+        if each.success:
+            continue
+        try:
+            trajectory = Trajectory.load(folder / FAILURES / f"{each.seed}.npz")
+        except RunError:  # it did not drive
+            continue
+        figures = EpisodeFigures(named(number), each.outcome, each.d0, each.d_min)
+        return episode_picture(task, figures, each.diagnosis, trajectory, LARGEST_SIDE)
+    return None

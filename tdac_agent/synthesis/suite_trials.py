@@ -8,38 +8,32 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from functools import partial
 from queue import SimpleQueue
-from statistics import fmean
 
-from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.errors import RunError
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.prompting.feedback import feedback_of
 from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
 from tdac_agent.runs.run_record import Status
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.archive import Archive, Member
-from tdac_agent.synthesis.candidates import Candidate, Explored, Figures, Result
+from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.delivery import (
     compared,
     place_verified,
     task_improvement,
 )
 from tdac_agent.synthesis.disturbed import (
-    FAILURES,
     DisturbedEpisodes,
     drive_disturbed,
+    failed_picture,
     kept_disturbed,
-    named,
     seeds_for,
+    task_figures,
 )
 from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.figures import EpisodeFigures
-from tdac_agent.verification.diagnosis.measures import least_steps
 from tdac_agent.verification.diagnosis.model_picture import (
     FailurePicture,
-    episode_picture,
     failure_picture,
 )
 from tdac_agent.verification.diagnosis.report import Report
@@ -47,10 +41,10 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
-from tdac_envs.ladder.scores import time_score
 
 NOT_RUN = "not run"
-RANKED = {"robustness": "goals reached", "time": "mean time score"}
+IMPROVE = "improve"
+"""Folder of the episodes of a search, inside that of a candidate."""
 
 
 class SuiteTrials:
@@ -190,8 +184,9 @@ class SuiteTrials:
             drove = any(each.outcome != NOT_RUN for each in report.episodes)
             said, failed = result.failure.line, result.failed
             return Explored(None, said, failed=failed, drove=drove, seed=result.seed)
-        driven = self._drive(candidate, "improve", self.terms.shares.block)
-        figures = self._figures(report, driven)
+        folder = candidate.folder / IMPROVE
+        driven = self._drive(candidate, IMPROVE, self.terms.shares.block)
+        figures = task_figures(self.task, report, driven)
         if not is_variation:
             said = drive_text(figures.time, driven.reached, len(driven.episodes))
             about = {"k": candidate.k, "j": candidate.j, "said": said}
@@ -203,7 +198,9 @@ class SuiteTrials:
             seed=result.seed,
             episodes=len(driven.episodes),
             feedback=driven.feedback,
-            picture=partial(self._drawn, candidate, driven),
+            picture=partial(
+                failed_picture, self.task, driven, candidate.folder / IMPROVE
+            ),
         )
 
     def lines(self, member: Member, best: Member) -> list[str]:
@@ -261,7 +258,7 @@ class SuiteTrials:
             chosen,
             changes,
             used=self.used,
-            first_seed=seeds_for(terms.recorder.run, "improve", 0).start,
+            first_seed=seeds_for(terms.recorder.run, IMPROVE, 0).start,
             first_comparison=seeds_for(terms.recorder.run, "comparison", 0).start,
         )
         text = found.model_dump_json(indent=2) + "\n"
@@ -299,35 +296,6 @@ class SuiteTrials:
         self.used += count
         terms.recorder.event("drive.end", **about, reached=found.reached)
         return found
-
-    def _figures(self, report: Report, driven: DisturbedEpisodes) -> Figures:
-        """Share of goals, mean time score, time of the nominal episode, clearance."""
-        nominal = next(each for each in report.episodes if each.name == "nominal")
-        least = least_steps(self.task.nominal)
-        figures = {
-            "robustness": fmean(driven.successes),
-            "time": fmean(driven.times),
-            "nominal": time_score(nominal.outcome == "reached", nominal.steps, least),
-            "clearance": fmean(each.clearance for each in driven.episodes),
-        }
-        return Figures(figures, RANKED)
-
-    def _drawn(
-        self, candidate: Candidate, driven: DisturbedEpisodes
-    ) -> FailurePicture | None:
-        """A picture of the first failed episode that drove."""
-        folder = candidate.folder / "improve" / FAILURES
-        for number, each in enumerate(driven.episodes, 1):
-            if each.success:
-                continue
-            try:
-                trajectory = Trajectory.load(folder / f"{each.seed}.npz")
-            except RunError:  # it did not drive
-                continue
-            figures = EpisodeFigures(named(number), each.outcome, each.d0, each.d_min)
-            found = each.diagnosis
-            return episode_picture(self.task, figures, found, trajectory, LARGEST_SIDE)
-        return None
 
 
 def _report(candidate: Candidate) -> Report:

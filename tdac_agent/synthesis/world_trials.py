@@ -5,30 +5,28 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
-from statistics import fmean
 
-from pydantic import ValidationError
-
-from tdac_agent.evaluation.kept_sets import TRAJECTORIES
 from tdac_agent.evaluation.set_report import SetReport
 from tdac_agent.evaluation.set_verify import verify_on_set
-from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.runs.improvement_record import PairedChange
 from tdac_agent.runs.run_record import Status
 from tdac_agent.runs.selection_record import SELECTION_FILE
-from tdac_agent.runs.world_pictures import failure_pictures
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.archive import Archive, Member
-from tdac_agent.synthesis.candidates import Candidate, Explored, Figures, Result
+from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.delivery import compared, selection_of
 from tdac_agent.synthesis.hidden import hidden_report
-from tdac_agent.synthesis.set_feedback import set_feedback, summary_of
+from tdac_agent.synthesis.set_reports import (
+    figures_of,
+    kept_report,
+    read_set_report,
+    set_feedback,
+    summary_of,
+    world_picture,
+)
 from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.synthesis.workload import MOST_EPISODES
-from tdac_agent.tasks.provenance import sha256_of, versions
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet
 
 BLOCKS = 2**30
@@ -37,10 +35,6 @@ PURPOSES = ("feedback", "validation", "improve", "comparison")
 """What worlds are used for, in the order of their numbers."""
 FINALISTS = 4
 """Most candidates that go on to the selection, beside the best one of the loop."""
-WORST = 4
-"""The worst n-th of the worlds stands for robustness."""
-RANKED = {"time": "mean time score"}
-SET_REPORT = "set.json"
 FEEDBACK, EXPLORED = "feedback-{}", "improve-1"
 """Folders of reports, inside that of a candidate."""
 
@@ -268,67 +262,3 @@ class WorldTrials:
         ended = {"reached": report.successes, "driven": report.worlds}
         terms.recorder.event("drive.end", **about, **ended)
         return report
-
-
-def figures_of(report: SetReport) -> Figures:
-    """Mean time and path scores, success, and time score on the worst worlds."""
-    episodes = report.episodes
-    times = sorted(each.time_score for each in episodes)
-    figures = {
-        "time": fmean(times),
-        "path": fmean(each.path_score for each in episodes),
-        "success": fmean(each.success for each in episodes),
-        "worst": fmean(times[: max(1, len(times) // WORST)]),
-    }
-    return Figures(figures, RANKED)
-
-
-def world_picture(
-    tasks: TaskSet, report: SetReport, folder: Path
-) -> FailurePicture | None:
-    """The picture of the first failed episode of a report that has a diagnosis.
-
-    Args:
-        tasks: The task set.
-        report: A report on worlds of `dev`.
-        folder: Folder of the report, with the trajectories.
-
-    Returns:
-        None if no such episode drove.
-
-    Raises:
-        ValueError: The worlds are of another split.
-    """
-    if report.provenance.split != "dev":
-        raise ValueError(f"expected worlds of dev, got {report.provenance.split}")
-    named = ((f"world {each.index}", each) for each in report.episodes)
-    found = failure_pictures(tasks, named, folder / TRAJECTORIES, LARGEST_SIDE)
-    return next((picture for _, picture in found), None)
-
-
-def read_set_report(folder: Path) -> SetReport:
-    """The report in a folder.
-
-    Raises:
-        OSError: There is none.
-        ValueError: It is damaged.
-    """
-    content = parse_json(read_file(folder / SET_REPORT, RECORD_BYTES))
-    return SetReport.model_validate(content)
-
-
-def kept_report(
-    folder: Path, tasks: TaskSet, source: bytes, first: int, count: int
-) -> SetReport | None:
-    """The report in a folder if it is about this controller and these worlds."""
-    try:
-        report = read_set_report(folder)
-    except (OSError, ValueError, ValidationError):
-        return None
-    about = report.provenance
-    facts = (about.set_sha256, about.split, about.controller_sha256, about.versions)
-    wanted = (tasks.sha256, "dev", sha256_of(source), versions())
-    numbers = [episode.index for episode in report.episodes]
-    # After a failed static test, there are no episodes.
-    complete = numbers in ([], list(range(first, first + count)))
-    return report if facts == wanted and complete else None

@@ -14,8 +14,8 @@ from tdac_agent.evaluation.set_verify import verify_on_set
 from tdac_agent.html_report import make_page
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.runs.resume import resume_arguments
+from tdac_agent.synthesis.set_reports import world_picture
 from tdac_agent.synthesis.synthesize import synthesize
-from tdac_agent.synthesis.world_trials import world_picture
 from tdac_envs import load_set
 from tdac_envs.drawing.canvas import MOVER
 

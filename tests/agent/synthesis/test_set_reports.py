@@ -3,7 +3,7 @@
 from few_worlds import write_set
 
 from tdac_agent.evaluation.set_verify import verify_on_set
-from tdac_agent.synthesis.set_feedback import REFUSED, set_feedback, summary_of
+from tdac_agent.synthesis.set_reports import REFUSED, set_feedback, summary_of
 from tdac_envs import load_set
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
