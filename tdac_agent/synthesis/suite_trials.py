@@ -198,9 +198,7 @@ class SuiteTrials:
             seed=result.seed,
             episodes=len(driven.episodes),
             feedback=driven.feedback,
-            picture=partial(
-                failed_picture, self.task, driven, candidate.folder / IMPROVE
-            ),
+            picture=partial(failed_picture, self.task, driven, folder),
         )
 
     def lines(self, member: Member, best: Member) -> list[str]:
