@@ -120,7 +120,8 @@ def test_an_unknown_keyword_is_named(write, ground, out):
 def test_the_budget_ends_a_run_that_more_tokens_continue(write, ground):
     """Nothing is delivered then, and no answer is paid for twice."""
     one = 40_000 if ground.is_task else 30_000  # enough for one question, not for two
-    _, run = write(ground, model=Paid(code(STILL)), max_tokens=one, iterations=1)
+    model = Paid(script.code(STILL))  # without tokens: all that is reserved counts
+    _, run = write(ground, model=model, max_tokens=one, iterations=1)
     assert run.status == "budget"
     assert "--max-tokens" in str(run.enough)
     model = Paid(code(BUMP), NO_RULES)
