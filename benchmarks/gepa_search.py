@@ -55,20 +55,20 @@ from tdac_agent.metrics.paired import bootstrap
 from tdac_agent.planners.planner import ranges_of, source_of, with_values
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import Run
-from tdac_agent.set_synthesis.improve import SetExplorer, finalists, founders
-from tdac_agent.set_synthesis.selection import select
-from tdac_agent.set_synthesis.trials import (
-    BLOCKS,
-    PURPOSES,
-    Candidate,
-    Trials,
-    first_world,
-)
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.dialogue import ModelAnswer
 from tdac_agent.synthesis.improve import ImprovingSearch
+from tdac_agent.synthesis.selection import select
+from tdac_agent.synthesis.terms import Terms as TrialTerms
 from tdac_agent.synthesis.workload import Shares, shares
+from tdac_agent.synthesis.world_trials import (
+    BLOCKS,
+    PURPOSES,
+    WorldTrials,
+    first_world,
+)
 from tdac_agent.verification.episode_report import (
     EpisodeProvenance,
     EpisodeReport,
@@ -153,21 +153,25 @@ class Terms(NamedTuple):
         return varied(source, (0, self.seed, number))[0]
 
 
-class _Trials(Trials):
+class _Trials(WorldTrials):
     """Drives in this process."""
 
-    def __init__(self, terms: Terms, recorder: Recorder) -> None:
-        super().__init__(terms.tasks, recorder, None, "none", SCREENED, terms.shares)
-        self._terms = terms
+    def __init__(self, pair: Terms, recorder: Recorder) -> None:
+        parts = TrialTerms(recorder, None, "none", pair.shares, SCREENED)
+        super().__init__(pair.tasks, parts)
+        self._pair = pair
 
     def _drive(
         self,
         candidate: Candidate,
+        purpose: str,
         first: int,
         count: int,
-        out: Path,  # noqa: ARG002
+        out: str,  # noqa: ARG002
     ) -> EpisodeReport:
-        return self._terms.report(candidate.source, range(first, first + count))
+        report = self._pair.report(candidate.source, range(first, first + count))
+        self.used[purpose] += report.count
+        return report
 
 
 class _Proposals:
@@ -204,11 +208,11 @@ def by_ours(terms: Terms) -> Found:
         start.feedback.append(
             terms.report(terms.start, terms.worlds("feedback", SCREENED))
         )
-        search = ImprovingSearch(proposals, SetExplorer(trials), [start])
-        search.run(founders(trials, [start]))
-        able = finalists(search.archive)
-        chosen = select(able, trials.validation_left, trials.validate)
-    used = trials.explore_used + trials.validation_used
+        search = ImprovingSearch(proposals, trials, [start])
+        search.run([start])
+        able = trials.finalists(search.archive)
+        chosen = select(able, terms.shares.validation, trials.validate)
+    used = trials.used["improve"] + trials.used["validation"]
     return Found(chosen.source, used, proposals.made)
 
 

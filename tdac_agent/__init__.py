@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from tdac_agent.runs.history import RunHistory, gather_run
     from tdac_agent.runs.ownership import load_task
     from tdac_agent.runs.run_record import Run, load_run
-    from tdac_agent.synthesis.loop import synthesize
+    from tdac_agent.synthesis.synthesize import synthesize
     from tdac_agent.tasks.disturbance import Disturbance
     from tdac_agent.tasks.task import Task
     from tdac_agent.verification.diagnosis.report import Report
@@ -53,7 +53,7 @@ _MODULE_OF = {
     "load_controller": "evaluation.policy",
     "load_run": "runs.run_record",
     "load_task": "runs.ownership",
-    "synthesize": "synthesis.loop",
+    "synthesize": "synthesis.synthesize",
     "verify": "verification.verify",
     "verify_episodes": "verification.verify_episodes",
     "verify_on_set": "verification.verify_episodes",

@@ -14,11 +14,11 @@ from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.models.ready import needs_limit
 from tdac_agent.prompting.prompt import VARIANTS
 from tdac_agent.runs.run_record import LoopSetting
-from tdac_agent.set_synthesis.synthesize import EPISODES, FEEDBACK_EPISODES
-from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.storage.hashes import sha256_of_file
 from tdac_agent.storage.shipped import shipped, shipped_names
 from tdac_agent.storage.yaml_file import read_yaml
+from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.trust import Wish, asking, suite_wish
 from tdac_envs.core.strict_model import StrictModel
@@ -26,6 +26,7 @@ from tdac_envs.core.strict_model import StrictModel
 SAME = "same"
 """Optimizer name for the learner itself."""
 Keep = Literal["all", "records"]
+_USUAL = SynthOptions()
 _VARIED = ("learners", "optimizers", "settings", "prompts")
 
 
@@ -68,10 +69,13 @@ class CampaignConfig(StrictModel):
         "may request: K·(J + 2).",
     )
     episodes: int = Field(
-        EPISODES, ge=2, le=MOST_EPISODES, description="As for --episodes, on sets."
+        _USUAL.episodes,
+        ge=2,
+        le=MOST_EPISODES,
+        description="As for --episodes, on sets.",
     )
     feedback_episodes: int = Field(
-        FEEDBACK_EPISODES,
+        _USUAL.feedback_episodes,
         ge=1,
         le=MOST_EPISODES,
         description="As for --feedback-episodes, on sets.",

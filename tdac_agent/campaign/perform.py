@@ -13,18 +13,18 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.campaign.concurrency import limited_provider
-from tdac_agent.campaign.plan import SET_LIMITS, PlannedRun, setting_of
+from tdac_agent.campaign.plan import SET_LIMITS, PlannedRun
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.executors.executor import Work
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.retry import RetryPolicy
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.ownership import is_own_folder, load_task, mark_anew
 from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run, load_run
 from tdac_agent.runs.selection_record import HIDDEN_FILE
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import seed_from
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
@@ -38,6 +38,8 @@ REPORTED_EVENTS = frozenset(
     {"call.intent", "call.fault", "verify.start", "drive.start", "hidden.start"}
 )
 REPORTED_KEYS = ("event", "kind", "k", "j", "fault", "what", "worlds")
+SETTINGS = "iterations", "patience", "refine", "base_url", "prompt", "max_output"
+"""Options of `synthesize` that a cell has by the same names."""
 RUNS = "runs"
 """Folder of the runs, inside the campaign folder."""
 KEPT = frozenset(
@@ -172,11 +174,11 @@ def _synthesize(
     planned: PlannedRun, terms: Terms, judge: WarmJudge | None, tell: Tell | None
 ) -> Run:
     cell = planned.cell
-    problem = _load(cell.task, cell.on_set)
+    problem = problem_of(_load(cell.task, cell.on_set))
     models = choose_models(
         cell.learner,
         cell.optimizer,
-        setting_of(problem),
+        problem.setting,
         cell.base_url,
         key_over_http=terms.key_over_http,
     )
@@ -185,28 +187,22 @@ def _synthesize(
     optimizer = learner if same else limited_provider(models[1], gates, terms.workers)
     folder = terms.runs / planned.name
     folder.parent.mkdir(parents=True, exist_ok=True)
-    wanted: dict[str, Any] = {
-        "out": folder,
-        "iterations": cell.iterations,
-        "patience": cell.patience,
-        "refine": cell.refine,
-        "base_url": cell.base_url,
-        "prompt": cell.prompt,
-        "max_output": cell.max_output,
-        "budget": terms.budget(planned),
-        "index": planned.index,
-        "retry": PATIENCE,
-        "judge": judge,
-        "on_event": tell,
-    }
-    if isinstance(problem, TaskSet):
-        wanted["seed"] = _seed(planned, problem.sha256, folder)
-        limits = {name: getattr(cell, name) for name in SET_LIMITS}
-        return synthesize_on_set(
-            problem, learner, optimizer, then_verify=True, **limits, **wanted
-        )
-    wanted["seed"] = _seed(planned, problem.sha256(), folder)
-    return synthesize(problem, learner, optimizer, **wanted)
+    limits = SET_LIMITS if problem.has_hidden else ()
+    settings = {name: getattr(cell, name) for name in (*SETTINGS, *limits)}
+    return synthesize(
+        problem,
+        learner,
+        optimizer,
+        out=folder,
+        seed=_seed(planned, problem.sha256, folder),
+        then_verify=problem.has_hidden,
+        budget=terms.budget(planned),
+        index=planned.index,
+        retry=PATIENCE,
+        judge=judge,
+        on_event=tell,
+        **settings,
+    )
 
 
 def _seed(planned: PlannedRun, task_sha256: str, folder: Path) -> int:

@@ -49,7 +49,7 @@ def run(options: BenchOptions) -> int:
 
     with contextlib.suppress(RunError):  # none yet, or not readable
         before = read(folder)
-    names = [name for name in options.sets.split(",") if name]
+    names, tasks = _names(options.sets), _names(options.tasks)
     executor = None if options.executor is None else executor_of(options.executor)
     try:
         with ChildPool() as child_pool, WarmJudge(child_pool) as judge, bar:
@@ -59,6 +59,7 @@ def run(options: BenchOptions) -> int:
                 options.split,
                 options.worlds,
                 out=folder,
+                tasks=tasks,
                 salt_file=options.salt_file,
                 tier=options.tier,
                 judge=judge,
@@ -80,6 +81,10 @@ def run(options: BenchOptions) -> int:
         _print_replaced(before, results, folder, console)
         _print_how_to_watch(results, named(options.entrants), names, folder, console)
     return 0 if any(each.time for each in results.rows) else 1
+
+
+def _names(words: str) -> list[str]:
+    return [name for name in words.split(",") if name]
 
 
 def _print_where(folder: Path, salt_file: Path | None, console: Console) -> None:
@@ -128,7 +133,7 @@ def _print_how_to_watch(
     if not own or not rows.is_file() or not any(row.time for row in results.rows):
         return
     entrant, table = own[0], read_worlds(rows)
-    for name, tasks in zip(names, results.sets, strict=True):
+    for name, tasks in zip(names, results.sets, strict=False):  # tasks come last
         mine = table[(table["set"] == tasks.name) & (table["entrant"] == entrant.name)]
         failed = mine[mine["success"] == 0]["index"]
         if failed.size and tasks.split != "hidden":

@@ -35,14 +35,24 @@ class BenchOptions:
         metavar="ENTRANT...",
     )
     sets: str = option(
-        ...,
+        "",
         "Task sets (`tdac sets`) or set.yaml files, with commas between them.",
         "--set",
         metavar="NAME,…",
     )
+    tasks: str = option(
+        "",
+        "Tasks by name or folder, with commas between them: from jittered starts.",
+        "--task",
+        metavar="NAME,…",
+    )
     split: str = option("test", "dev, test or hidden.", metavar="NAME")
     worlds: int = option(
-        100, "Number of worlds of each set.", "-n", "--worlds", least=1
+        100,
+        "Number of worlds of each set, and of starts of each task.",
+        "-n",
+        "--worlds",
+        least=1,
     )
     out: Path | None = out_option(
         "Folder for the results; after an interruption, the same command drives only "
@@ -77,10 +87,10 @@ class BenchOptions:
 )
 @typed_options("bench:run")
 def run_command(options: BenchOptions) -> None:
-    """Drive entrants on the same worlds of task sets, and compare them.
+    """Drive entrants on the same worlds of task sets, or on tasks, and compare them.
 
     For a ranking to publish: several sets, hidden worlds, seeds of a training, figures.
-    To compare a few policies while you work, or on tasks, use `tdac evaluate`.
+    To compare a few policies while you work, use `tdac evaluate`.
     `tdac bench show DIR...` shows results again, `tdac bench reveal DIR` publishes
     hidden worlds.
     """

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.synth import arguments_of, write
-from tdac_agent.cli.synth_options import SynthOptions
+from tdac_agent.cli.synth import write
 from tdac_agent.library.listing import next_folder
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
+from tdac_agent.synthesis.options import SynthOptions
 
 INTRODUCTION = (
     "Replaying a language model's answers to the [bold]{prompt}[/] prompt for the task "
@@ -37,4 +38,4 @@ def run(out: Path | None, as_json: bool) -> int:
         seed=recorded.seed,
         prompt=recorded.prompt,
     )
-    return write(task, out or next_folder("demo"), arguments_of(options), console)
+    return write(problem_of(task), out or next_folder("demo"), options, console)

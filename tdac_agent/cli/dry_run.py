@@ -7,45 +7,40 @@ import sys
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.synth_flags import RunFlags
-from tdac_agent.cli.synth_options import SynthOptions
 from tdac_agent.cli.task_choice import chosen
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.models.budget import format_usd
 from tdac_agent.models.choice import Options, check_name, missing_for_name
 from tdac_agent.models.prices import SHIPPED, load_prices, price_file
 from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
-from tdac_agent.prompting.given_rules import read_given
-from tdac_agent.prompting.prompt import generate_prompt, load_template
-from tdac_agent.prompting.set_prompt import set_prompt
+from tdac_agent.problems.choice import problem_of
+from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
+from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.setup import checked_vision
-from tdac_agent.synthesis.workload import most_variations
-from tdac_agent.tasks.setting import Setting
-from tdac_envs.ladder.task_sets import TaskSet
+from tdac_agent.synthesis.synthesize import book_of
+from tdac_agent.synthesis.workload import shares
+from tdac_agent.tasks.task import Task
 
 
 def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int:
     """Prints the prompt alone to stdout, the rest to stderr; returns 0."""
-    names = options.learner, options.optimizer or options.learner
+    learner = str(options.learner)
+    names = learner, str(options.optimizer or learner)
     for name in names:
         check_name(name)
-    template = load_template(options.prompt)
-    book = None if options.rules is None else read_given(options.rules)
-    rules = () if book is None else book.in_force
-    problem = chosen(flags, options, run_flags)
-    on_set = isinstance(problem, TaskSet)
-    setting: Setting | TaskSet
-    if isinstance(problem, TaskSet):
-        question, setting = set_prompt(problem, rules, template), problem
-    else:
-        problem = problem.with_profile(run_flags.profile)
-        question, setting = generate_prompt(problem, rules, template), problem.setting
+    template, book = load_template(options.prompt), book_of(options.rules)
+    named = chosen(flags, options, run_flags)
+    if isinstance(named, Task):
+        named = named.with_profile(run_flags.profile)
+    problem = problem_of(named)
     checked_vision(options.vision, names[1], options.patience, options.improve)
-    server = Options(setting, options.base_url, options.key_over_http)
+    server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]
+    episodes = options.episodes if problem.has_hidden else None
     forecast = cost_of(
         problem.name,
-        question,
+        problem.question(book.in_force, template),
         *names,
         load_prices(),
         iterations=options.iterations,
@@ -53,7 +48,7 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
         candidates=options.candidates,
         refine=options.refine,
         vision=options.vision,
-        variations=most_variations(options.improve, on_set=on_set),
+        variations=shares(episodes, options.improve).asked,
         base_url=options.base_url,
         max_output=options.max_output,
         max_cost=options.max_cost,

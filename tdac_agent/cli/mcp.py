@@ -21,7 +21,7 @@ from tdac_envs.core.extras import install_command
 from tdac_envs.ladder.task_sets import TaskSet
 
 if TYPE_CHECKING:
-    from tdac_agent.mcp.desk import Desk
+    from tdac_agent.mcp.session import Session
 
 
 def run(flags: TaskFlags, options: McpOptions) -> None:
@@ -35,25 +35,25 @@ def run(flags: TaskFlags, options: McpOptions) -> None:
     if find_spec("mcp") is None:
         raise TaskError(f"the server needs an extra: {install_command('mcp')}")
     from tdac_agent.mcp.gate import given_token
-    from tdac_agent.mcp.opening import EPISODES, begun, open_desk
+    from tdac_agent.mcp.opening import EPISODES, begun, open_session
     from tdac_agent.mcp.serve import serve_stdio
 
     out, http = options.out, options.http
     known = begun(out) if out is not None and not typed_fields(flags) else None
-    problem = known.about if known else _named(flags)
+    problem = known.problem if known else _named(flags)
     most = options.episodes or (known.episodes if known else EPISODES)
     folder = out or next_folder(problem.name)
     agent: Agent = "over HTTP" if http else "unconfined"
     token = given_token() if http else None
     try:
-        with open_desk(problem, folder, most, agent) as desk:
+        with open_session(problem, folder, most, agent) as session:
             try:
                 if http:
-                    _serve_http(desk, options.port or 0, token)
+                    _serve_http(session, options.port or 0, token)
                 else:
-                    serve_stdio(desk)
+                    serve_stdio(session)
             finally:
-                if out is None and not desk.submissions:
+                if out is None and not session.submissions:
                     shutil.rmtree(folder)
     except KeyboardInterrupt:
         if http:
@@ -71,7 +71,7 @@ def _named(flags: TaskFlags) -> Task | TaskSet:
     return allowed(problem, None, trust=False)
 
 
-def _serve_http(desk: Desk, port: int, token: str | None) -> None:
+def _serve_http(session: Session, port: int, token: str | None) -> None:
     """Serves over HTTP; prints the address, and on stderr a token that was drawn."""
     from tdac_agent.loopback import listen
     from tdac_agent.mcp.gate import drawn_token
@@ -89,4 +89,4 @@ def _serve_http(desk: Desk, port: int, token: str | None) -> None:
     except OSError as error:
         raise TaskError(f"--port {port}: {error.strerror}; give another one") from error
     with opened:
-        serve_http(desk, opened, secret, announce)
+        serve_http(session, opened, secret, announce)

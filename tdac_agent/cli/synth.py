@@ -18,14 +18,15 @@ from tdac_agent.cli.progress import SynthProgress
 from tdac_agent.cli.run_view import show_run, show_selection
 from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.synth_flags import RunFlags
-from tdac_agent.cli.synth_options import SynthOptions
-from tdac_agent.cli.task_choice import check_tier, chosen, scope
+from tdac_agent.cli.task_choice import check_tier, chosen
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import flag_name
-from tdac_agent.errors import ControllerFileError, Fault, RunError
+from tdac_agent.errors import Fault, RunError
 from tdac_agent.library.listing import next_folder
+from tdac_agent.models.provider import Provider
 from tdac_agent.models.ready import check_ready
-from tdac_agent.prompting.given_rules import read_given
+from tdac_agent.problems.choice import problem_of
+from tdac_agent.problems.problem import Problem
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.resume import (
     check_own,
@@ -34,16 +35,13 @@ from tdac_agent.runs.resume import (
     resume_line,
 )
 from tdac_agent.runs.run_record import AGENT, Run, load_run
-from tdac_agent.set_synthesis.resume import resume_set_arguments
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.setup import checked_vision
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
-from tdac_agent.verification.verify import read_source
-from tdac_envs.ladder.task_sets import TaskSet
 
 RECORDED = ("learner", "optimizer", "base_url", "max_cost", "max_tokens")
 ALLOWED = frozenset(
@@ -72,48 +70,40 @@ def run(
     check_tier(options.tier)
     check_models(options)
     console = Console(stderr=run_flags.as_json)
-    settings = arguments_of(options)
     with console.status("preparing the task …"):
         problem = chosen(flags, options, run_flags)
         if isinstance(problem, Task):
             problem = problem.with_profile(run_flags.profile)
             problem = allowed(problem, run_flags.suite, trust=run_flags.trust)
-    return write(problem, run_flags.out or next_folder(problem.name), settings, console)
-
-
-def arguments_of(options: SynthOptions) -> dict[str, Any]:
-    """The arguments of a synthesis; files are read."""
-    named = {field.name: getattr(options, field.name) for field in fields(options)}
-    source, rules = options.start_from, options.rules
-    named["start_from"] = None if source is None else read_text(source)
-    named["rules"] = None if rules is None else read_given(rules)
-    return named
+    folder = run_flags.out or next_folder(problem.name)
+    return write(problem_of(problem), folder, options, console)
 
 
 def write(
-    problem: Task | TaskSet, folder: Path, settings: dict[str, Any], console: Console
+    problem: Problem,
+    folder: Path,
+    options: SynthOptions,
+    console: Console,
+    index: int = 0,
 ) -> int:
     """Synthesises with live progress and prints the run; returns the exit code.
 
     Args:
         problem: Task or task set.
         folder: Run folder.
-        settings: Arguments of a synthesis.
+        options: Options of the synthesis.
         console: Console to print to; if it is stderr, the run record goes to stdout as
             JSON.
+        index: Index of the run among otherwise equal ones.
     """
-    before, on_set = existing_run(folder), isinstance(problem, TaskSet)
-    heading = _heading(problem, settings["learner"], settings["optimizer"])
+    before = existing_run(folder)
+    heading = _heading(problem, options.learner, options.optimizer)
+    on_set = problem.tasks is not None
     try:
         with SynthProgress(console, heading, on_set=on_set) as progress:
-            if isinstance(problem, TaskSet):
-                own = {"tasks": problem, "out": folder, "on_event": progress}
-                result = synthesize_on_set(**settings | own)
-            else:
-                names = [f.name for f in fields(SynthOptions) if scope(f) == "set"]
-                settings = {n: v for n, v in settings.items() if n not in names}
-                own = {"task": problem, "out": folder, "on_event": progress}
-                result = synthesize(**settings | own)
+            result = synthesize(
+                problem, out=folder, options=options, index=index, on_event=progress
+            )
     except (KeyboardInterrupt, Fault, OSError):
         print_plain(console, _so_far(folder))
         raise
@@ -148,18 +138,19 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
     if before.finished and not more:
         check_own(before)
         return _show(before, console, before=before)
-    everything = {**arguments_of(options), "suite": run_flags.suite}
+    everything = {**_values(options), "suite": run_flags.suite}
     known = {name: everything[name] for name in ALLOWED & set(typed)}
     known |= {n: everything[n] for n in ("max_cost", "max_tokens", "tier")}
     check_ready_again(before, known)
     with console.status("preparing the task …"):
-        if before.on_set:
-            wanted = resume_set_arguments(before, known, trust=run_flags.trust)
-            wanted["then_verify"] = options.then_verify
-        else:
-            wanted = resume_arguments(run_flags.resume, known, trust=run_flags.trust)
-    problem = wanted.pop("tasks" if before.on_set else "task")
-    return write(problem, wanted.pop("out"), wanted, console)
+        wanted = resume_arguments(run_flags.resume, known, trust=run_flags.trust)
+    problem, folder, index = (wanted.pop(n) for n in ("problem", "out", "index"))
+    settings = SynthOptions(then_verify=options.then_verify).changed(**wanted)
+    return write(problem, folder, settings, console, index)
+
+
+def _values(options: SynthOptions) -> dict[str, Any]:
+    return {field.name: getattr(options, field.name) for field in fields(options)}
 
 
 def _refuse_others(typed: Collection[str], *options: Any) -> None:
@@ -177,7 +168,8 @@ def _refuse_others(typed: Collection[str], *options: Any) -> None:
 
 def check_models(options: SynthOptions) -> None:
     """Checks the models of a new run before its task is loaded; see `check_ready`."""
-    names = [options.learner, options.optimizer or options.learner]
+    learner = str(options.learner)
+    names = [learner, str(options.optimizer or learner)]
     checked_vision(options.vision, names[1], options.patience, options.improve)
     limits = (*RECORDED, "key_over_http")
     check_ready(names, {name: getattr(options, name) for name in limits})
@@ -228,36 +220,23 @@ def _so_far(folder: Path) -> str:
     return f"the run so far is in {folder}; to continue: {command}"
 
 
-def read_text(path: Path) -> str:
-    """The text of a controller file.
-
-    Raises:
-        ControllerFileError: The file cannot be read, or is not UTF-8.
-    """
-    try:
-        return read_source(path).decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise ControllerFileError(
-            f"{path} is not UTF-8 text: {error.reason}"
-        ) from error
-
-
-def _heading(problem: Task | TaskSet, learner: str, optimizer: str | None) -> str:
-    on_set = isinstance(problem, TaskSet)
-    kind = "no language model" if on_set else "a tuned template, no language model"
-    model = f"learner [bold]{escape(learner)}[/]"
+def _heading(problem: Problem, learner: str | Provider, optimizer: Any) -> str:
+    kind = "no language model"
+    kind = kind if problem.task is None else f"a tuned template, {kind}"
+    model = f"learner [bold]{escape(str(learner))}[/]"
     model += f" ({kind})" if learner == "builtin" else ""
     if optimizer not in (None, learner):
         model += f", optimizer [bold]{escape(str(optimizer))}[/]"
-    if isinstance(problem, TaskSet):
+    task = problem.task
+    if task is None:
         digest = f"[bold]{escape(problem.name)}[/] {problem.sha256[:8]}"
         return f"task set {digest}, worlds of dev; {model}"
-    nominal, setting = problem.nominal, problem.setting
+    nominal, setting = task.nominal, task.setting
     return (
-        f"task [bold]{escape(display_name(problem))}[/]: shortest path "
+        f"task [bold]{escape(display_name(task))}[/]: shortest path "
         f"{setting.length_text(shortest_path_length(nominal))}, "
         f"body radius {setting.length_text(nominal.body_radius)}, "
-        f"at most {nominal.horizon} steps; {model}" + "".join(_remarks(problem))
+        f"at most {nominal.horizon} steps; {model}" + "".join(_remarks(task))
     )
 
 

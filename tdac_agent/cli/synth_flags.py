@@ -15,10 +15,10 @@ from tdac_agent.cli.options import (
     suite_option,
     trust_option,
 )
-from tdac_agent.cli.synth_options import SynthOptions
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import typed_options
 from tdac_agent.options import option
+from tdac_agent.synthesis.options import SynthOptions
 
 app = typer.Typer()
 

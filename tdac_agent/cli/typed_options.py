@@ -14,6 +14,7 @@ import dataclasses
 import functools
 import inspect
 import math
+import sys
 from collections.abc import Callable, Collection, Iterable, Sequence
 from importlib import import_module
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
@@ -92,12 +93,22 @@ class _WithFlags:
 
 def _fields(kind: Any) -> dict[str, tuple[dataclasses.Field[Any], Flag, Any]]:
     """The fields of a dataclass that have flags, with these and their types."""
-    hints, flags = get_type_hints(kind), {}
+    flags = {}
     for field in dataclasses.fields(kind):
         flag = flag_of(field)
         if flag is not None:
-            flags[field.name] = field, flag, flag.type or hints[field.name]
+            flags[field.name] = field, flag, flag.type or _type_of(kind, field.name)
     return flags
+
+
+def _type_of(kind: Any, name: str) -> Any:
+    """The type of a field; types of others need not be imported."""
+    for owner in kind.__mro__:
+        hint = vars(owner).get("__annotations__", {}).get(name)
+        if hint is not None:
+            module = vars(sys.modules[owner.__module__])
+            return eval(hint, module) if isinstance(hint, str) else hint
+    raise TypeError(f"{kind.__name__} has no field {name}")
 
 
 def _flags(kind: Any, without: Collection[str]) -> Iterable[inspect.Parameter]:

@@ -37,8 +37,8 @@ class VerifyOptions:
     seed: int | None = seed_option(scope="task")
     junit: Path | None = option(None, "Write a JUnit XML report.", metavar="FILE")
     out: Path | None = out_option(
-        "Folder for report.json (and robust.json; or set.json), the trajectories and a "
-        "picture of each failed episode."
+        "Folder for report.json or episodes.json, the trajectories and a picture of "
+        "each failed episode."
     )
     as_json: bool = json_option()
     split: str = option(

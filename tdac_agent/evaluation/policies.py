@@ -24,7 +24,7 @@ from tdac_agent.planners.planner import planner_names, planner_on
 from tdac_agent.problems.episodes import episodes_of, planner_sha256, write_set
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.storage.hashes import sha256_of, sha256_of_file
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file
 from tdac_agent.verification.judge.drivers import Kind, PolicySpec

@@ -15,14 +15,15 @@ import jinja2
 from tdac_agent.errors import RunError
 from tdac_agent.harbor.judge import SALT_FILE, TASK_FOLDER, WORLDS_FILE
 from tdac_agent.harbor.wheel import pinned_versions, write_wheel
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.problems.episodes import episodes_of, write_set
-from tdac_agent.problems.problem import LevelProblem, Problem, TaskProblem
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.synthesis.answers import Exam, files_of, reference_of
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.verification.salt import SALT_BYTES
-from tdac_agent.verification.verify import DEADLINE_SECONDS, suite_sha256
+from tdac_agent.verification.verify import DEADLINE_SECONDS
 from tdac_envs.ladder.task_sets import TaskSet
 
 TEMPLATES = Path(__file__).with_name("templates")
@@ -51,10 +52,11 @@ def export_task(task: Task, out: Path) -> Path:
             f"the task {task.name} has tests of its own, which a Harbor task cannot "
             "bring; leave out `suite`"
         )
-    problem = TaskProblem(task)
-    facts = {"task_sha256": task.sha256(), "suite_sha256": suite_sha256(task)}
+    exam = Exam(problem_of(task))
+    problem = exam.problem
+    facts = {"task_sha256": problem.sha256, "suite_sha256": problem.suite_sha256}
     tests = _write_common(
-        problem,
+        exam,
         out,
         {
             "package": _package(task.name),
@@ -85,10 +87,10 @@ def export_set(tasks: TaskSet, out: Path, worlds: int = WORLDS) -> Path:
     """
     _check_empty(out)
     salt = secrets.token_bytes(SALT_BYTES)
-    problem = LevelProblem(tasks, worlds)
+    exam = Exam(problem_of(tasks), worlds)
     longest = episodes_of(tasks).limits.cpu_seconds * worlds
     tests = _write_common(
-        problem,
+        exam,
         out,
         {
             "package": _package(tasks.name),
@@ -112,10 +114,10 @@ def export_set(tasks: TaskSet, out: Path, worlds: int = WORLDS) -> Path:
 
 
 def _write_common(
-    problem: Problem, out: Path, labels: dict[str, Any], facts: dict[str, Any]
+    exam: Exam, out: Path, labels: dict[str, Any], facts: dict[str, Any]
 ) -> Path:
     """Writes all files but the problem itself; returns the folder of the tests."""
-    question, solution = problem.question(), problem.reference()
+    question, solution = exam.question(), reference_of(exam.problem)
     environment, tests, oracle = (
         out / name for name in ("environment", "tests", "solution")
     )
@@ -152,7 +154,7 @@ def _write_common(
         script.chmod(0o755)
     write_atomic(tests / "constraints.txt", pinned_versions())
     write_atomic(oracle / "controller.py", solution)
-    for name, raw in problem.files().items():
+    for name, raw in files_of(exam.problem).items():
         write_atomic(environment / "files" / name, raw)
     return tests
 

@@ -14,9 +14,10 @@ import sys
 from pathlib import Path
 
 from tdac_agent.errors import Fault
-from tdac_agent.problems.problem import LevelProblem, Problem, TaskProblem
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.synthesis.answers import Exam
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
@@ -30,33 +31,33 @@ MOST_BYTES = 1_000_000
 """Larger files are not read; the tests refuse much smaller ones."""
 
 
-def problem_in(tests: Path) -> Problem:
-    """The problem in the folder `tests` of a Harbor task.
+def exam_in(tests: Path) -> Exam:
+    """The problem, and how it is judged, in the folder `tests` of a Harbor task.
 
     Raises:
         TdacError: It cannot be read.
     """
     if (tests / TASK_FOLDER / TASK_FILE).is_file():
-        return TaskProblem(load_task(tests / TASK_FOLDER))
+        return Exam(problem_of(load_task(tests / TASK_FOLDER)))
     worlds = parse_json(read_file(tests / WORLDS_FILE, TEXT_BYTES))
     tasks = load_set(tests / SET_FILE)
-    return LevelProblem(tasks, worlds, "hidden", tests / SALT_FILE)
+    return Exam(problem_of(tasks), worlds, "hidden", tests / SALT_FILE)
 
 
 def main(words: list[str]) -> int:
     """Judges, and prints the feedback; returns the exit code."""
     controller, tests, logs = map(Path, words)
     try:
-        problem = problem_in(tests)
+        exam = exam_in(tests)
         source, fault = _read(controller)
-        judged = None if source is None else problem.judge(source, lambda: None)
+        judged = None if source is None else exam.judge(source, lambda: None)
     except (TdacError, Fault, OSError, ValueError) as error:
         print(f"no verdict: {error}", file=sys.stderr)
         return 3
-    scores = dict.fromkeys(problem.scores, 0.0) if judged is None else judged.scores
+    scores = dict.fromkeys(exam.scores, 0.0) if judged is None else judged.scores
     if judged is not None:
         _write(logs / "report.json", judged.facts["report"])
-    _write(logs / "reward.json", {"reward": scores[problem.scores[0]], **scores})
+    _write(logs / "reward.json", {"reward": scores[exam.scores[0]], **scores})
     print(fault if judged is None else judged.feedback)
     return 0
 

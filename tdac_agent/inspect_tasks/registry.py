@@ -19,11 +19,10 @@ from inspect_ai.scorer import Scorer
 from tdac_agent.inspect_tasks.names import registered
 from tdac_agent.inspect_tasks.scoring import driven, verified
 from tdac_agent.inspect_tasks.solvers import repair, tdac_builtin
-from tdac_agent.problems.problem import LevelProblem, problem_of
+from tdac_agent.synthesis.answers import exam_of, files_of
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.registry import own_environments
 from tdac_envs.ladder.set_file import set_names
-from tdac_envs.ladder.task_sets import load_set
 
 __all__ = ["driven", "repair", "tdac_builtin", "verified"]
 WORLDS = 20
@@ -68,8 +67,7 @@ def _register_level(inspect_name: str, name: str) -> None:
     ) -> Task:
         # Inspect may change the working folder later.
         salt = None if salt_file is None else Path(salt_file).absolute()
-        LevelProblem(load_set(name), worlds, split, salt)  # checks the values
-        about = {"level": name, "worlds": worlds, "split": split}
+        about: dict[str, Any] = {"level": name, "worlds": worlds, "split": split}
         if salt is not None:
             about["salt_file"] = str(salt)
         return _task(name, about, driven())
@@ -77,13 +75,13 @@ def _register_level(inspect_name: str, name: str) -> None:
 
 def _task(name: str, about: dict[str, Any], judge: Scorer) -> Task:
     """A task of one sample: the question for one controller."""
-    problem = problem_of(about)
+    exam = exam_of(about)  # checks the values
     sample = Sample(
-        input=problem.question(),
+        input=exam.question(),
         target="a verified controller.py",
         id=name,
         metadata=about,
-        files={name: _data_uri(raw) for name, raw in problem.files().items()},
+        files={name: _data_uri(raw) for name, raw in files_of(exam.problem).items()},
     )
     return Task(dataset=[sample], scorer=judge, version=versions()["tdac"])
 

@@ -22,14 +22,10 @@ from inspect_ai.solver import TaskState
 from inspect_ai.util import concurrency
 
 from tdac_agent.inspect_tasks.names import registered
-from tdac_agent.problems.problem import (
-    Poll,
-    Problem,
-    problem_of,
-    raw,
-    unusable,
-)
+from tdac_agent.problems.problem import Poll
 from tdac_agent.prompting.extract import POLICY, Answer, read_answer
+from tdac_agent.synthesis.answers import Exam, exam_of, unusable
+from tdac_agent.synthesis.candidates import raw
 
 T = TypeVar("T")
 JUDGES = 1
@@ -89,14 +85,14 @@ def answer_of(state: TaskState) -> Answer:
     return read_answer(state.output.completion, (POLICY,), ended=ended)
 
 
-async def in_thread(state: TaskState, work: Callable[[Problem, Poll], T]) -> T:
+async def in_thread(state: TaskState, work: Callable[[Exam, Poll], T]) -> T:
     """Does the judge's work on a sample in a thread, while others wait for theirs.
 
     A sample that is cancelled ends it.
 
     Args:
         state: State of the sample.
-        work: Called with the sample's problem, and with a function to call repeatedly.
+        work: Called with the sample's exam, and with a function to call repeatedly.
 
     Raises:
         Fault: The judge or its sandbox is broken. For Inspect this is an error of the
@@ -104,7 +100,7 @@ async def in_thread(state: TaskState, work: Callable[[Problem, Poll], T]) -> T:
     """
 
     def called() -> T:
-        return work(problem_of(state.metadata), from_thread.check_cancelled)
+        return work(exam_of(state.metadata), from_thread.check_cancelled)
 
     async with concurrency("tdac judge", JUDGES):
         return await to_thread.run_sync(called)
@@ -115,7 +111,7 @@ async def _judged(state: TaskState) -> tuple[dict[str, float], dict[str, Any]]:
     source, problem = answer_of(state)
     if source is None:
         return {}, {"explanation": unusable(problem), "reason": NO_CODE}
-    judged = await in_thread(state, lambda own, poll: own.judge(raw(source), poll))
+    judged = await in_thread(state, lambda exam, poll: exam.judge(raw(source), poll))
     rest = {
         "answer": source,
         "explanation": judged.feedback,

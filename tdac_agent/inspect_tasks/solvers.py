@@ -7,13 +7,9 @@ from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from tdac_agent.inspect_tasks.names import registered
 from tdac_agent.inspect_tasks.scoring import answer_of, in_thread
-from tdac_agent.problems.problem import (
-    Judged,
-    Poll,
-    Problem,
-    raw,
-    unusable,
-)
+from tdac_agent.problems.problem import Judged, Poll
+from tdac_agent.synthesis.answers import Exam, reference_of, unusable
+from tdac_agent.synthesis.candidates import raw
 from tdac_envs.core.arguments import whole_number
 
 MOST_ATTEMPTS = 100
@@ -54,8 +50,8 @@ async def _told(state: TaskState, turn: int) -> str | None:
     if source is None:
         return unusable(problem)
 
-    def rehearse(own: Problem, poll: Poll) -> Judged:
-        return own.rehearse(raw(source), turn, poll)
+    def rehearse(exam: Exam, poll: Poll) -> Judged:
+        return exam.rehearse(raw(source), turn, poll)
 
     judged = await in_thread(state, rehearse)
     return None if judged.passed else REPAIR.format(feedback=judged.feedback)
@@ -66,7 +62,7 @@ def tdac_builtin() -> Solver:
     """Answers with tdac's own controller and asks no model, to try an installation."""
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001
-        source = await in_thread(state, lambda problem, _: problem.reference())
+        source = await in_thread(state, lambda exam, _: reference_of(exam.problem))
         answer = f"```python\n{source}```\n"
         state.output = ModelOutput.from_content("tdac builtin", answer)
         state.messages.append(state.output.message)

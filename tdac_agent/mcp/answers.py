@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from pydantic import BaseModel, Field
 
+from tdac_agent.verification.episode_report import EpisodeReport, decision_text
+
 
 class Refused(Exception):
     """A request that cannot be answered: what is wrong, in one line."""
@@ -17,25 +19,6 @@ class EpisodeAnswer(BaseModel):
     name: str = Field(description="Its name, for `picture`.")
     outcome: str = Field(description="`reached`, `collision`, `out of time`, …")
     steps: int
-
-
-@dataclass(frozen=True, slots=True)
-class Judged:
-    """How a submission did.
-
-    Attributes:
-        verified: Whether it passed all tests of a task; never true on a task set.
-        summary: The result in one line.
-        failures: What failed, for the agent; never empty.
-        episodes: Its episodes that may be told; those of held-out starts may not.
-        unfit: Why it cannot be chosen; empty if it can.
-    """
-
-    verified: bool
-    summary: str
-    failures: str
-    episodes: tuple[EpisodeAnswer, ...]
-    unfit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +90,36 @@ class ChooseAnswer(BaseModel):
     summary: str = Field(description="The verdict in one line.")
     worlds: int | None = Field(description="Hidden worlds driven; null on a task.")
     reached: int | None = Field(description="Those in which the goal was reached.")
+
+
+def suite_verdict(number: int, *, verified: bool) -> ChooseAnswer:
+    """The verdict on a task, which its suite gave before the choice."""
+    return ChooseAnswer(
+        submission=number,
+        verified=verified,
+        summary=f"submission {number} is the verified controller of this run",
+        worlds=None,
+        reached=None,
+    )
+
+
+def hidden_verdict(number: int, report: EpisodeReport) -> ChooseAnswer:
+    """The verdict on hidden worlds of a task set."""
+    parts = [f"the goal reached in {report.successes} of {report.count} hidden worlds"]
+    if report.refused:
+        parts = ["the static and contract tests refused the file"]
+    if report.sequential is not None:
+        parts.append(decision_text(report.sequential).rstrip(","))
+    if report.causes:
+        counts = (f"{count} {name}" for name, count in report.causes.items())
+        parts.append(f"failures: {', '.join(counts)}")
+    return ChooseAnswer(
+        submission=number,
+        verified=report.passed,
+        summary="; ".join(parts),
+        worlds=report.count,
+        reached=report.successes,
+    )
 
 
 def first_word(*, verified: bool) -> str:

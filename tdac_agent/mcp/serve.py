@@ -1,4 +1,4 @@
-"""Serves a desk over stdio, or over HTTP on the loopback interface."""
+"""Serves a session over stdio, or over HTTP on the loopback interface."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ import uvicorn
 from mcp.server.stdio import stdio_server
 
 from tdac_agent.loopback import HOST
-from tdac_agent.mcp.desk import Desk
 from tdac_agent.mcp.gate import Gate
 from tdac_agent.mcp.server import Counter
+from tdac_agent.mcp.session import Session
 
 PATH = "/mcp"
 END_SECONDS = 1
 """How long open requests are waited for at the end."""
 
 
-def serve_stdio(desk: Desk) -> None:
+def serve_stdio(session: Session) -> None:
     """Serves one agent until it closes stdin; stdout belongs to the protocol.
 
     Raises:
         KeyboardInterrupt: A signal ended it. A thread may still wait for stdin, so that
             the process must be ended by `os._exit`.
     """
-    with closing(Counter(desk)) as counter, _interrupted_at_once():
+    with closing(Counter(session)) as counter, _interrupted_at_once():
         anyio.run(_speak, counter)
 
 
@@ -39,17 +39,17 @@ async def _speak(counter: Counter) -> None:
 
 
 def serve_http(
-    desk: Desk, opened: socket.socket, token: str, announce: Callable[[str], None]
+    session: Session, opened: socket.socket, token: str, announce: Callable[[str], None]
 ) -> None:
     """Serves agents on the loopback interface until it is interrupted.
 
     Args:
-        desk: The desk.
+        session: The session.
         opened: An open port, from `listen`.
         token: The bearer token that each request must have.
         announce: Called with the address.
     """
-    with closing(Counter(desk)) as counter:
+    with closing(Counter(session)) as counter:
         port = opened.getsockname()[1]
         application = counter.server().streamable_http_app(
             streamable_http_path=PATH, host=HOST

@@ -1,4 +1,4 @@
-"""The protocol: answers requests by work at the desk, one request at a time."""
+"""The protocol: answers requests by a session, one request at a time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pydantic import ValidationError
 
 from tdac_agent.errors import Fault
 from tdac_agent.mcp.answers import Refused
-from tdac_agent.mcp.desk import Desk
+from tdac_agent.mcp.session import Session
 from tdac_agent.mcp.tools import BY_NAME, TOOLS, ToolSpec, problem
 from tdac_agent.mcp.watch import Step, Stopped
 from tdac_envs.core.errors import TdacError, hint, one_line_reason
@@ -45,20 +45,20 @@ UNFINISHED = (
 
 
 class Counter:
-    """Serves agents at a desk: a single thread does all work, in order of arrival.
+    """Serves agents in a session: a single thread does all work, in order of arrival.
 
     Judging takes long, so the thread of the protocol stays free. A request that its
     client gives up is finished nevertheless if it has begun.
 
     Args:
-        desk: The desk.
+        session: The session.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, session: Session) -> None:
+        self._session = session
         self._thread = ThreadPoolExecutor(1, "tdac-mcp")
         # What an earlier server left unfinished comes first.
-        self._caught_up = self._thread.submit(_answered, desk.catch_up)
+        self._caught_up = self._thread.submit(_answered, session.catch_up)
 
     def server(self) -> Server[dict[str, Any]]:
         """The server, for any transport."""
@@ -72,10 +72,10 @@ class Counter:
         )
 
     def close(self) -> None:
-        """Stops the present work, refuses the rest, and closes the desk."""
-        self._desk.watch.stop()
+        """Stops the present work, refuses the rest, and closes the session."""
+        self._session.watch.stop()
         self._thread.shutdown(cancel_futures=True)
-        self._desk.close()
+        self._session.close()
 
     async def _list(
         self, context: Context, parameters: PaginatedRequestParams | None
@@ -116,13 +116,13 @@ class Counter:
         client: str,
         on_step: Callable[[Step], None],
     ) -> CallToolResult:
-        self._desk.watch.begin(on_step)
+        self._session.watch.begin(on_step)
         try:
-            self._desk.catch_up()
-            self._desk.met(client)
-            return tool.work(self._desk, arguments, client)
+            self._session.catch_up()
+            self._session.met(client)
+            return tool.work(self._session, arguments, client)
         finally:
-            self._desk.watch.begin(None)
+            self._session.watch.begin(None)
 
 
 def _answered(work: Callable[[], T]) -> T | CallToolResult:

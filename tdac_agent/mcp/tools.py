@@ -1,4 +1,4 @@
-"""The tools: their names, descriptions and schemas, and what each does at the desk."""
+"""The tools: their names, descriptions and schemas, and what each does."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tdac_agent.mcp.answers import (
     SubmitAnswer,
     first_word,
 )
-from tdac_agent.mcp.desk import Desk
+from tdac_agent.mcp.session import Session
 
 
 class _Arguments(BaseModel):
@@ -58,7 +58,7 @@ class ToolSpec:
         name: Its name.
         description: What it does, for the agent.
         arguments: Its arguments.
-        work: Does it; takes the desk, the arguments, and the agent's program.
+        work: Does it; takes the session, the arguments, and the agent's program.
         answer: What its structured content is; None if it has none.
         reads: Whether it changes nothing.
     """
@@ -66,7 +66,7 @@ class ToolSpec:
     name: str
     description: str
     arguments: type[_Arguments]
-    work: Callable[[Desk, Any, str], CallToolResult]
+    work: Callable[[Session, Any, str], CallToolResult]
     answer: type[BaseModel] | None = None
     reads: bool = True
 
@@ -101,14 +101,14 @@ def _said(text: str, answer: BaseModel | None = None) -> CallToolResult:
     return CallToolResult(content=[_text(text)], structured_content=content)
 
 
-def _read_task(desk: Desk, arguments: Nothing, client: str) -> CallToolResult:
+def _read_task(session: Session, arguments: Nothing, client: str) -> CallToolResult:
     del arguments, client
-    return _said(desk.read_task())
+    return _said(session.read_task())
 
 
-def _submit(desk: Desk, arguments: Source, client: str) -> CallToolResult:
-    answer = desk.submit(arguments.source, client)
-    number, left = answer.submission, desk.left
+def _submit(session: Session, arguments: Source, client: str) -> CallToolResult:
+    answer = session.submit(arguments.source, client)
+    number, left = answer.submission, session.left
     text = f"{first_word(verified=answer.verified)}: {answer.summary}."
     if answer.verified:
         text += f" choose({number}) makes it the result, and ends the run."
@@ -121,14 +121,14 @@ def _submit(desk: Desk, arguments: Source, client: str) -> CallToolResult:
 _STATE = {True: "verified", False: "not verified"}
 
 
-def _failures(desk: Desk, arguments: Numbered, client: str) -> CallToolResult:
+def _failures(session: Session, arguments: Numbered, client: str) -> CallToolResult:
     del client
-    return _said(desk.failures(arguments.submission))
+    return _said(session.failures(arguments.submission))
 
 
-def _picture(desk: Desk, arguments: PictureOf, client: str) -> CallToolResult:
+def _picture(session: Session, arguments: PictureOf, client: str) -> CallToolResult:
     del client
-    png = desk.picture(arguments.submission, str(arguments.episode))
+    png = session.picture(arguments.submission, str(arguments.episode))
     data = base64.b64encode(png).decode("ascii")
     caption = (
         f"Submission {arguments.submission}, episode {arguments.episode}: the robot's "
@@ -138,21 +138,21 @@ def _picture(desk: Desk, arguments: PictureOf, client: str) -> CallToolResult:
     return CallToolResult(content=[image, _text(caption)])
 
 
-def _submissions(desk: Desk, arguments: Nothing, client: str) -> CallToolResult:
+def _submissions(session: Session, arguments: Nothing, client: str) -> CallToolResult:
     del arguments, client
-    answer = desk.listed()
+    answer = session.listed()
     lines = [
         f"{each.submission}: {_STATE[each.verified]}: {each.summary}"
         for each in answer.submissions
     ]
     lines = lines or ["nothing has been submitted"]
-    lines.append(f"left: {desk.left}" if answer.ended is None else answer.ended)
+    lines.append(f"left: {session.left}" if answer.ended is None else answer.ended)
     return _said("\n".join(lines), answer)
 
 
-def _choose(desk: Desk, arguments: Numbered, client: str) -> CallToolResult:
+def _choose(session: Session, arguments: Numbered, client: str) -> CallToolResult:
     del client
-    answer = desk.choose(arguments.submission)
+    answer = session.choose(arguments.submission)
     word = first_word(verified=answer.verified)
     return _said(f"{word}: {answer.summary}. The run has ended.", answer)
 

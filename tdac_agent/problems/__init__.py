@@ -1,1 +1,1 @@
-"""A task or a level as a question for a model, with the judge of its answers."""
+"""What controllers are written for: a single task, or a task set."""

@@ -18,11 +18,9 @@ from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import sha256_of_file
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import Task, read_task
-from tdac_agent.tasks.task_file import SET_FILE, TaskFile
+from tdac_agent.tasks.task_file import OWN_SUITE, SET_FILE, TaskFile
 from tdac_agent.tasks.trust import Wish, asking, suite_wish
 
-OWN_SUITE = "suite"
-"""Subfolder of a run with the tests of its task."""
 OURS = "builtin"
 """The learner that needs no permission."""
 

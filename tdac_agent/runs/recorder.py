@@ -7,18 +7,18 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tdac_agent.models.budget import Amount, Enough
 from tdac_agent.models.provider import Kind, Reply, Request
 from tdac_agent.models.retry import FailedCall
+from tdac_agent.problems.problem import Problem
 from tdac_agent.prompting.prompt import PromptTemplate
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.runs.journal_state import REPEATED, JournalState, reply_of
 from tdac_agent.runs.mark import Files, MarkedJournal, files_of, mark_of
-from tdac_agent.runs.ownership import OWN_SUITE, suite_in
+from tdac_agent.runs.ownership import suite_in
 from tdac_agent.runs.run_record import (
     GIVEN_FILE,
     GIVEN_RULES_FILE,
@@ -32,14 +32,11 @@ from tdac_agent.runs.run_record import (
     call_file,
     candidate_at,
 )
-from tdac_agent.runs.task_files import write_task
 from tdac_agent.storage.blobs import Blobs
 from tdac_agent.storage.files import write_atomic, write_if_changed
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.installation import lasting_secret
-from tdac_agent.tasks.task import Task, portable_task_file
-from tdac_agent.tasks.task_file import TASK_FILE
-from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.tasks.task_file import OWN_SUITE
 
 MOST_LINES = 5000
 """Longest source that is diffed; the time grows with the square of the length."""
@@ -74,53 +71,35 @@ class Recorder:
         """Reads what the journal has already."""
         self._journal = MarkedJournal.of(self.run)
 
-    def start(
-        self, task: Task, template: PromptTemplate, given: str | None, **facts: Any
-    ) -> None:
-        """Writes the task and its files, and begins the journal.
-
-        Args:
-            task: What the controller must do.
-            template: Template of the first question; a copy is kept unless shipped.
-            given: Source of an initial controller, if there is one.
-            **facts: Further fields of the journal record.
-        """
-        last = TASK_FILE, portable_task_file(task, own_suite=OWN_SUITE)
-        own = self.run.folder / OWN_SUITE if task.suite else None
-        self.begin(partial(write_task, task), last, template, given, own, **facts)
-
     def begin(
         self,
-        write: Callable[[Path], None],
-        last: tuple[str, str],
+        problem: Problem,
         template: PromptTemplate,
         given: str | None,
-        suite: Path | None = None,
         **facts: Any,
     ) -> None:
         """Writes the files of a new run, and begins the journal.
 
         Args:
-            write: Writes what the run is about into its folder.
-            last: Name and content of the file that is written last.
+            problem: What the controller is for.
             template: Template of the first question; a copy is kept unless shipped.
             given: Source of an initial controller, if there is one.
-            suite: Where `write` puts the user's own tests, if there are any.
             **facts: Further fields of the journal record.
         """
         folder = self.run.folder
         # Most runs have neither template nor tests: they are known from here on.
         self.run.mark = "" if lasting_secret() is None else "own"
         self.save()
-        write(folder)
+        problem.write_files(folder)
+        problem.write_originals(folder)
         if template.text is not None:
             write_atomic(folder / PROMPT_FILE, template.text)
         if given is not None:
             write_atomic(folder / GIVEN_FILE, given)
-        self._take_files(suite)
+        self._take_files(folder / OWN_SUITE if problem.suite else None)
         self.save()
         # Written last: a run with a task but no mark is from another installation.
-        write_atomic(folder / last[0], last[1])
+        write_atomic(folder / problem.file, problem.text)
         about = {"task": self.run.task, "learner": self.run.learner}
         self.event("run.start", **about, **facts)
 
@@ -293,37 +272,6 @@ class Recorder:
     def vouches(self, file: Path) -> bool:
         """Whether a report may be reused: this run has written it, as it is now."""
         return bool(self.run.mark) and self._journal.vouches(file)
-
-    def judged(
-        self,
-        k: int,
-        j: int,
-        report: Report | None,
-        notes: tuple[str, ...],
-        *,
-        unchanged: bool = False,
-    ) -> bool:
-        """Records the result of a candidate; returns whether it is new.
-
-        Args:
-            k: Iteration of the candidate.
-            j: Edit of the candidate.
-            report: Its report; None if the model gave no code.
-            notes: Notes on the model's answer.
-            unchanged: Whether the report is that of an earlier candidate with its code.
-        """
-        failed = () if report is None else tuple(f.test for f in report.failures)
-        attempt = Attempt(
-            k=k,
-            j=j,
-            valid=report is not None,
-            passed=report is not None and report.passed,
-            failed_tests=failed,
-            seed=None if report is None else report.provenance.seed,
-            notes=notes,
-            unchanged=unchanged,
-        )
-        return self.attempted(attempt)
 
     def attempted(self, attempt: Attempt) -> bool:
         """Records the result of a candidate; returns whether it is new."""

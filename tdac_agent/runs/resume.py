@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from tdac_agent.errors import RunError
+from tdac_agent.problems.choice import kept_problem
 from tdac_agent.prompting.given_rules import given_book
 from tdac_agent.prompting.prompt import VARIANTS
 from tdac_agent.runs.ownership import (
@@ -16,7 +16,6 @@ from tdac_agent.runs.ownership import (
     has_earlier_mark,
     is_own,
     is_own_folder,
-    load_task,
     remark_on,
     wishes_of,
 )
@@ -30,11 +29,9 @@ from tdac_agent.runs.run_record import (
 )
 from tdac_agent.storage.files import UNFINISHED, read_inside
 from tdac_agent.storage.locks import LOCK_FILE
-from tdac_agent.tasks.task import Task
-from tdac_agent.tasks.task_file import TASK_FILE
 from tdac_agent.tasks.trust import permit
 from tdac_envs.core.errors import one_line_reason
-from tdac_envs.core.intake import TEXT_BYTES, parse_json
+from tdac_envs.core.intake import TEXT_BYTES
 
 # Fields that determine the questions of a run and the use of the answers, as named in
 # messages. Runs that agree in all of them are the same run.
@@ -157,23 +154,20 @@ def resume_arguments(
 
     Raises:
         NotTrustedError: Another installation's run needs a permission.
-        RunError: There is no readable run.
-        TaskError: The task cannot be read.
+        RunError: There is no readable run, or it had not begun.
+        TaskError: The task or the task set cannot be read.
     """
-    run = load_run(folder)
-    if not (folder / TASK_FILE).is_file():
+    run, problem = load_run(folder), kept_problem(folder)
+    if problem is None:
         raise RunError(
             f"the run in {folder} ended before its files were written: repeat its "
             f"command with --out {folder}"
         )
     flags = {name: value for name, value in (given or {}).items() if value is not None}
-    task = recorded_task(folder)
-    if not is_own(run, task.suite):
-        permit(called(run), wishes_of(run, task.suite, flags), trust=trust)
-    suite = flags.pop("suite", None)
-    if task.suite is not None:
-        task = replace(task, suite=suite or task.suite, trusted=True)
-    return {**settings_of(run), "task": task, **flags}
+    if not is_own(run, problem.suite):
+        permit(called(run), wishes_of(run, problem.suite, flags), trust=trust)
+    problem = problem.permitted(flags.pop("suite", None))
+    return {**settings_of(run), "problem": problem, **flags}
 
 
 def settings_of(run: Run) -> dict[str, Any]:
@@ -195,6 +189,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "patience": run.patience,
         "candidates": run.candidates,
         "improve": run.improve,
+        **_of_episodes(run),
         "seed": run.seed,
         "index": run.index,
         "start_from": _text(folder) if initial.is_file() else None,
@@ -208,6 +203,12 @@ def settings_of(run: Run) -> dict[str, Any]:
     }
 
 
+def _of_episodes(run: Run) -> dict[str, Any]:
+    """The settings that only a run on a task set records."""
+    settings = {name: getattr(run, name) for name in ("episodes", "feedback_episodes")}
+    return {name: value for name, value in settings.items() if value is not None}
+
+
 def _text(folder: Path) -> str:
     """Reads the initial controller of a run.
 
@@ -219,23 +220,3 @@ def _text(folder: Path) -> str:
     except (OSError, ValueError) as error:
         file = folder / GIVEN_FILE
         raise RunError(f"cannot read {file}: {one_line_reason(error)}") from error
-
-
-def recorded_task(folder: Path) -> Task:
-    """Loads the task of a run with its original parameters.
-
-    The folder has a copy of the map or world; `params.json` names the original file.
-
-    Raises:
-        RunError: The parameters are damaged.
-    """
-    task = load_task(folder)
-    setting: Any = task.setting
-    try:
-        raw = read_inside(folder, "params.json", TEXT_BYTES)
-        params = setting.params.read(parse_json(raw))
-    except (OSError, ValueError) as error:
-        raise RunError(
-            f"cannot resume {folder}: params.json: {one_line_reason(error)}"
-        ) from error
-    return replace(task, setting=replace(setting, params=params))

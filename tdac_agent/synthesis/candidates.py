@@ -1,109 +1,194 @@
-"""Tests candidates of a run on one task, and delivers a verified one."""
+"""Candidates: controllers that models wrote, and how they did."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from queue import SimpleQueue
+from statistics import fmean
 
-from tdac_agent.runs.recorder import Recorder
-from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.task import Task
-from tdac_agent.verification.diagnosis.figures import draw_trajectories
+from tdac_agent.prompting.feedback import Feedback
+from tdac_agent.runs.run_record import Attempt
+from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.diagnosis.report import Report
-from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.verify import kept_report, load_trajectories, verify
-from tdac_envs.core.intake import IMAGE_BYTES, read_file
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 
 
 @dataclass(frozen=True, slots=True)
-class Tests:
-    """Where candidates are tested: on a task, by a judge, in a sandbox tier."""
+class Result:
+    """What came of the tests of a candidate so far.
 
-    task: Task
-    judge: WarmJudge
-    tier: str
+    Attributes:
+        passed: Whether it was tested, and nothing failed.
+        rank: What decides which candidate is better, the main figure first; that is
+            above 0 if the candidate works.
+        failure: What the models are told; None if there is nothing to tell.
+        summary: The result in one line, with figures.
+        said: What the record says, unless the names of failed tests say it.
+        unfit: Why it cannot be delivered; empty if it can.
+        failed: What failed.
+        seed: Seed of its jittered starts, if its tests had one.
+        episodes: Name, outcome and steps of the episodes that may be told.
+    """
 
+    passed: bool
+    rank: tuple[float, ...]
+    failure: Feedback | None
+    summary: str = ""
+    said: str = ""
+    unfit: str = ""
+    failed: tuple[str, ...] = ()
+    seed: int | None = None
+    episodes: tuple[tuple[str, str, int], ...] = ()
 
-Job = tuple[int, int, str, Path]
-"""k, j, source and folder of a candidate."""
+    @property
+    def works(self) -> bool:
+        """Whether it is good for something."""
+        return self.rank[0] > 0.0
 
-
-def verify_all(recorder: Recorder, jobs: Sequence[Job], tests: Tests) -> list[Report]:
-    """The reports on candidates; at a time as many as there are cores."""
-    if len(jobs) < 2:
-        return [verify_candidate(recorder, *job, tests) for job in jobs]
-    for k, j, *_ in jobs:
-        recorder.event("verify.start", k=k, j=j)
-    cores = min(len(jobs), len(os.sched_getaffinity(0)))
-    with ExitStack() as stack:
-        others = [
-            stack.enter_context(WarmJudge(task=tests.task)) for _ in range(cores - 1)
-        ]
-        judges: SimpleQueue[WarmJudge] = SimpleQueue()
-        for judge in (tests.judge, *others):
-            judges.put(judge)
-
-        def report(job: Job) -> Report:
-            judge = judges.get()
-            try:
-                return _report(recorder, *job[2:], replace(tests, judge=judge))
-            finally:
-                judges.put(judge)
-
-        with ThreadPoolExecutor(cores) as pool:
-            return list(pool.map(report, jobs))
-
-
-def verify_candidate(
-    recorder: Recorder, k: int, j: int, source: str, folder: Path, tests: Tests
-) -> Report:
-    """The report on a candidate; a recorded one is reused."""
-    recorder.event("verify.start", k=k, j=j)
-    return _report(recorder, source, folder, tests)
-
-
-def _report(recorder: Recorder, source: str, folder: Path, tests: Tests) -> Report:
-    task, seed, file = tests.task, recorder.run.seed, folder / "report.json"
-    known = recorder.vouches(file)
-    kept = kept_report(folder, task, source, seed) if known else None
-    if kept is not None:
-        return kept
-    report = verify(
-        folder / "controller.py",
-        task,
-        tier=tests.tier,
-        seed=seed,
-        out=folder,
-        judge=tests.judge,
-    )
-    recorder.vouch(file)
-    return report
+    def attempt(
+        self, k: int, j: int, notes: tuple[str, ...], *, new: bool = True
+    ) -> Attempt:
+        """The record of an answer with this result; `new` is whether its code is."""
+        return Attempt(
+            k=k,
+            j=j,
+            valid=True,
+            passed=self.passed,
+            failed_tests=self.failed,
+            seed=self.seed,
+            notes=notes,
+            unchanged=not new,
+        )
 
 
-def deliver(
-    recorder: Recorder, task: Task, k: int, source: str, report: Report, evidence: Path
-) -> None:
-    """Ends a run with its first verified controller, of iteration `k`."""
-    place(recorder, task, source, report, evidence)
-    recorder.run.tau = k
-    recorder.finish("verified", k=k)
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """How a candidate drove in the episodes of a search; higher is better.
+
+    Attributes:
+        by_name: All figures.
+        ranked: Those that decide which member is best, the first one first, with what
+            they are called in texts.
+    """
+
+    by_name: Mapping[str, float]
+    ranked: Mapping[str, str]
+
+    @property
+    def time(self) -> float:
+        """Mean time score."""
+        return self.by_name["time"]
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """The figures that decide."""
+        return tuple(self.by_name[name] for name in self.ranked)
+
+    def beats(self, other: Figures) -> bool:
+        """Whether they are nowhere worse than others, and better somewhere."""
+        pairs = [(own, other.by_name[name]) for name, own in self.by_name.items()]
+        return all(a >= b for a, b in pairs) and any(a > b for a, b in pairs)
 
 
-def place(
-    recorder: Recorder, task: Task, source: str, report: Report, evidence: Path
-) -> None:
-    """Copies a verified controller and its evidence to the top of the run folder."""
-    folder = recorder.run.folder
-    recorder.deliver(source)
-    write_atomic(folder / "report.json", report.model_dump_json(indent=2) + "\n")
-    (folder / "trajectories").mkdir(exist_ok=True)
-    for path in sorted((evidence / "trajectories").glob("*.npz")):
-        write_atomic(folder / "trajectories" / path.name, read_file(path, IMAGE_BYTES))
-    outcomes = {episode.name: episode.outcome for episode in report.episodes}
-    trajectories = load_trajectories(folder / "trajectories")
-    draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")
+def _nothing() -> None:
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Explored:
+    """What came of a candidate in the episodes of a search.
+
+    Attributes:
+        figures: Its figures; None if it does not become a member of the archive.
+        said: The result in one line.
+        passed: Whether nothing failed.
+        failed: What failed.
+        drove: Whether it drove at all.
+        seed: Seed of its jittered starts, if its tests had one.
+        episodes: Number of episodes.
+        feedback: How it failed in them; None if it never did.
+        picture: Draws such a failure; it returns None if there is none to draw.
+    """
+
+    figures: Figures | None
+    said: str
+    passed: bool = False
+    failed: tuple[str, ...] = ()
+    drove: bool = True
+    seed: int | None = None
+    episodes: int = 0
+    feedback: str | None = None
+    picture: Callable[[], FailurePicture | None] = _nothing
+
+
+@dataclass(slots=True)
+class Candidate:
+    """A controller that a model wrote.
+
+    Attributes:
+        k: Its iteration.
+        j: Its edit.
+        source: Its source.
+        folder: Its folder.
+        report: The report of a suite; None before it was tested by one.
+        feedback: Reports on feedback worlds, in order.
+        validation: Its episodes on validation worlds.
+        explored: What came of it in a search, if it took part in one.
+    """
+
+    k: int
+    j: int
+    source: str
+    folder: Path
+    report: Report | None = None
+    feedback: list[EpisodeReport] = field(default_factory=list)
+    validation: list[EpisodeRow] = field(default_factory=list)
+    explored: Explored | None = None
+
+    @property
+    def place(self) -> str:
+        """Its name in texts."""
+        return f"k={self.k} j={self.j}"
+
+    @property
+    def raw(self) -> bytes:
+        """The bytes of its source."""
+        return raw(self.source)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of its source."""
+        return sha256_of(self.raw)
+
+    @property
+    def drives(self) -> bool:
+        """Whether it passed the static and contract tests, so that it drove."""
+        return any(report.count for report in self.feedback)
+
+    @property
+    def first_failure(self) -> EpisodeReport | None:
+        """The report that ended its tests; None if it has not failed so far."""
+        failed = (r for r in self.feedback if not r.count or r.successes < r.count)
+        return next(failed, None)
+
+    @property
+    def feedback_score(self) -> float:
+        """Mean time score on feedback worlds; 0 if it did not drive."""
+        return _mean([each for report in self.feedback for each in report.episodes])
+
+    @property
+    def score(self) -> float:
+        """Mean time score on validation worlds; 0 if it has not driven on any."""
+        return _mean(self.validation)
+
+
+def raw(source: str) -> bytes:
+    """The bytes of a controller's source."""
+    return source.encode("utf-8", "surrogatepass")
+
+
+def _mean(episodes: Sequence[EpisodeRow]) -> float:
+    return fmean(each.time_score for each in episodes) if episodes else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,12 +16,18 @@ from tdac_agent.models.provider import (
     Request,
     is_concurrent,
 )
-from tdac_agent.prompting.extract import POLICY, Answer, read_answer
+from tdac_agent.problems.problem import Problem
+from tdac_agent.prompting.extract import Answer, read_answer
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.given_rules import GIVEN, RUN_HEADING, written
-from tdac_agent.prompting.prompt import ONE_TASK, NamedPicture, repair_question
+from tdac_agent.prompting.prompt import (
+    FULL,
+    NamedPicture,
+    PromptTemplate,
+    repair_question,
+)
 from tdac_agent.prompting.rule_answer import RuleAnswerError, apply, parse_operations
-from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
+from tdac_agent.prompting.rules import BEGIN, RuleBook
 from tdac_agent.storage.secrets import one_line
 from tdac_agent.synthesis.calls import Calls
 from tdac_agent.synthesis.side_by_side import side_by_side
@@ -38,11 +44,14 @@ _PARSING = threading.Lock()
 _ENDED = {"length": "it was truncated", "refusal": "it was refused"}
 
 
+Notes = tuple[str, ...]
+
+
 class ModelAnswer(NamedTuple):
     """Source of a controller (None if the model gave none) and notes on the answer."""
 
     source: str | None
-    notes: tuple[str, ...] = ()
+    notes: Notes = ()
 
 
 @dataclass(slots=True)
@@ -50,23 +59,21 @@ class Dialogue:
     """The Learner (LLM1) and the Optimizer (LLM2) of one run.
 
     Attributes:
-        question: The question for a new controller under some rules.
+        problem: What controllers are written for.
         learner: Generates controllers.
         optimizer: Edits them and writes rules.
         calls: Asks every question.
         book: Rules of this run, in force and ended.
-        about: What the scope `task` of a rule means.
-        contract: Names that a controller must define.
+        template: Template of the question for a new controller.
         earlier: The attempts so far, one line each.
     """
 
-    question: Callable[[tuple[RepairRule, ...]], str]
+    problem: Problem
     learner: Provider
     optimizer: Provider
     calls: Calls
     book: RuleBook = field(default_factory=RuleBook)
-    about: str = ONE_TASK
-    contract: tuple[str, ...] = (POLICY,)
+    template: PromptTemplate = FULL
     earlier: tuple[str, ...] = ()
     _failed: int = 0
     _unchanged: bool = False
@@ -214,7 +221,7 @@ class Dialogue:
             self.earlier = (*self.earlier, f"k={k} j={j}: {result.line}")
 
     def _question(self) -> str:
-        return self.question(self.book.in_force)
+        return self.problem.question(self.book.in_force, self.template)
 
     def _images(
         self, kind: Kind, k: int, j: int, picture: FailurePicture | None
@@ -230,7 +237,7 @@ class Dialogue:
     ) -> NamedPicture | None:
         if picture is None:
             return None
-        return NamedPicture(images[0].name, picture, self.calls.recorder.run.on_set)
+        return NamedPicture(images[0].name, picture, self.problem.has_hidden)
 
     def _repair(
         self,
@@ -250,7 +257,7 @@ class Dialogue:
             earlier=self.earlier[:-1][-MAX_EARLIER:],
             rules=self.book.in_force,
             unchanged=self._unchanged,
-            scope=self.about,
+            scope=self.problem.scope,
             picture=self._named(images, picture),
         )
         stable = _stable(question)
@@ -292,7 +299,7 @@ class Dialogue:
             return Answer(None, _ENDED[reply.stop])
         # A server that names its model also reports why an answer ended.
         ended = reply.model is not None
-        return read_answer(reply.text, self.contract, ended=ended)
+        return read_answer(reply.text, self.problem.contract, ended=ended)
 
     def _again(
         self, request: Request, reply: Reply, problem: str, asked: int

@@ -1,40 +1,35 @@
-"""Drives verified candidates in disturbed episodes, and counts these."""
+"""Disturbed episodes of candidates for a task: their seeds, and what they show."""
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 
-from pydantic import ConfigDict, Field, ValidationError
-
+from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.prompting.feedback import cut
+from tdac_agent.runs.episode_pictures import failure_pictures
 from tdac_agent.runs.improvement_record import goals_text
-from tdac_agent.runs.recorder import Recorder
-from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.hashes import number_of, sha256_of
-from tdac_agent.storage.printable_record import PrintableRecord
-from tdac_agent.synthesis.archive import Candidate
-from tdac_agent.synthesis.candidates import Tests
-from tdac_agent.synthesis.workload import Shares
-from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.provenance import versions
-from tdac_agent.verification.judge.episode_row import EpisodeRow
-from tdac_agent.verification.verify_episodes import verify_episodes
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_agent.runs.run_record import Run
+from tdac_agent.storage.hashes import number_of
+from tdac_agent.synthesis.candidates import Figures
+from tdac_agent.synthesis.workload import MOST_EPISODES
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.measures import least_steps
+from tdac_agent.verification.diagnosis.model_picture import FailurePicture
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.store import TRAJECTORIES
+from tdac_envs.ladder.scores import time_score
 
 PURPOSES = ("improve", "comparison")
 """What the episodes are for, in the order of their seeds."""
 FIRST_SEED = 2**33
-"""Greater than the seeds that `tdac verify --robust` chooses by default."""
+"""Greater than the seeds that `tdac verify -n` chooses by default."""
 SEEDS = 2**32
 """Number of seeds for each purpose."""
-MOST_EPISODES = 100_000
 MOST_TOLD = 3
 """Failures whose diagnosis is told."""
-EPISODES_FILE = "disturbed.json"
-FAILURES = "trajectories"
-"""Folder with the trajectories of failed episodes."""
+RANKED = {"robustness": "goals reached", "time": "mean time score"}
 
 
 def named(number: int) -> str:
@@ -42,164 +37,68 @@ def named(number: int) -> str:
     return f"disturbed episode {number}"
 
 
-class DisturbedEpisodes(PrintableRecord):
-    """Episodes with consecutive seeds, as those of `tdac verify --robust`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    schema_version: int = 1
-    task_sha256: str
-    controller_sha256: str
-    disturbance: Disturbance
-    first_seed: int
-    sandbox: str = Field(description="Sandbox tier.")
-    versions: dict[str, str]
-    episodes: tuple[EpisodeRow, ...]
-
-    @property
-    def reached(self) -> int:
-        """Number of episodes that reached the goal without a contact."""
-        return sum(each.success for each in self.episodes)
-
-    @property
-    def successes(self) -> list[float]:
-        """1 for each episode that reached the goal, else 0."""
-        return [float(each.success) for each in self.episodes]
-
-    @property
-    def times(self) -> list[float]:
-        """Time score of each episode."""
-        return [each.time_score for each in self.episodes]
-
-    @property
-    def told(self) -> str:
-        """The result in one line."""
-        return goals_text(self.reached, len(self.episodes))
-
-    @property
-    def failed(self) -> dict[str, int]:
-        """Number of failures by cause."""
-        failed = (each for each in self.episodes if not each.success)
-        causes = Counter(str(each.cause or each.outcome) for each in failed)
-        return dict(causes.most_common())
-
-    @property
-    def feedback(self) -> str | None:
-        """Causes of failures, and diagnoses of some; None without a failure."""
-        causes = [f"{count} {cause}" for cause, count in self.failed.items()]
-        if not causes:
-            return None
-        texts = [
-            each.text.replace(f"seed {each.seed}", named(number), 1)
-            for number, each in enumerate(self.episodes, 1)
-            if each.text
-        ]
-        parts = [f"{self.told[0].upper()}{self.told[1:]}; {', '.join(causes)}."]
-        parts += [f"{n}. {cut(text)}" for n, text in enumerate(texts[:MOST_TOLD], 1)]
-        return "\n\n".join(parts)
+def seeds_for(run: Run, purpose: str, count: int) -> range:
+    """The seeds of the episodes of a run for a purpose."""
+    first = number_of(f"disturbed|{run.seed}|{run.index}") % (SEEDS - MOST_EPISODES)
+    first += FIRST_SEED + PURPOSES.index(purpose) * SEEDS
+    return range(first, first + count)
 
 
-@dataclass(slots=True)
-class DisturbedTrials:
-    """Drives candidates; all of them have the same seeds.
+def successes_of(driven: EpisodeReport) -> list[float]:
+    """1 for each episode that reached the goal, else 0."""
+    return [float(each.success) for each in driven.episodes]
 
-    Attributes:
-        recorder: Records the run.
-        tests: The task, the judge and the sandbox tier.
-        shares: How the episodes are divided.
-        used: Number of episodes that were driven.
+
+def times_of(driven: EpisodeReport) -> list[float]:
+    """Time score of each episode."""
+    return [each.time_score for each in driven.episodes]
+
+
+def told(driven: EpisodeReport) -> str:
+    """The result in one line."""
+    return goals_text(driven.successes, driven.count)
+
+
+def disturbed_feedback(driven: EpisodeReport) -> str | None:
+    """Causes of failures, and diagnoses of some; None without a failure."""
+    if not driven.failures:
+        return None
+    counts = ", ".join(f"{count} {cause}" for cause, count in driven.causes.items())
+    texts = [
+        each.text.replace(f"seed {each.seed}", named(number), 1)
+        for number, each in enumerate(driven.episodes, 1)
+        if each.text
+    ]
+    line = told(driven)
+    parts = [f"{line[0].upper()}{line[1:]}; {counts}."]
+    parts += [f"{n}. {cut(text)}" for n, text in enumerate(texts[:MOST_TOLD], 1)]
+    return "\n\n".join(parts)
+
+
+def task_figures(task: Task, report: Report, driven: EpisodeReport) -> Figures:
+    """Share of goals, mean time score, time of the nominal episode, clearance.
+
+    Args:
+        task: The task.
+        report: The report that verified the candidate.
+        driven: Its disturbed episodes.
     """
+    nominal = next(each for each in report.episodes if each.name == "nominal")
+    least = least_steps(task.nominal)
+    figures = {
+        "robustness": fmean(successes_of(driven)),
+        "time": fmean(times_of(driven)),
+        "nominal": time_score(nominal.outcome == "reached", nominal.steps, least),
+        "clearance": fmean(each.gap_left for each in driven.episodes),
+    }
+    return Figures(figures, RANKED)
 
-    recorder: Recorder
-    tests: Tests
-    shares: Shares
-    used: int = 0
 
-    @property
-    def can_explore(self) -> bool:
-        """Whether there are episodes for another variation."""
-        return self.used + self.shares.block <= self.shares.explore
-
-    def explore(self, candidate: Candidate) -> DisturbedEpisodes:
-        """Drives the episodes for variations."""
-        return self._drive(candidate, "improve", self.shares.block)
-
-    def compare(self, candidate: Candidate) -> DisturbedEpisodes:
-        """Drives the episodes of the comparison at the end, which decide nothing."""
-        return self._drive(candidate, "comparison", self.shares.comparison)
-
-    def first_seed(self, purpose: str) -> int:
-        """Seed of the first episode for a purpose; the others count up from it."""
-        run = self.recorder.run
-        number = number_of(f"disturbed|{run.seed}|{run.index}")
-        first = number % (SEEDS - MOST_EPISODES)
-        return FIRST_SEED + PURPOSES.index(purpose) * SEEDS + first
-
-    def _drive(
-        self, candidate: Candidate, purpose: str, count: int
-    ) -> DisturbedEpisodes:
-        """Drives episodes; those on record are reused."""
-        about = {"k": candidate.k, "j": candidate.j, "what": purpose, "episodes": count}
-        self.recorder.event("drive.start", **about)
-        out, first = candidate.folder / purpose, self.first_seed(purpose)
-        found = None
-        if self.recorder.vouches(out / EPISODES_FILE):
-            found = self._kept(out, candidate, first, count)
-        if found is None:
-            found = self._driven(candidate, out, range(first, first + count), about)
-        self.used += count
-        self.recorder.event("drive.end", **about, reached=found.reached)
-        return found
-
-    def _driven(
-        self, candidate: Candidate, out: Path, seeds: range, about: dict[str, object]
-    ) -> DisturbedEpisodes:
-        task = self.tests.task
-        source = candidate.source.encode("utf-8", "surrogatepass")
-        out.mkdir(exist_ok=True)
-        report = verify_episodes(
-            source,
-            task,
-            len(seeds),
-            first=seeds.start,
-            tier=self.tests.tier,
-            out=out,
-            trajectories=True,
-            judge=self.tests.judge,
-            watch=lambda done, reached: self.recorder.tell(
-                {"event": "drive.step", **about, "done": done, "reached": reached}
-            ),
-        )
-        found = DisturbedEpisodes(
-            task_sha256=task.sha256(),
-            controller_sha256=sha256_of(source),
-            disturbance=Disturbance(),
-            first_seed=seeds.start,
-            sandbox=report.provenance.sandbox,
-            versions=dict(versions()),
-            episodes=report.episodes,
-        )
-        write_atomic(out / EPISODES_FILE, found.model_dump_json(indent=2) + "\n")
-        self.recorder.vouch(out / EPISODES_FILE)
-        return found
-
-    def _kept(
-        self, out: Path, candidate: Candidate, first: int, count: int
-    ) -> DisturbedEpisodes | None:
-        """The episodes in a folder if they are complete and of this candidate."""
-        try:
-            content = parse_json(read_file(out / EPISODES_FILE, RECORD_BYTES))
-            found = DisturbedEpisodes.model_validate(content)
-        except (OSError, ValueError, ValidationError):
-            return None
-        source = candidate.source.encode("utf-8", "surrogatepass")
-        wanted = {
-            "task_sha256": self.tests.task.sha256(),
-            "controller_sha256": sha256_of(source),
-            "disturbance": Disturbance(),
-            "first_seed": first,
-            "versions": dict(versions()),
-        }
-        same = all(getattr(found, name) == value for name, value in wanted.items())
-        seeds = [each.seed for each in found.episodes]
-        return found if same and seeds == list(range(first, first + count)) else None
+def failed_picture(
+    task: Task, driven: EpisodeReport, folder: Path
+) -> FailurePicture | None:
+    """A picture of the first failed episode that drove; None if there is none."""
+    numbered = enumerate(driven.episodes, 1)
+    episodes = ((named(number), each) for number, each in numbered)
+    found = failure_pictures(task, episodes, folder / TRAJECTORIES, LARGEST_SIDE)
+    return next((picture for _, picture in found), None)

@@ -1,205 +1,212 @@
-"""An iteration of Algorithm 2: new candidates, tests, repairs."""
+"""The iterations of Algorithm 2: new candidates, tests, repairs, rules."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import NamedTuple
 
 from tdac_agent.errors import Fault
-from tdac_agent.models.picture import LARGEST_SIDE
-from tdac_agent.models.provider import Provider
-from tdac_agent.prompting.feedback import feedback_of
+from tdac_agent.models.provider import Provider, is_fixed
 from tdac_agent.prompting.python_source import same_code
-from tdac_agent.synthesis.candidates import (
-    Tests,
-    deliver,
-    place,
-    verify_all,
-    verify_candidate,
-)
-from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer, same_as
-from tdac_agent.synthesis.improve_task import TaskCandidate, improve_verified
-from tdac_agent.verification.diagnosis.model_picture import (
-    FailurePicture,
-    failure_picture,
-)
-from tdac_agent.verification.diagnosis.report import Report
-from tdac_agent.verification.verify import load_trajectories
+from tdac_agent.runs.run_record import Attempt
+from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer, Notes, same_as
+from tdac_agent.synthesis.trials import Trials
 
 MOST_SPENT = 3
 """Iterations in a row without code, after which a paid model is given up."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Tested:
-    """A candidate and its report."""
+class _Answered:
+    """An answer with code.
+
+    Attributes:
+        k: Its iteration.
+        j: Its edit.
+        source: Its source.
+        notes: Notes on the answer.
+        candidate: Its candidate, which may be an earlier one with the same code.
+        new: Whether its code is new.
+    """
 
     k: int
     j: int
     source: str
-    report: Report
-    folder: Path
-
-
-class _New(NamedTuple):
-    """A new candidate (k, 0).
-
-    Attributes:
-        k: Its iteration.
-        source: Its source.
-        notes: Notes on the answer.
-        folder: Its folder.
-        same: Iteration of an earlier one of its group with the same code.
-    """
-
-    k: int
-    source: str
-    notes: tuple[str, ...]
-    folder: Path
-    same: int | None
+    notes: Notes
+    candidate: Candidate
+    new: bool
 
 
 class Iterations:
     """One iteration after another: tests new candidates, repairs the best one.
 
+    A candidate with the code of an earlier one is not tested again.
+
     Args:
         dialogue: The models.
-        tests: Where candidates are tested.
+        trials: Tests candidates.
+        given: Source of an initial controller, if there is one.
+
+    Attributes:
+        written: The candidates so far.
     """
 
-    def __init__(self, dialogue: Dialogue, tests: Tests) -> None:
-        self._dialogue, self._tests = dialogue, tests
-        self._recorder = dialogue.calls.recorder
+    def __init__(self, dialogue: Dialogue, trials: Trials, given: str | None) -> None:
+        self._dialogue, self._trials, self._given = dialogue, trials, given
+        self._recorder = trials.terms.recorder
+        self.written: list[Candidate] = []
         # Recorded answers do not count, so that a resumed run asks as often again.
         self._empty = 0
-        # Verified ones beside the best of a group.
-        self._others: list[_Tested] = []
 
-    def iteration(self, ks: Sequence[int], answers: Sequence[ModelAnswer]) -> bool:
-        """Tests new candidates, and repairs the best; returns whether one passed.
+    def run(self) -> str:
+        """Writes and tests candidates until nothing is left to repair, or to ask.
 
-        Args:
-            ks: Their iterations.
-            answers: Their sources.
+        Returns:
+            What ended the writing early; empty after K iterations, and after a success.
+
+        Raises:
+            OutOfBudget: The budget of money or tokens is used up.
+            Fault: A model does not answer, or gives no code again and again.
         """
-        best = self._begin(ks, answers)
-        if best is None:
-            return False
-        dialogue, run = self._dialogue, self._recorder.run
-        k, source, report = best.k, best.source, best.report
-        failure = feedback_of(report)
-        for j in range(1, run.patience + 1):
-            if report.passed:
-                break
-            parent, picture = source, self._picture(best)
-            edited, notes = dialogue.edit(k, j, source, failure, picture)
-            if edited is None:
-                self._no_code(k, j, notes)
-                return False
-            source, self._empty = edited, 0
-            folder = self._recorder.candidate(k, j, source)
-            if same_code(source, parent):
-                said = same_as(k, j - 1)
-                self._recorder.judged(k, j, report, (*notes, said), unchanged=True)
-                dialogue.saw_no_change(k, j)
-                continue
-            report = verify_candidate(self._recorder, k, j, source, folder, self._tests)
-            self._recorder.judged(k, j, report, notes)
-            failure = feedback_of(report)
-            dialogue.saw(k, j, failure)
-            best = _Tested(k, j, source, report, folder)
-        if report.passed:
-            self._finish(best)
-            return True
-        if run.refine:
-            dialogue.summarise(k, run.patience, source, failure)
-        return False
+        for ks, answers in self._dialogue.new_candidates(self._given):
+            ended = self._iteration(ks, answers)
+            if ended is not None:
+                return ended
+        return ""
 
-    def _begin(
+    def _iteration(
         self, ks: Sequence[int], answers: Sequence[ModelAnswer]
-    ) -> _Tested | None:
-        """Tests new candidates; returns the best one, or None if there is no code.
+    ) -> str | None:
+        """One iteration; returns what ends the writing, or None."""
+        run, count = self._recorder.run, len(self.written)
+        at = self._begun(ks, answers)
+        while at is not None:
+            ended = self._ended(at)
+            if ended is not None:
+                return ended
+            if at.j == run.patience:
+                break
+            at = self._edited(at)
+        if at is None:
+            return None
+        failure = self._trials.result(at.candidate).failure
+        if run.refine and failure is not None:
+            self._dialogue.summarise(at.k, at.j, at.source, failure)
+        if self._trials.needs_new_code and len(self.written) == count:
+            return f"iteration {at.k} brought no new code"
+        return None
 
-        Those with the same code are tested once.
-        """
-        begun: list[_New] = []
+    def _ended(self, at: _Answered) -> str | None:
+        """What ends the writing after a candidate; None if it is to be repaired."""
+        if self._is_last(at.candidate):
+            return f"{self._dialogue.learner.name} has one controller"
+        result = self._trials.result(at.candidate)
+        spent = self._trials.tests_left == 0
+        if result.passed or result.failure is None or spent:
+            return self._trials.ended
+        return None
+
+    def _begun(
+        self, ks: Sequence[int], answers: Sequence[ModelAnswer]
+    ) -> _Answered | None:
+        """Tests new candidates; returns the best one, or None if there is no code."""
+        group: list[_Answered] = []
         for k, (source, notes) in zip(ks, answers, strict=True):
             if source is None:
                 self._no_code(k, 0, notes)
-                continue
-            self._empty = 0
-            folder = self._recorder.candidate(k, 0, source)
-            first = (each.k for each in begun if same_code(source, each.source))
-            begun.append(_New(k, source, notes, folder, next(first, None)))
-        new = [each for each in begun if each.same is None]
-        if not new:
+            else:
+                group.append(self._answered(k, 0, source, notes))
+        if not group:
             return None
-        jobs = [(each.k, 0, each.source, each.folder) for each in new]
-        reports = verify_all(self._recorder, jobs, self._tests)
-        tested = [
-            _Tested(each.k, 0, each.source, report, each.folder)
-            for each, report in zip(new, reports, strict=True)
-        ]
-        by_k = {each.k: each.report for each in tested}
-        for k, _, notes, _, same in begun:
-            if same is None:
-                self._recorder.judged(k, 0, by_k[k], notes)
-                continue
-            said = same_as(same, 0)
-            self._recorder.judged(k, 0, by_k[same], (*notes, said), unchanged=True)
-            self._dialogue.saw_again(k, 0, (same, 0))
-        best = min(tested, key=lambda each: (len(each.report.failures), each.k))
-        self._others = [one for one in tested if one.report.passed and one is not best]
+        new = [each for each in group if each.new]
+        self._trials.test([each.candidate for each in new])
+        best = max(new or group[:1], key=self._rank)
+        self._go_on(best.candidate)
+        for each in group:
+            self._record(each)
         # The next question is about the last one that was seen.
-        for each in [*(one for one in tested if one is not best), best]:
-            self._dialogue.saw(each.k, 0, feedback_of(each.report))
+        for each in [*(one for one in group if one is not best), best]:
+            self._see(each)
         return best
 
-    def _picture(self, failed: _Tested) -> FailurePicture | None:
-        """A picture of a failure, if the models are shown pictures."""
-        if not self._recorder.run.vision:
+    def _edited(self, at: _Answered) -> _Answered | None:
+        """Asks for a repaired candidate and tests it; None if there is no code."""
+        k, j, parent = at.k, at.j + 1, at.candidate
+        failure = self._trials.result(parent).failure
+        assert failure is not None
+        picture = self._trials.picture(parent) if self._recorder.run.vision else None
+        source, notes = self._dialogue.edit(k, j, at.source, failure, picture)
+        if source is None:
+            self._no_code(k, j, notes)
             return None
-        trajectories = load_trajectories(failed.folder / "trajectories")
-        task = self._tests.task
-        return failure_picture(task, failed.report, trajectories, LARGEST_SIDE)
+        edited = self._answered(k, j, source, notes)
+        if edited.new:
+            self._trials.test([edited.candidate])
+        self._go_on(edited.candidate)
+        self._record(edited)
+        self._see(edited, parent)
+        return edited
 
-    def _no_code(self, k: int, j: int, notes: tuple[str, ...]) -> None:
+    def _rank(self, answered: _Answered) -> tuple[float, ...]:
+        return self._trials.result(answered.candidate).rank
+
+    def _go_on(self, candidate: Candidate) -> None:
+        """Tests a candidate further, unless nobody uses what that tells."""
+        if not self._is_last(candidate):
+            self._trials.go_on(candidate)
+
+    def _is_last(self, candidate: Candidate) -> bool:
+        """Whether the models have nothing else to answer, however it does."""
+        dialogue, first = self._dialogue, (candidate.k, candidate.j) == (1, 0)
+        fixed = is_fixed(dialogue.learner) and is_fixed(dialogue.optimizer)
+        return fixed and not (self._given is not None and first)
+
+    def _answered(self, k: int, j: int, source: str, notes: Notes) -> _Answered:
+        """Keeps the source of an answer; its candidate is new if its code is."""
+        self._empty = 0
+        folder = self._recorder.candidate(k, j, source)
+        same = (each for each in self.written if same_code(source, each.source))
+        known = next(same, None)
+        candidate = known or Candidate(k, j, source, folder)
+        if known is None:
+            self.written.append(candidate)
+        return _Answered(k, j, source, notes, candidate, known is None)
+
+    def _record(self, answered: _Answered) -> None:
+        """Records the result of an answer."""
+        candidate, result = answered.candidate, self._trials.result(answered.candidate)
+        said = result.said if answered.new else same_as(candidate.k, candidate.j)
+        notes = (*answered.notes, said) if said else answered.notes
+        attempt = result.attempt(answered.k, answered.j, notes, new=answered.new)
+        self._recorder.attempted(attempt)
+
+    def _see(self, answered: _Answered, parent: Candidate | None = None) -> None:
+        """Notes the result of an answer for later questions."""
+        k, j, candidate = answered.k, answered.j, answered.candidate
+        failure = self._trials.result(candidate).failure
+        if candidate is parent:
+            self._dialogue.saw_no_change(k, j)
+        elif not answered.new:
+            self._dialogue.saw_again(k, j, (candidate.k, candidate.j))
+        elif failure is not None:
+            self._dialogue.saw(k, j, failure)
+
+    def _no_code(self, k: int, j: int, notes: Notes) -> None:
         """Records an answer without code.
 
         Raises:
             Fault: A paid model has given none in some iterations in a row.
         """
-        new = self._recorder.judged(k, j, None, notes)
+        attempt = Attempt(k=k, j=j, valid=False, passed=False, notes=notes)
+        new = self._recorder.attempted(attempt)
         self._empty += new and j == 0
         learner, most = self._dialogue.learner, self._recorder.run.iterations
         if learner.paid and self._empty >= MOST_SPENT and k < most:
-            raise given_up(learner, self._empty, notes)
-
-    def _finish(self, first: _Tested) -> None:
-        """Delivers a verified candidate, or the best variation of it."""
-        recorder, task = self._recorder, self._tests.task
-        first_at = (first.source, first.report, first.folder)
-        if not recorder.run.improve:
-            deliver(recorder, task, first.k, *first_at)
-            return
-        # An interrupted search leaves a verified controller.
-        place(recorder, task, *first_at)
-        recorder.run.tau = first.k
-        recorder.save()
-        founders = [
-            TaskCandidate(each.k, each.j, each.source, each.folder, each.report)
-            for each in (first, *self._others)
-        ]
-        chosen, stopped = improve_verified(self._dialogue, self._tests, founders)
-        if chosen is not founders[0]:
-            assert chosen.report is not None
-            place(recorder, task, chosen.source, chosen.report, chosen.folder)
-        recorder.finish("verified", k=chosen.k, j=chosen.j, reason=stopped)
+            raise _given_up(learner, self._empty, notes)
 
 
-def given_up(model: Provider, count: int, notes: tuple[str, ...]) -> Fault:
+def _given_up(model: Provider, count: int, notes: Notes) -> Fault:
     """The fault of a model that gives no code, with the note on its last answers."""
     return Fault(
         f"{model.name}: {count} iterations in a row without a controller; in the last "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import secrets
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -17,19 +17,17 @@ from tdac_agent.models.choice import BLIND
 from tdac_agent.models.provider import Author, Provider, recorded_seed, served_at
 from tdac_agent.models.ready import check_servers
 from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
-from tdac_agent.prompting.prompt import PromptTemplate, generate_prompt
+from tdac_agent.problems.problem import Problem
+from tdac_agent.prompting.prompt import FULL, PromptTemplate
 from tdac_agent.runs.journal_state import read_past
 from tdac_agent.runs.ownership import remark_on
 from tdac_agent.runs.recorder import Event, Recorder
-from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import JOURNAL, Run
 from tdac_agent.storage.files import clear_unfinished
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.journal import read_records, repair_end
 from tdac_agent.storage.locks import own_folder
 from tdac_agent.tasks.installation import drawn_seed, lasting_secret
-from tdac_agent.tasks.task import Task
-from tdac_agent.verification.verify import suite_sha256
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,18 +75,17 @@ def account_of(
     return Account(Budget(bounds.max_cost, bounds.max_tokens), tariffs, bounds.notes)
 
 
-def describe(
-    task: Task,
+def new_run(
+    problem: Problem,
     models: Sequence[Author],
     template: PromptTemplate,
-    *,
-    start_from: str | None,
+    start_from: str | None = None,
     **facts: Any,
 ) -> Run:
-    """The record of a run on a task that has not begun.
+    """The record of a run that has not begun.
 
     Args:
-        task: What the controller must do.
+        problem: What the controller is for.
         models: Learner and optimizer.
         template: Template of the first question.
         start_from: Source of an initial controller, if there is one.
@@ -97,37 +94,18 @@ def describe(
     Raises:
         PromptError: The template cannot be used.
     """
-    return new_run(
-        models,
-        generate_prompt(task, (), template),
-        start_from,
-        task=task.name,
-        task_sha256=task.sha256(),
-        profile=task.spec.profile,
-        prompt=template.name,
-        suite_sha256=suite_sha256(task),
-        **facts,
-    )
-
-
-def new_run(
-    models: Sequence[Author], question: str, start_from: str | None, **facts: Any
-) -> Run:
-    """The record of a run that has not begun.
-
-    Args:
-        models: Learner and optimizer.
-        question: The first question.
-        start_from: Source of an initial controller, if there is one.
-        **facts: Further fields of `Run`.
-    """
     addresses = {model.name: served_at(model) for model in models}
     return Run(
+        task=problem.name,
+        task_sha256=problem.sha256,
+        profile=problem.profile,
+        suite_sha256=problem.suite_sha256,
         learner=models[0].name,
         optimizer=models[1].name,
         served_at={name: url for name, url in addresses.items() if url is not None},
         version=importlib.metadata.version("tdac"),
-        prompt_sha256=sha256_of(question),
+        prompt=template.name,
+        prompt_sha256=sha256_of(problem.question((), template)),
         given_sha256=None if start_from is None else sha256_of(start_from),
         cost=0.0,
         id=secrets.token_hex(8),
@@ -164,16 +142,21 @@ def checked_vision(
 
 
 def settled_seed(
-    given: int | None, learner: Provider, out: Path, *, needed: bool = False
+    given: int | None, learner: Provider, before: Run | None, *, needed: bool
 ) -> int | None:
     """The seed of a run; None if each of its candidates has its own.
 
     If a seed is needed, or no secret can be kept, one is drawn for a new run.
+
+    Args:
+        given: The seed that the user gives.
+        learner: The learner, which may have a recorded one.
+        before: The record of an earlier process, if there was one.
+        needed: Whether a seed is needed.
     """
     known = recorded_seed(learner) if given is None else given
     if known is not None or (not needed and lasting_secret() is not None):
         return known
-    before = existing_run(out)
     return drawn_seed() if before is None else before.seed
 
 
@@ -188,20 +171,23 @@ def hold_folder(out: Path) -> AbstractContextManager[None]:
 
 
 def open_record(
-    start: Callable[..., None],
+    problem: Problem,
     run: Run,
     before: Run | None,
     account: Account,
-    on_event: Event | None,
+    template: PromptTemplate = FULL,
+    given: str | None = None,
+    on_event: Event | None = None,
 ) -> Recorder:
     """The recorder of a new or resumed run; recorded calls count in the budget.
 
     Args:
-        start: Writes the files of a new run; takes the recorder, and facts for the
-            journal.
+        problem: What the controller is for.
         run: The record.
         before: The record of an earlier process, if there was one.
         account: What the run may spend.
+        template: Template of the first question.
+        given: Source of an initial controller, if there is one.
         on_event: Called with each journal record.
 
     Raises:
@@ -228,7 +214,7 @@ def open_record(
             clear_unfinished(run.folder)
             recorder.resume(before, **facts)
         else:
-            start(recorder, **facts)
+            recorder.begin(problem, template, given, **facts)
     except OSError as error:
         raise RunError(f"cannot write to {run.folder}: {error.strerror}") from error
     return recorder

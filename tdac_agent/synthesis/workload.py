@@ -16,8 +16,9 @@ from tdac_agent.runs.run_record import Run
 FEEDBACK_TOKENS = 12_000
 """Allowance for the failures, the earlier attempts and the text around them."""
 
-
 MOST_BLOCK = 32
+MOST_EPISODES = 100_000
+"""Most episodes of a run for one purpose."""
 LEAST_IMPROVE = 32
 """Least number of episodes for improving: some variations in some episodes each."""
 ASKED_FOR_ONE = 2
@@ -48,49 +49,32 @@ class Shares(NamedTuple):
         """Most variations, beside one candidate that is varied."""
         return max(0, self.explore // self.block - 1)
 
+    @property
+    def asked(self) -> int:
+        """Most variations that a run asks for, if each first answer is used."""
+        return self.variations * (1 if self.validation else ASKED_FOR_ONE)
 
-def shares(episodes: int, improve: int = 0) -> Shares:
+
+def shares(episodes: int | None, improve: int = 0) -> Shares:
     """Divides the episodes of a run.
 
     Args:
-        episodes: Limit of the loop: half for tests, half for the selection.
-        improve: Further episodes: five eighths for variations, one for the selection,
-            two for the comparison at the end.
+        episodes: Limit of the loop on a set: half for tests, half for the selection.
+            None on a task, whose tests are those of a suite.
+        improve: Further episodes. An eighth of them each goes to the two controllers
+            of the comparison at the end, on a set another one to the selection, and
+            the others to variations.
     """
     part = improve // 8
-    explore = improve - 3 * part
-    half = episodes // 2
+    if episodes is None:
+        explore = improve - 2 * part
+        return Shares(0, 0, explore, _block(explore), part)
+    explore, half = improve - 3 * part, episodes // 2
     return Shares(half, episodes - half + part, explore, _block(explore), part)
-
-
-def task_shares(improve: int) -> Shares:
-    """Divides the episodes for improving a controller for one task.
-
-    Args:
-        improve: Their number: three quarters for variations, a quarter for the
-            comparison at the end.
-    """
-    part = improve // 8
-    explore = improve - 2 * part
-    return Shares(0, 0, explore, _block(explore), part)
 
 
 def _block(explore: int) -> int:
     return min(MOST_BLOCK, max(4, explore // 8))
-
-
-def most_variations(improve: int, *, on_set: bool) -> int:
-    """Number of variations that a run may ask for, if each first answer is used.
-
-    Args:
-        improve: Episodes to improve what works; 0 for none.
-        on_set: Whether the run is on a task set.
-    """
-    if not improve:
-        return 0
-    if on_set:
-        return shares(0, improve).variations
-    return ASKED_FOR_ONE * task_shares(improve).variations
 
 
 class Workload(NamedTuple):
@@ -127,7 +111,7 @@ def whole(
         patience: J.
         refine: Whether failures become rules.
         candidates: N, of which one is repaired.
-        variations: Most variations of what works.
+        variations: Most variations of what works (`Shares.asked`).
     """
     repaired = math.ceil(iterations / candidates)
     return Workload(iterations, repaired * (patience + refine) + variations)
@@ -192,7 +176,7 @@ def rest_of(
         run.patience,
         refine=run.refine,
         candidates=run.candidates,
-        variations=most_variations(run.improve, on_set=run.on_set),
+        variations=shares(run.episodes, run.improve).asked,
     )
     tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
     shown = _pictures_left(run, request)
@@ -219,6 +203,6 @@ def _pictures_left(run: Run, request: Request) -> int:
         run.patience,
         refine=False,
         candidates=run.candidates,
-        variations=most_variations(run.improve, on_set=run.on_set),
+        variations=shares(run.episodes, run.improve).asked,
     )
     return left.optimizer - (request.kind in PICTURED)

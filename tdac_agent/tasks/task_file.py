@@ -26,6 +26,8 @@ TASK_FILE = "task.yaml"
 """File name in the folder of a task or a run."""
 SET_FILE = "set.yaml"
 """File name in the folder of a run on a task set, which has no single task."""
+OWN_SUITE = "suite"
+"""Subfolder of a run with the user's own tests."""
 
 MAP_FILES = (
     *(".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".gif", ".tif", ".tiff", ".webp"),

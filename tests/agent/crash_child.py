@@ -18,7 +18,7 @@ from tdac_agent.models.budget import Budget
 from tdac_agent.models.openai_api import OpenAIModel
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import JOURNAL
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 
 def killing_write(write, kill_at, share):

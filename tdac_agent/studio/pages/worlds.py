@@ -14,8 +14,6 @@ from nicegui import ui
 from tdac_agent.evaluation.replay import SHOWN
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.planners.planner import planner_names
-from tdac_agent.set_synthesis.synthesize import EPISODES
-from tdac_agent.set_synthesis.trials import MOST_EPISODES
 from tdac_agent.studio.driving import KeyboardDrive
 from tdac_agent.studio.folder import FILES, STATE, as_word, keep, made_within
 from tdac_agent.studio.jobs import free_folder, start
@@ -27,6 +25,8 @@ from tdac_agent.studio.pages.layout import (
     shown_first,
 )
 from tdac_agent.studio.pages.writers import Writers
+from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_envs.core.errors import TdacError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.ladder.picture import draw_world
@@ -34,6 +34,7 @@ from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
 
+EPISODES = SynthOptions().episodes
 LEAST = 2
 """Episodes of a run on a set: one for a test, one for the selection."""
 SECONDS = 0.05

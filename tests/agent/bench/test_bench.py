@@ -23,6 +23,7 @@ from tdac_agent.bench.shown import merged, read, reveal
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.executors.local import executor_of
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.store import mark_rows
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
@@ -413,6 +414,19 @@ def test_nobody_drives(tdac, tmp_path, level, files):
     assert (code, "did not drive" in said) == (1, True)
     code, _, err = tdac("bench", "show", tmp_path)
     assert (code, len(err.strip().splitlines())) == (2, 1)
+    code, _, err = tdac("bench", files[2])
+    assert (code, "at least one task set or task" in err) == (2, True)
+
+
+def test_tasks_on_the_command_line(tdac, tmp_path):
+    """A task is driven from jittered starts; hidden worlds are of sets alone."""
+    words = "bench", "builtin", "go-to-goal", "--task", "maze", "-n", "2"
+    code, said, _ = tdac(*words, "--set", "known", "--out", tmp_path / "out")
+    assert code == 0
+    assert "jittered starts 0 to 1" in said
+    assert "worlds 0 to 1 of test" in said
+    code, _, err = tdac(*words, "--split", "hidden", "--out", tmp_path / "no")
+    assert (code, "tasks have no hidden worlds" in err) == (2, True)
 
 
 @pytest.mark.slow
@@ -435,6 +449,7 @@ def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
     assert len(kept) >= 2
     changed = json.loads(kept[0]) | {"time_score": 0.5}
     rows.write_text("\n".join([json.dumps(changed), kept[1], kept[1][:20]]))
+    mark_rows(rows.parent)
     found = bench(files[:1], [level], out=out, watch=note, **given)
     # The first episode is the one that was kept, the broken line is driven again.
     assert found.rows[0].time.value == pytest.approx(0.5 / 6)

@@ -23,7 +23,7 @@ from tdac_agent.environments.epuck.oracle import WorldOracle, occupied_at
 from tdac_agent.episodes.episode import Record
 from tdac_agent.models.provider import Request
 from tdac_agent.prompting.extract import extract_source
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.suite import contract
 from tdac_agent.verification.verify import verify

@@ -474,7 +474,7 @@ def test_synth_keeps_the_profile_and_takes_a_tier(tdac, done, good):
     about = json.loads(Path("a/report.json").read_text())["provenance"]
     assert (about["profile"], about["sandbox"]) == ("policy", "rlimits")
     arguments = resume_arguments(Path("a"))
-    assert arguments["task"].spec.profile == "policy"
+    assert arguments["problem"].profile == "policy"
     assert "tier" not in arguments
     code, _, errors = tdac(*words[:-2])
     assert (code, "profile policy instead of paper" in errors) == (2, True)

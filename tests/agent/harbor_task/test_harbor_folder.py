@@ -18,7 +18,7 @@ from small import write_small_task
 from tdac_agent import load_task
 from tdac_agent.errors import RunError
 from tdac_agent.harbor.folder import export_set, export_task
-from tdac_agent.harbor.judge import main, problem_in
+from tdac_agent.harbor.judge import exam_in, main
 from tdac_agent.harbor.wheel import write_wheel
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import load_set
@@ -114,9 +114,9 @@ def test_the_agent_sees_neither_salt_nor_solution(unknown):
 def test_two_exports_have_different_worlds(unknown, tmp_path):
     other = export_set(load_set("unknown"), tmp_path / "other", 2)
     assert (other / "tests/salt").read_bytes() != (unknown / "tests/salt").read_bytes()
-    hidden = [problem_in(each / "tests") for each in (unknown, other)]
-    assert {problem.split for problem in hidden} == {"hidden"}
-    assert hidden[0].tasks.sha256 == load_set("unknown").sha256
+    hidden = [exam_in(each / "tests") for each in (unknown, other)]
+    assert {exam.split for exam in hidden} == {"hidden"}
+    assert hidden[0].problem.sha256 == load_set("unknown").sha256
 
 
 @pytest.mark.slow

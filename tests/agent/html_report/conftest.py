@@ -12,7 +12,7 @@ from tdac_agent import load_task
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.html_report import make_page
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.diagnosis.report import Report
 
 

@@ -12,7 +12,7 @@ import anyio
 import pytest
 from installed import installation
 
-from tdac_agent.problems.problem import problem_of
+from tdac_agent.synthesis.answers import exam_of, files_of, reference_of
 from tdac_agent.tasks.task_file import bundled_tasks
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import set_names
@@ -28,7 +28,7 @@ def answer(source):
 
 
 def reference(**about):
-    return answer(problem_of(about).reference())
+    return answer(reference_of(exam_of(about).problem))
 
 
 def call(words, cwd, python=sys.executable):
@@ -184,7 +184,7 @@ def test_wrong_arguments_are_refused_before_a_model_is_asked():
     ):
         about = {"level": "unknown", "worlds": 2, "split": "test"} | wrong
         with pytest.raises(TaskError, match=why):
-            problem_of(about)
+            exam_of(about)
 
 
 def test_every_bundled_task_and_level_has_a_task():
@@ -217,8 +217,8 @@ def test_a_cancelled_sample_ends_the_judges_work():
 
     state, ended = SimpleNamespace(metadata={"task": "maze"}), []
 
-    def judge(problem, poll):
-        ended.append(problem.judge(NOTHING.encode(), poll))
+    def judge(exam, poll):
+        ended.append(exam.judge(NOTHING.encode(), poll))
 
     async def cancelled():
         with anyio.move_on_after(0.5) as scope:
@@ -231,16 +231,16 @@ def test_a_cancelled_sample_ends_the_judges_work():
 
 def test_agents_find_the_working_folder_in_their_sandbox(tmp_path):
     """As files of the sample; Inspect copies them if there is a sandbox."""
-    problem = problem_of({"task": "maze"})
-    assert {"params.json", "occupancy.npy", "sensors.py"} <= problem.files().keys()
-    level = problem_of({"level": "unknown", "worlds": 2, "split": "test"})
-    assert list(level.files()) == ["params.json"]
+    problem = exam_of({"task": "maze"}).problem
+    assert {"params.json", "occupancy.npy", "sensors.py"} <= files_of(problem).keys()
+    level = exam_of({"level": "unknown", "worlds": 2, "split": "test"}).problem
+    assert list(files_of(level)) == ["params.json"]
 
 
 @pytest.mark.slow
 def test_tdac_alone_does_not_import_inspect():
     code = (
-        "import sys, tdac_agent, tdac_agent.cli.main, tdac_agent.problems.problem;"
+        "import sys, tdac_agent, tdac_agent.cli.main, tdac_agent.synthesis.answers;"
         "assert not [m for m in sys.modules if m.startswith('inspect_ai')]"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -9,7 +9,7 @@ pytest.importorskip("mcp.server", reason="needs tdac[mcp]")
 from few_worlds import KNOWN, write_set
 from mcp_agent import Running, converse
 
-from tdac_agent.mcp.opening import open_desk
+from tdac_agent.mcp.opening import open_session
 from tdac_agent.mcp.server import Counter
 from tdac_envs import load_set
 
@@ -43,8 +43,8 @@ def serve(out):
 
     def run(about, conversation, episodes=128):
         with (
-            open_desk(about, out, episodes, "unconfined") as desk,
-            contextlib.closing(Counter(desk)) as counter,
+            open_session(about, out, episodes, "unconfined") as session,
+            contextlib.closing(Counter(session)) as counter,
         ):
             return converse(counter.server(), conversation)
 

@@ -16,7 +16,7 @@ from grounds import write_map_task, zoo_task
 from mcp_agent import converse
 
 from tdac_agent import load_task
-from tdac_agent.mcp.opening import open_desk
+from tdac_agent.mcp.opening import open_session
 from tdac_agent.mcp.server import Counter
 from tdac_agent.sandbox import MAX_SOURCE_BYTES
 from tdac_agent.tasks.installation import lasting_secret
@@ -69,11 +69,11 @@ def check(cases, task, seed, out):
     with (
         tempfile.TemporaryDirectory(prefix="zoo-") as name,
         Canaries(name) as around,
-        open_desk(task, out, episodes, "unconfined") as desk,
-        contextlib.closing(Counter(desk)) as counter,
+        open_session(task, out, episodes, "unconfined") as session,
+        contextlib.closing(Counter(session)) as counter,
     ):
         # Weak controllers fail with the zoo's seed, not with each one.
-        desk.run.seed = seed
+        session.run.seed = seed
         secrets = (Path(name) / "secret.txt").read_text(), lasting_secret().hex()
 
         async def conversation(agent):

@@ -21,7 +21,7 @@ from tdac_agent.models.transport import _Answer
 from tdac_agent.runs.resume import existing_run
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 QUICK = ("2^63 tokens", "deep JSON", "a deep error", "a deep code", "a huge code")
 MOST_GROWTH_MB = 100

@@ -28,7 +28,7 @@ from tdac_agent.models.provider import (
     recorded_seed,
 )
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_envs.core.extras import install_command
 
 QUESTION = Request("generate", "Wände? ÄÖ\n" * 20_000)

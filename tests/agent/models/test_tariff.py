@@ -16,7 +16,7 @@ from tdac_agent.models.prices import SHIPPED, Price
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.tariff import UNPRICED_TOKENS, Tariff, bounds_of, tariffs_of
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_envs.core.extras import install_command
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"

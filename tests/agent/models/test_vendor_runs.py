@@ -15,7 +15,7 @@ from tdac_agent import load_task
 from tdac_agent.errors import Fault
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 STANDS = "def policy(obs):\n    return 0.0, 0.0\n"

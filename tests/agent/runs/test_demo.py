@@ -12,7 +12,7 @@ from tdac_agent.prompting.extract import extract_source
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.verify import verify
 
 

@@ -22,7 +22,7 @@ from tdac_agent.runs.recorder import difference
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import Attempt, Run, load_run
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 
 def journal(folder):

@@ -22,7 +22,7 @@ from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.locks import LOCK_FILE, hold
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 
@@ -239,8 +239,8 @@ def test_a_folder_knows_how_it_was_begun(tmp_path, name, warm):
     template.unlink()
     known = resume_arguments(out)
     assert {key: known[key] for key in wanted} == wanted
-    assert known["task"].sha256() == task.sha256()
-    assert generate_prompt(known["task"], ()) == generate_prompt(task, ())
+    assert known["problem"].sha256 == task.sha256()
+    assert known["problem"].question() == generate_prompt(task, ())
     model = Script(PermanentFault("gone again"))
     with pytest.raises(Fault, match="gone again"):
         synthesize(**{**known, "learner": model, "optimizer": None}, judge=warm)

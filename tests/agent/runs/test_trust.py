@@ -13,6 +13,7 @@ from small import write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.models.budget import Enough
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.prompting.prompt import (
     PromptError,
     PromptTemplate,
@@ -31,8 +32,8 @@ from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.studio.run_status import from_elsewhere
-from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.setup import hold_folder
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import display_name
 from tdac_agent.tasks.task_file import TaskFile
@@ -250,7 +251,7 @@ def test_a_controller_is_replaced_at_any_moment(tmp_path):
     before = "x = 1\n"
     begun = load_run(DEMO).model_copy(update={"folder": tmp_path, "mark": ""})
     recorder = Recorder(begun)
-    recorder.begin(lambda _: None, ("task.yaml", "x: 1\n"), load_template("full"), None)
+    recorder.begin(problem_of(load_task(begun.task)), load_template("full"), None)
     recorder.deliver(before)
     recorder.run.tau = 1
     recorder.save()
@@ -428,6 +429,18 @@ def test_a_limit_to_go_on_with_is_marked(run):
     assert not is_own_folder(more)
 
 
+class Written:
+    """A problem of which only the files matter."""
+
+    file, text = "task.yaml", "name: x\n"
+
+    def __init__(self, write, suite=None):
+        self.write_files, self.suite = write, suite
+
+    def write_originals(self, folder):
+        pass
+
+
 def test_a_run_that_begins_is_known(tmp_path):
     """From its first file on; one that was left unfinished by others is not."""
     begun = load_run(DEMO).model_copy(update={"folder": tmp_path, "mark": ""})
@@ -437,7 +450,7 @@ def test_a_run_that_begins_is_known(tmp_path):
         seen.append(is_own_folder(load_run(folder)))
 
     template = load_template("full")
-    Recorder(begun).begin(write, ("task.yaml", "name: x\n"), template, None)
+    Recorder(begun).begin(Written(write), template, None)
     assert [*seen, is_own_folder(load_run(tmp_path))] == [True, True]
 
 
@@ -454,9 +467,7 @@ def test_a_run_that_begins_with_tests_and_a_template_is_known(tmp_path):
 
     template = PromptTemplate("mine.j2", "text")
     with hold_folder(folder):
-        Recorder(begun).begin(
-            write, ("task.yaml", "name: x\n"), template, None, folder / "suite"
-        )
+        Recorder(begun).begin(Written(write, folder / "suite"), template, None)
     assert seen == [""]
     assert is_own_folder(load_run(folder))
     for unfinished in ("task.yaml", "prompt.j2"):

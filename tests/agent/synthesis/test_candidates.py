@@ -5,11 +5,9 @@ import json
 import re
 import sys
 import threading
-from functools import partial
 from types import SimpleNamespace
 
 import pytest
-from few_worlds import KNOWN, write_set
 from script import NO_RULES, STILL, code
 from small import write_small_task
 
@@ -18,17 +16,13 @@ from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.metrics import frames_of
 from tdac_agent.models.provider import PermanentFault
-from tdac_agent.models.retry import RetryPolicy
-from tdac_agent.prompting.prompt import generate_prompt
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
 from tdac_agent.synthesis.dialogue import Dialogue
-from tdac_agent.synthesis.loop import synthesize
 from tdac_agent.synthesis.side_by_side import side_by_side
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import whole
-from tdac_envs import load_set
 
-AT_ONCE = RetryPolicy(first_wait=0.0)
 BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
 RAISES = "def policy(obs):\n    raise ValueError\n"
 
@@ -63,21 +57,15 @@ class Table:
 
 
 @pytest.fixture
-def task(tmp_path):
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
-
-
-@pytest.fixture
-def write(task, tmp_path, warm):
+def ask(write, on_task):
     def run(model, **values):
-        given = {"out": tmp_path / "run", "judge": warm, "retry": AT_ONCE, **values}
-        return synthesize(task, model, candidates=3, iterations=6, **given)
+        return write(on_task, model=model, candidates=3, iterations=6, **values)[1]
 
     return run
 
 
 @pytest.mark.slow
-def test_the_best_of_three_is_repaired(write, good_source, tmp_path):
+def test_the_best_of_three_is_repaired(ask, good_source, tmp_path):
     """All are asked at the same time, and each is an iteration."""
     answers = {
         ("generate", 1, 0): code(RAISES),
@@ -87,7 +75,7 @@ def test_the_best_of_three_is_repaired(write, good_source, tmp_path):
         ("edit", 3, 1): code(good_source),
     }
     model = Table(answers, together=3)
-    run = write(model)
+    run = ask(model)
     assert run.verified
     assert sorted(model.asked[:3]) == [("generate", k, 0) for k in (1, 2, 3)]
     (edit,) = model.asked[3:]
@@ -105,7 +93,7 @@ def test_the_best_of_three_is_repaired(write, good_source, tmp_path):
         synthesize(load_task(tmp_path / "task"), model, out=run.folder, iterations=6)
 
 
-def test_equal_answers_are_tested_once(write, good_source):
+def test_equal_answers_are_tested_once(ask, good_source):
     """Each is an iteration with the result of the first one, and it is said."""
     answers = {
         ("generate", 1, 0): code(STILL),
@@ -119,7 +107,7 @@ def test_equal_answers_are_tested_once(write, good_source):
         if record["event"] == "verify.start":
             tested.append((record["k"], record["j"]))
 
-    run = write(model, on_event=watch)
+    run = ask(model, on_event=watch)
     assert tested == [(1, 0), (1, 1)]
     first, *others, last = run.attempts
     assert (first.unchanged, first.notes, last.passed) == (False, (), True)
@@ -135,10 +123,10 @@ def test_equal_answers_are_tested_once(write, good_source):
 
 
 @pytest.mark.slow
-def test_one_of_three_passes_at_once(write, good_source):
+def test_one_of_three_passes_at_once(ask, good_source):
     answers = {("generate", k, 0): code(STILL) for k in (1, 3)}
     answers[("generate", 2, 0)] = code(good_source)
-    run = write(Table(answers, together=3))
+    run = ask(Table(answers, together=3))
     assert run.verified
     assert run.tau == 2
     assert [(a.k, a.passed) for a in run.attempts] == [
@@ -148,56 +136,46 @@ def test_one_of_three_passes_at_once(write, good_source):
 
 
 @pytest.mark.slow
-def test_a_fault_loses_no_answer_of_the_others(write, good_source):
+def test_a_fault_loses_no_answer_of_the_others(ask, good_source):
     """The resumed run asks only what has no answer."""
     answers = {("generate", k, 0): code(STILL) for k in (1, 3)}
     answers[("generate", 2, 0)] = PermanentFault("no access")
     model = Table(answers, together=3)
     with pytest.raises(Exception, match="no access"):
-        write(model)
+        ask(model)
     again = Table({("generate", 2, 0): code(good_source)}, together=1)
     again.name = model.name
-    run = write(again)
+    run = ask(again)
     assert run.verified
     assert again.asked == [("generate", 2, 0)]
 
 
 @pytest.mark.slow
-def test_without_a_success_there_are_all_iterations(write):
+def test_without_a_success_there_are_all_iterations(ask):
     """K = 6 in two groups; one edit and one summary each."""
     answers = {("generate", k, 0): code(f"{STILL}\nA = {k}\n") for k in range(1, 7)}
     answers |= {("edit", k, 1): code(BUMP) for k in (1, 4)}
     answers |= {("summarise", k, 1): NO_RULES for k in (1, 4)}
     model = Table(answers, together=3)
-    run = write(model)
+    run = ask(model)
     assert run.status == "not verified"
     assert len(model.asked) == 10 == whole(6, 1, candidates=3).questions
     assert frames_of([run]).runs["done"].tolist() == [6]
 
 
 @pytest.mark.slow
-def test_on_a_set_all_drive_on_the_same_worlds(tmp_path, warm):
-    few = load_set(write_set(tmp_path / "few.yaml"))
+def test_on_a_set_all_drive_on_the_same_worlds(write, on_set, out):
     answers = {
         ("generate", 1, 0): code(STILL),
-        ("generate", 2, 0): code(KNOWN.read_text()),
+        ("generate", 2, 0): code(on_set.good),
         ("generate", 3, 0): code(STILL),
     }
     model = Table(answers, together=3)
-    run = synthesize_on_set(
-        few,
-        model,
-        out=tmp_path / "run",
-        episodes=16,
-        feedback_episodes=2,
-        candidates=3,
-        seed=3,
-        judge=warm,
-    )
+    _, run = write(on_set, model=model, episodes=16, candidates=3)
     assert run.status == "selected"
     assert run.tau == 2
     worlds = {}
-    for path in (tmp_path / "run").glob("iterations/*/j0/feedback-1/set.json"):
+    for path in out.glob("iterations/*/j0/feedback-1/set.json"):
         episodes = json.loads(path.read_text())["episodes"]
         worlds[path.parts[-4]] = [episode["index"] for episode in episodes]
     assert worlds["k01"] == worlds["k02"]
@@ -259,7 +237,7 @@ def test_threads_do_not_parse_at_the_same_time(task):
     sys.setswitchinterval(1e-6)
     try:
         for _ in range(5):
-            dialogue = Dialogue(partial(generate_prompt, task), model, model, Calls())
+            dialogue = Dialogue(problem_of(task), model, model, Calls())
             answers = dialogue.generate_all(range(1, 9))
             assert all(source == STILL * 100 for source, _ in answers)
     finally:

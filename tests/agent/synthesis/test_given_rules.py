@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 from script import NO_RULES, STILL, Script, code
-from small import write_small_task
 
-from tdac_agent import load_task
 from tdac_agent.html_report import make_page
 from tdac_agent.models.provider import Reply
 from tdac_agent.models.retry import RetryPolicy
@@ -21,7 +19,7 @@ from tdac_agent.prompting.given_rules import (
 from tdac_agent.prompting.prompt import PromptError
 from tdac_agent.prompting.rules import MAX_RULE_TOKENS, RuleBook
 from tdac_agent.runs.run_record import load_rules, load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 LEARNT = [
@@ -34,11 +32,6 @@ LEARNT = [
 def answer(rules):
     operations = [{"op": "add", "scope": s, "text": t} for s, t in rules]
     return Reply(f"```json\n{json.dumps(operations)}\n```")
-
-
-@pytest.fixture
-def task(tmp_path):
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
 
 
 @pytest.fixture

@@ -11,22 +11,15 @@ from hypothesis import strategies as st
 from script import STILL, Script, code
 from small import write_small_task
 
-from tdac_agent import load_task
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.library.listing import row_of, variations_text
 from tdac_agent.metrics import frames_of
-from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.disturbed import DisturbedEpisodes
-from tdac_agent.synthesis.loop import synthesize
-from tdac_agent.synthesis.workload import (
-    LEAST_IMPROVE,
-    most_variations,
-    task_shares,
-)
+from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.core.errors import TaskError
 
@@ -62,21 +55,15 @@ ENOUGH_FOR_ONE = 40_000
 
 
 @pytest.fixture
-def task(tmp_path):
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
-
-
-@pytest.fixture
 def fragile(good_source):
     return good_source.replace("def policy(", "def drive(") + FRAGILE
 
 
 @pytest.fixture
-def write(task, tmp_path, warm):
+def improve(write, on_task):
     def run(model="builtin", **values):
-        given = {"out": tmp_path / "run", "judge": warm, "improve": 32, "seed": 3}
-        given["retry"] = RetryPolicy(first_wait=0.0)
-        return synthesize(task, model, iterations=6, **given | values)
+        given = {"improve": 32, "seed": 3, "iterations": 6} | values
+        return write(on_task, model=model, **given)[1]
 
     return run
 
@@ -88,22 +75,22 @@ def report_of(folder):
 @given(st.integers(LEAST_IMPROVE, 10_000))
 def test_the_shares_of_a_task_are_all_episodes(improve):
     """And there are at least some variations."""
-    parts = task_shares(improve)
+    parts = shares(None, improve)
     assert parts.explore + 2 * parts.comparison == improve
     assert parts.variations >= 4
     assert (parts.variations + 1) * parts.block <= parts.explore
-    assert most_variations(improve, on_set=False) == 2 * parts.variations
-    assert most_variations(0, on_set=False) == 0
+    assert parts.asked == 2 * parts.variations
+    assert shares(None).asked == 0
 
 
 @pytest.mark.slow
 def test_a_more_robust_variation_is_asked_for_and_delivered(
-    write, fragile, good_source, tmp_path
+    improve, fragile, good_source, tmp_path
 ):
     """The model sees the parent, its figures, and what was tried with it."""
     answers = (fragile, STILL, fragile, good_source, STILL, STILL, STILL)
     model = Script(*map(code, answers))
-    run = write(model)
+    run = improve(model)
     out = tmp_path / "run"
     assert model.asked() == [
         ("generate", 1, 0),
@@ -157,7 +144,7 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
         name: [
             each["seed"]
             for each in json.loads(
-                (out / "iterations" / name / "disturbed.json").read_text()
+                (out / "iterations" / name / "episodes.json").read_text()
             )["episodes"]
         ]
         for k in ("k01/j0", "k09/j0")
@@ -180,10 +167,10 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
 
 
 @pytest.mark.slow
-def test_models_that_see_get_a_picture_of_a_failed_episode(write, fragile, good_source):
+def test_models_that_see_get_a_picture_of_a_failure(improve, fragile, good_source):
     """None if all goals were reached."""
     model = Script(*map(code, (fragile, good_source, *[STILL] * 12)))
-    write(model, vision=True)
+    improve(model, vision=True)
     generated, first, *others = model.requests
     assert generated.images == ()
     (picture,) = first.images
@@ -197,7 +184,7 @@ def test_models_that_see_get_a_picture_of_a_failed_episode(write, fragile, good_
 
 @pytest.mark.slow
 def test_without_a_better_one_the_first_stays(
-    write, task, fragile, good_source, tmp_path, warm
+    improve, task, fragile, good_source, tmp_path, warm
 ):
     """It is delivered before the search begins, and has driven as in `--robust`."""
     model = Script(*map(code, (good_source, fragile, *[STILL] * 4)))
@@ -207,7 +194,7 @@ def test_without_a_better_one_the_first_stays(
         if record["event"] == "drive.start":
             seen.append((tmp_path / "run" / "controller.py").read_text())
 
-    run = write(model, on_event=watch)
+    run = improve(model, on_event=watch)
     assert set(seen) == {good_source}
     assert (run.folder / "controller.py").read_text() == good_source
     found = read_improvement(run.folder)
@@ -217,8 +204,8 @@ def test_without_a_better_one_the_first_stays(
     robust = verify_episodes(
         run.controller, task, 4, first=found.first_seed, judge=warm
     )
-    own = run.folder / "iterations/k01/j0/improve/disturbed.json"
-    driven = DisturbedEpisodes.model_validate_json(own.read_text()).episodes
+    own = run.folder / "iterations/k01/j0/improve/episodes.json"
+    driven = EpisodeReport.model_validate_json(own.read_text()).episodes
     for episode in robust.worst:
         (same,) = (each for each in driven if each.seed == episode.seed)
         assert (same.steps, same.d_min) == (episode.steps, episode.d_min)
@@ -227,11 +214,11 @@ def test_without_a_better_one_the_first_stays(
 
 @pytest.mark.slow
 def test_all_verified_candidates_of_a_group_found_the_archive(
-    write, fragile, good_source
+    improve, fragile, good_source
 ):
     """The run is still compared with its first one."""
     answers = (fragile, good_source, fragile, *[STILL] * 4)
-    run = write(Script(*map(code, answers)), candidates=3)
+    run = improve(Script(*map(code, answers)), candidates=3)
     found = read_improvement(run.folder)
     assert [(each.k, each.parent) for each in found.members] == [(1, None), (2, None)]
     assert (found.first, found.selected, run.tau) == ((1, 0), (2, 0), 1)
@@ -239,11 +226,11 @@ def test_all_verified_candidates_of_a_group_found_the_archive(
 
 
 @pytest.mark.slow
-def test_the_end_of_the_budget_ends_the_search_alone(write, good_source):
+def test_the_end_of_the_budget_ends_the_search_alone(improve, good_source):
     """The verified controller stays verified."""
     model = Script(code(good_source))
     model.paid = True
-    run = write(model, max_tokens=ENOUGH_FOR_ONE)
+    run = improve(model, max_tokens=ENOUGH_FOR_ONE)
     assert (run.status, run.tau) == ("verified", 1)
     assert model.asked() == [("generate", 1, 0)]
     assert "tokens" in run.reason
@@ -253,7 +240,7 @@ def test_the_end_of_the_budget_ends_the_search_alone(write, good_source):
 
 
 @pytest.mark.slow
-def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
+def test_the_built_in_learner_varies_the_same_way_twice(improve, tmp_path):
     """With one seed, folders agree but for clocks: after a break, and as a replay."""
 
     class Stop(Exception):
@@ -263,14 +250,14 @@ def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
         if record["event"] == "drive.end" and record["k"] == 8:
             raise Stop
 
-    one = write(out=tmp_path / "a")
+    one = improve(out=tmp_path / "a")
     with pytest.raises(Stop):
-        write(out=tmp_path / "b", on_event=stop)
+        improve(out=tmp_path / "b", on_event=stop)
     broken = load_run(tmp_path / "b")
     assert (broken.status, broken.tau, broken.censored) == ("fault", 1, False)
     assert frames_of([broken]).runs["censored"].tolist() == [False]
-    other = write(out=tmp_path / "b")
-    again = write(f"replay:{tmp_path / 'a'}", out=tmp_path / "c")
+    other = improve(out=tmp_path / "b")
+    again = improve(f"replay:{tmp_path / 'a'}", out=tmp_path / "c")
     for run in (other, again):
         assert run.verified
         assert run.attempts == one.attempts
@@ -278,18 +265,18 @@ def test_the_built_in_learner_varies_the_same_way_twice(write, tmp_path):
         assert sources(run.folder) == sources(one.folder)
     assert len(sources(one.folder)) > 4
     with pytest.raises(RunError, match="number of improving episodes 32 instead of 40"):
-        write(out=tmp_path / "b", improve=40)
+        improve(out=tmp_path / "b", improve=40)
 
 
 @pytest.mark.slow
 def test_an_interrupted_search_leaves_a_verified_run(
-    write, good_source, tmp_path, tdac
+    improve, good_source, tmp_path, tdac
 ):
     """All places say so, and how to go on; also after a break in resuming it."""
     out = tmp_path / "run"
     model = Script(code(good_source), code(STILL), KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
-        write(model)
+        improve(model)
 
     def check():
         run = load_run(out)
@@ -313,9 +300,9 @@ def test_an_interrupted_search_leaves_a_verified_run(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write(Script(), on_event=interrupt)
+        improve(Script(), on_event=interrupt)
     check()
-    run = write(Script(*[code(STILL)] * 3))
+    run = improve(Script(*[code(STILL)] * 3))
     assert (run.status, len(run.attempts)) == ("verified", 5)
 
 
@@ -343,14 +330,14 @@ def sources(folder):
     }
 
 
-def test_too_few_episodes_on_a_task_are_refused(write):
+def test_too_few_episodes_on_a_task_are_refused(improve):
     with pytest.raises(TaskError, match="improve"):
-        write(improve=31)
+        improve(improve=31)
 
 
-def test_a_seed_is_drawn_for_a_search(write, good_source):
+def test_a_seed_is_drawn_for_a_search(improve, good_source):
     """So that its record says which episodes it drove."""
-    run = write(Script(code(good_source), *[code(good_source)] * 3), seed=None)
+    run = improve(Script(code(good_source), *[code(good_source)] * 3), seed=None)
     assert isinstance(run.seed, int)
     found = read_improvement(run.folder)
     assert found.first_seed > 2**33
@@ -367,7 +354,7 @@ def test_the_command_improves_a_task(tdac, tmp_path, good_source):
     code_, out, err = tdac(*words, "--dry-run", "--json")
     assert (code_, err) == (0, "")
     told = json.loads(out)
-    assert told["variations"] == most_variations(32, on_set=False) == 10
+    assert told["variations"] == shares(None, 32).asked == 10
     assert told["questions"] == 20 * 3 + 10
     code_, out, err = tdac(*words, "--out", "run")
     assert (code_, err) == (0, "")

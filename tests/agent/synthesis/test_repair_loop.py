@@ -8,10 +8,9 @@ from pathlib import Path
 import pytest
 from small import write_small_task
 
-from tdac_agent import load_task
 from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
 from tdac_agent.runs.run_record import Attempt, Run, load_rules, load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 
 PROGRAM = Path(__file__).parents[1] / "scripted_model.py"
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
@@ -48,21 +47,8 @@ class Model:
         return [file.read_text() for file in files]
 
 
-@pytest.fixture
-def policy_task(tmp_path):
-    """The small task in the profile `policy`."""
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run"
-
-
 @pytest.mark.slow
-def test_rules_live_on(
-    policy_task, good_source, tmp_path, out, tdac, monkeypatch, warm
-):
+def test_rules_live_on(task, good_source, tmp_path, out, tdac, monkeypatch, warm):
     """Learnt, edited and dropped over three iterations; `tdac rules` shows it all."""
     model = Model(
         tmp_path / "model",
@@ -76,9 +62,7 @@ def test_rules_live_on(
         ),
         code(good_source),
     )
-    run = synthesize(
-        policy_task, model.name, out=out, iterations=3, patience=0, judge=warm
-    )
+    run = synthesize(task, model.name, out=out, iterations=3, patience=0, judge=warm)
     assert run.tau == 3
     prompts = model.prompts()
     assert len(prompts) == 5
@@ -122,7 +106,7 @@ def check_life(folder):
 
 @pytest.mark.slow
 def test_a_malformed_answer_about_rules_is_asked_again(
-    policy_task, good_source, tmp_path, out, warm
+    task, good_source, tmp_path, out, warm
 ):
     """With the reason; after three of them the rules stay, and the run goes on."""
     model = Model(
@@ -130,9 +114,7 @@ def test_a_malformed_answer_about_rules_is_asked_again(
         *(code(STILL), "- Do not stand still.", rules(add("x" * 201)), rules()),
         *(code(STILL), "no", "no", "no", code(good_source)),
     )
-    run = synthesize(
-        policy_task, model.name, out=out, iterations=3, patience=0, judge=warm
-    )
+    run = synthesize(task, model.name, out=out, iterations=3, patience=0, judge=warm)
     assert run.tau == 3
     assert load_rules(out).rules == ()
     first, second, third = model.prompts()[1:4]
@@ -144,13 +126,13 @@ def test_a_malformed_answer_about_rules_is_asked_again(
 
 @pytest.mark.slow
 def test_an_unusable_answer_is_asked_again_with_the_reason(
-    policy_task, good_source, tmp_path, out, warm
+    task, good_source, tmp_path, out, warm
 ):
     """Nothing is guessed: not from two files, and not from a part of one."""
     two = code(good_source) + code(good_source.replace("1.0", "0.9"))
     part = code("def helper(obs):\n    return 0.0, 0.0\n")
     model = Model(tmp_path / "model", two, part, code(good_source))
-    run = synthesize(policy_task, model.name, out=out, iterations=1, judge=warm)
+    run = synthesize(task, model.name, out=out, iterations=1, judge=warm)
     assert run.tau == 1
     _, second, third = model.prompts()
     assert "two blocks that may be the file" in second[-200:]
@@ -161,15 +143,13 @@ def test_an_unusable_answer_is_asked_again_with_the_reason(
 
 
 @pytest.mark.slow
-def test_earlier_attempts_are_told(policy_task, good_source, tmp_path, out, warm):
+def test_earlier_attempts_are_told(task, good_source, tmp_path, out, warm):
     """One line each, the one in question left out; no figure of a held-out start."""
     model = Model(
         tmp_path / "model",
         *(code(STILL), code(WALL), code(f"{WALL}X = 1\n"), code(good_source)),
     )
-    run = synthesize(
-        policy_task, model.name, out=out, iterations=1, patience=3, judge=warm
-    )
+    run = synthesize(task, model.name, out=out, iterations=1, patience=3, judge=warm)
     assert run.tau == 1
     first, second, third = (
         prompt.partition("## Earlier attempts, oldest first\n")[2]
@@ -186,10 +166,10 @@ def test_earlier_attempts_are_told(policy_task, good_source, tmp_path, out, warm
 
 
 @pytest.mark.slow
-def test_the_prompt_is_on_record(policy_task, good_source, tmp_path, out, warm):
+def test_the_prompt_is_on_record(task, good_source, tmp_path, out, warm):
     """A run says which template its questions were made from."""
     model = Model(tmp_path / "model", code(good_source))
-    synthesize(policy_task, model.name, out=out, prompt="underspecified", judge=warm)
+    synthesize(task, model.name, out=out, prompt="underspecified", judge=warm)
     assert load_run(out).prompt == "underspecified"
     assert "## Advice" not in model.prompts()[0]
 

@@ -8,50 +8,136 @@ import sys
 
 import pytest
 import script
-from script import STILL as NOTHING
-from script import Script
+from script import NO_RULES, STILL, Script
 from small import write_small_task
 
-from tdac_agent import load_task
+from tdac_agent import load_task, synthesize
 from tdac_agent.errors import Fault, ProviderError, RunError
 from tdac_agent.models.provider import PermanentFault, ProviderFault, Reply
-from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.verification.verify import verify
+from tdac_envs.core.errors import TaskError
 
-AT_ONCE = RetryPolicy(first_wait=0.0)
+BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
+LEARNT = ("Drive towards the goal.", "Do not stand still.")
+OPERATIONS = [{"op": "add", "scope": "code", "text": text} for text in LEARNT]
+RULES = Reply(f"```json\n{json.dumps(OPERATIONS)}\n```", tokens_in=7)
+GARBAGE = Reply("\n\n  lorem \x1b[31mipsum\n" + "dolor sit amet " * 99)
 
 
 def code(source):
     return script.code(source, tokens_in=10, tokens_out=5)
 
 
-@pytest.fixture
-def policy_task(tmp_path):
-    """The small task in the profile `policy`."""
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run"
+class Paid(Script):
+    paid = True
 
 
 def journal(folder):
     return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
-LEARNT = ("Drive towards the goal.", "Do not stand still.")
-OPERATIONS = [{"op": "add", "scope": "code", "text": text} for text in LEARNT]
-RULES = Reply(f"```json\n{json.dumps(OPERATIONS)}\n```", tokens_in=7)
+def halted(folder):
+    """The run as if its last process had been killed."""
+    record = json.loads((folder / "run.json").read_text())
+    (folder / "run.json").write_text(json.dumps(record | {"status": "running"}))
+    return folder
 
 
-def test_it_passes_after_rules_and_an_edit(policy_task, good_source, out, warm):
+# On a task and on a task set alike.
+
+
+def test_the_same_code_is_not_tested_again(write, ground, out):
+    """Neither in an edit nor in a later iteration; the model is told."""
+    # j=1 is unedited, k=2 begins with k=1's code, and its edit changes nothing.
+    answers = [code(STILL), code(f"# the same\n{STILL}"), NO_RULES] * 2
+    model, run = write(ground, *answers, iterations=2)
+    known = [(attempt.unchanged, attempt.valid) for attempt in run.attempts]
+    assert known == [(False, True), *[(True, True)] * 3]
+    assert run.attempts[2].notes[-1] == "same code as k=1 j=0"
+    assert run.attempts[2].failed_tests == run.attempts[0].failed_tests
+    assert "The last edit changed nothing" in model.requests[2].prompt
+    assert "The last edit changed nothing" not in model.requests[4].prompt
+    assert (run.status, run.tau, run.controller.exists()) == ("not verified", None, 0)
+    reports = [p for name in ("report", "episodes") for p in out.rglob(f"{name}.json")]
+    tested = {path.relative_to(out / "iterations").parts[:2] for path in reports}
+    assert tested == {("k01", "j0")}
+    starts = [each for each in journal(out) if each["event"] == "verify.start"]
+    assert len(starts) == ground.is_task
+
+
+def test_a_broken_run_goes_on_where_it_was(write, ground, out):
+    """What is on record is neither asked nor tested again; nor is a finished run."""
+    with pytest.raises(Fault, match=r"^script: no access$"):
+        write(ground, code(STILL), PermanentFault("no access"))
+    run = load_run(out)
+    assert run.status == "fault"
+    assert [(a.k, a.j, a.passed) for a in run.attempts] == [(1, 0, False)]
+    assert (out / "iterations/k01/j0/generate.reply.md").is_file()
+    assert (out / "iterations/k01/j1/edit.prompt.md").is_file()
+    reports = [p for name in ("report", "episodes") for p in out.rglob(f"{name}.json")]
+    before = {path: path.stat().st_mtime_ns for path in reports}
+    assert len(before) == 1
+    model, run = write(ground, code(ground.good))
+    assert model.asked() == [("edit", 1, 1)]
+    assert run.status == ("verified" if ground.is_task else "selected")
+    assert run.controller.read_text() == ground.good
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    model, again = write(ground)
+    assert (model.asked(), again.status) == ([], run.status)
+
+
+def test_an_interrupt_leaves_a_readable_run(write, ground, out):
+    """Ctrl-C in the middle of a call; another run is then refused in its folder."""
+    with pytest.raises(KeyboardInterrupt):
+        write(ground, code(STILL), KeyboardInterrupt())
+    run = load_run(out)
+    assert (run.status, [(a.k, a.j) for a in run.attempts]) == ("interrupted", [(1, 0)])
+    assert journal(out)[-1]["status"] == "interrupted"
+    with pytest.raises(RunError, match="K 20 instead of 3"):
+        write(ground, iterations=3)
+
+
+def test_a_given_controller_is_tried_first(write, ground, tmp_path):
+    """`start_from` replaces the first answer of the learner; a path is read."""
+    file = tmp_path / "given.py"
+    file.write_text(ground.good)
+    model, run = write(ground, start_from=file)
+    assert (run.tau, model.requests) == (1, [])
+
+
+def test_an_unknown_keyword_is_named(write, ground, out):
+    """Before anything is written; options and keywords are the same."""
+    with pytest.raises(TypeError, match="no option 'iteration'; the options are base"):
+        write(ground, iteration=3)
+    with pytest.raises(TaskError, match="improve"):
+        write(ground, options=SynthOptions(improve=31))
+    assert not out.exists()
+
+
+@pytest.mark.slow
+def test_the_budget_ends_a_run_that_more_tokens_continue(write, ground):
+    """Nothing is delivered then, and no answer is paid for twice."""
+    one = 40_000 if ground.is_task else 30_000  # enough for one question, not for two
+    model = Paid(script.code(STILL))  # without tokens: all that is reserved counts
+    _, run = write(ground, model=model, max_tokens=one, iterations=1)
+    assert run.status == "budget"
+    assert "--max-tokens" in str(run.enough)
+    model = Paid(code(BUMP), NO_RULES)
+    _, run = write(ground, model=model, max_tokens=500_000, iterations=1)
+    assert model.asked()[0] == ("edit", 1, 1)
+    assert run.status == "not verified"
+
+
+# On a task.
+
+
+def test_it_passes_after_rules_and_an_edit(task, good_source, out, warm):
     """Two failures, rules, a failure, an edit that passes: k = 2, j = 1."""
-    learner = Script(code(NOTHING), code(NOTHING + "\nX = 2\n"))
-    optimizer = Script(code(NOTHING + "\nX = 1\n"), RULES, code(good_source))
-    run = synthesize(policy_task, learner, optimizer, out=out, judge=warm)
+    learner = Script(code(STILL), code(STILL + "\nX = 2\n"))
+    optimizer = Script(code(STILL + "\nX = 1\n"), RULES, code(good_source))
+    run = synthesize(task, learner, optimizer, out=out, judge=warm)
     assert run.verified
     assert run.tau == 2
     assert learner.asked() == [("generate", 1, 0), ("generate", 2, 0)]
@@ -65,8 +151,9 @@ def test_it_passes_after_rules_and_an_edit(policy_task, good_source, out, warm):
     for later in (learner.requests[1], optimizer.requests[2]):
         assert later.rules == LEARNT
         assert all(f"- {rule} [R" in later.prompt for rule in LEARNT)
-    assert optimizer.requests[0].controller == NOTHING
+    assert optimizer.requests[0].controller == STILL
     assert "no motion" in optimizer.requests[0].prompt
+    assert optimizer.requests[1].report.verdict.failed_tests > 0
     assert run.tokens_in == 10 * 4 + 7
     check_folder(out, good_source)
 
@@ -85,8 +172,7 @@ def check_folder(folder, source):
     assert "+X = 1" in (folder / "iterations/k01/j1/controller.diff").read_text()
     assert load_run(folder).verified
     events = [record["event"] for record in journal(folder)]
-    assert events[0] == "run.start"
-    assert events[-1] == "run.end"
+    assert (events[0], events[-1]) == ("run.start", "run.end")
     rules = next(r for r in journal(folder) if r["event"] == "rules")["rules"]
     assert rules[0]["id"] == "R1"
     assert "test_end_to_end.py::test_progress" in rules[0]["evidence"]
@@ -97,17 +183,14 @@ def check_folder(folder, source):
     "reply",
     [
         Reply("I cannot help with that.", stop="refusal"),
-        Reply(f"```python\n{NOTHING}```", stop="length"),
+        Reply(f"```python\n{STILL}```", stop="length"),
         Reply("No code here."),
         Reply("```python\ndef policy(:\n```"),
     ],
 )
-def test_invalid_answers_are_asked_again_twice(
-    policy_task, good_source, out, reply, warm
-):
+def test_invalid_answers_are_asked_again_twice(write, on_task, out, reply):
     """Then the iteration is spent and marked invalid; each answer is kept."""
-    learner = Script(reply, reply, reply, code(good_source))
-    run = synthesize(policy_task, learner, out=out, judge=warm)
+    _, run = write(on_task, reply, reply, reply, code(on_task.good))
     assert run.tau == 2
     assert [(a.k, a.valid, a.passed) for a in run.attempts] == [
         (1, False, False),
@@ -120,180 +203,110 @@ def test_invalid_answers_are_asked_again_twice(
         (1, 0, asked, 3) for asked in (1, 2, 3)
     ]
     assert all(why.endswith(r["problem"]) for r in unused)
-    first = out / "iterations" / "k01" / "j0"
-    replies = sorted(path.name for path in first.glob("generate.reply*"))
-    assert replies == [
+    replies = (out / "iterations" / "k01" / "j0").glob("generate.reply*")
+    assert sorted(path.name for path in replies) == [
         *("generate.reply-2.md", "generate.reply-3.md", "generate.reply.md"),
     ]
 
 
-GARBAGE = Reply("\n\n  lorem \x1b[31mipsum\n" + "dolor sit amet " * 99)
-
-
 @pytest.mark.slow
-def test_a_model_without_a_usable_answer_is_given_up(
-    policy_task, good_source, out, warm
-):
+def test_a_model_without_a_usable_answer_is_given_up(write, on_task, out):
     """After three spent iterations the run is censored; to go on asks it once more."""
-    paid = Script(*[GARBAGE] * 9)
-    paid.paid = True
     expected = r"^script: 3 iterations in a row without a controller; in the last one, "
     with pytest.raises(Fault, match=expected + "none of 3 answers could be used: it "):
-        synthesize(policy_task, paid, out=out, iterations=9, judge=warm)
+        write(on_task, model=Paid(*[GARBAGE] * 9), iterations=9)
     run = load_run(out)
     assert (run.status, run.censored, len(run.attempts)) == ("fault", True, 3)
     says = {r["says"] for r in journal(out) if r["event"] == "call.unused"}
     assert says == {("lorem [31mipsum " + "dolor sit amet " * 99)[:159] + "…"}
-    paid = Script(*[GARBAGE] * 6, code(good_source))
-    paid.paid = True
-    run = synthesize(policy_task, paid, out=out, iterations=9, judge=warm)
+    paid = Paid(*[GARBAGE] * 6, code(on_task.good))
+    _, run = write(on_task, model=paid, iterations=9)
     assert (run.tau, paid.answers) == (6, [])
 
 
-def test_who_costs_nothing_may_answer_what_it_likes(policy_task, out, warm):
+def test_who_costs_nothing_may_answer_what_it_likes(write, on_task):
     """A simulation or a replay goes on to its last iteration."""
-    run = synthesize(
-        policy_task, Script(*[GARBAGE] * 15), out=out, iterations=5, judge=warm
-    )
+    _, run = write(on_task, *[GARBAGE] * 15, iterations=5)
     assert (run.status, len(run.attempts)) == ("not verified", 5)
 
 
-def test_faults_use_up_no_iteration(policy_task, good_source, out, warm):
-    """A provider that cannot be reached is asked again; the second answer counts."""
-    learner = Script(ProviderFault("503"), ProviderFault("503"), code(good_source))
-    run = synthesize(
-        policy_task, learner, out=out, iterations=1, retry=AT_ONCE, judge=warm
-    )
+def test_faults_use_up_no_iteration(write, on_task, out):
+    """A provider that cannot be reached is asked again; the third answer counts."""
+    faults = [ProviderFault("503")] * 2
+    _, run = write(on_task, *faults, code(on_task.good), iterations=1)
     assert run.tau == 1
     faults = [r for r in journal(out) if r["event"] == "call.fault"]
     assert [fault["attempt"] for fault in faults] == [1, 2]
     assert {fault["fault"] for fault in faults} == {"transient"}
 
 
-def test_four_faults_stop_the_run(policy_task, out, warm):
+def test_four_faults_stop_the_run(write, on_task, out):
     """The run is neither verified nor failed, and its record says why."""
-    learner = Script(*[ProviderFault("no route to host")] * 4)
     expected = r"^script: no route to host \(asked 4 times\)$"
     with pytest.raises(Fault, match=expected):
-        synthesize(policy_task, learner, out=out, retry=AT_ONCE, judge=warm)
-    assert learner.answers == []
-    run = load_run(out)
-    assert run.status == "fault"
-    assert run.attempts == []
+        write(on_task, *[ProviderFault("no route to host")] * 4)
+    assert (load_run(out).status, load_run(out).attempts) == ("fault", [])
     assert "no route" in journal(out)[-1]["reason"]
 
 
-def test_a_permanent_fault_keeps_what_there_is(policy_task, out, warm):
-    """It is not asked again; the candidate before it stays on record."""
-    learner = Script(code(NOTHING), PermanentFault("401 no such key"))
-    with pytest.raises(Fault, match=r"^script: 401 no such key$"):
-        synthesize(policy_task, learner, out=out, judge=warm)
-    run = load_run(out)
-    assert run.status == "fault"
-    assert [(a.k, a.j, a.passed) for a in run.attempts] == [(1, 0, False)]
-    assert (out / "iterations/k01/j0/generate.reply.md").is_file()
-    assert (out / "iterations/k01/j1/edit.prompt.md").is_file()
-
-
-def test_a_truncated_answer_gets_more_room(policy_task, good_source, out, warm):
+def test_a_truncated_answer_gets_more_room(write, on_task):
     """It is never used, even where the code in it is whole, and asked for again."""
-    cut = Reply(f"```python\n{good_source}```", stop="length")
-    learner = Script(cut, code(good_source))
-    run = synthesize(policy_task, learner, out=out, judge=warm)
+    cut = Reply(f"```python\n{on_task.good}```", stop="length")
+    model, run = write(on_task, cut, code(on_task.good))
     assert run.tau == 1
-    first, second = (request.max_tokens for request in learner.requests)
+    first, second = (request.max_tokens for request in model.requests)
     assert second == 2 * first
 
 
-def test_more_room_than_a_model_can_have(policy_task, good_source, out, warm):
+def test_more_room_than_a_model_can_have(write, on_task):
     """Where it is refused, the usual room is asked for; the run goes on."""
-    cut, refused = (
-        Reply("```python", stop="length"),
-        PermanentFault("400 at most 16384"),
-    )
-    learner = Script(cut, refused, cut, refused, code(good_source))
-    assert synthesize(policy_task, learner, out=out, judge=warm).tau == 1
-    rooms = [request.max_tokens for request in learner.requests]
+    cut, refused = Reply("```python", stop="length"), PermanentFault("400 at most")
+    model, run = write(on_task, cut, refused, cut, refused, code(on_task.good))
+    assert run.tau == 1
+    rooms = [request.max_tokens for request in model.requests]
     usual = rooms[0]
     assert rooms == [usual, 2 * usual, usual, 2 * usual, usual]
 
 
-def test_it_gives_up_after_k_iterations(policy_task, out, warm):
-    """Nothing verified: no controller.py, status `not verified`."""
-    learner = Script(code(NOTHING), RULES, code(NOTHING), RULES)
-    run = synthesize(
-        policy_task, learner, out=out, iterations=2, patience=0, judge=warm
-    )
-    assert run.status == "not verified"
-    assert run.tau is None
-    assert not run.controller.exists()
-    assert learner.asked()[-1] == ("summarise", 2, 0)
-    assert learner.requests[-1].report.verdict.failed_tests > 0
-
-
-def test_an_interrupt_leaves_a_readable_run(policy_task, out, warm):
-    """Ctrl-C in the middle of a call."""
-    learner = Script(code(NOTHING), KeyboardInterrupt())
-    with pytest.raises(KeyboardInterrupt):
-        synthesize(policy_task, learner, out=out, judge=warm)
-    run = load_run(out)
-    assert run.status == "interrupted"
-    assert [(a.k, a.j) for a in run.attempts] == [(1, 0)]
-    assert journal(out)[-1]["status"] == "interrupted"
-
-
-def test_a_given_controller_is_tried_first(policy_task, good_source, out, warm):
-    """`start_from` replaces the first answer of the learner."""
-    learner = Script()
-    run = synthesize(policy_task, learner, out=out, start_from=good_source, judge=warm)
-    assert run.tau == 1
-    assert learner.requests == []
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("source", ["", "# no line end"])
-def test_a_given_controller_may_be_poor(policy_task, good_source, out, source, warm):
+def test_a_given_controller_may_be_poor(write, on_task, source):
     """An empty file or one without a line end is a candidate like any other."""
-    learner = Script(code(good_source))
-    run = synthesize(policy_task, learner, out=out, start_from=source, judge=warm)
+    _, run = write(on_task, code(on_task.good), start_from=source)
     assert [a.passed for a in run.attempts] == [False, True]
 
 
-def test_builtin_needs_no_model(policy_task, out, warm):
+def test_builtin_needs_no_model(write, on_task):
     """The builtin learner verifies the small task by itself."""
-    run = synthesize(policy_task, out=out, judge=warm)
+    _, run = write(on_task, model="builtin")
     assert run.verified
     assert run.learner == run.optimizer == "builtin"
     assert run.tokens_in == 0
 
 
-def test_an_unknown_learner(policy_task, out, warm):
-    """The name is refused before anything is written."""
+def test_what_cannot_begin_writes_nothing(write, on_task, out):
+    """An unknown learner, hidden worlds of a task, a folder that holds something."""
     with pytest.raises(ProviderError, match="unknown model 'gpt'; known: builtin, "):
-        synthesize(policy_task, "gpt", out=out, judge=warm)
+        write(on_task, model="gpt")
+    with pytest.raises(TaskError, match=r"the task small .* has no hidden"):
+        write(on_task, then_verify=True)
     assert not out.exists()
-
-
-def test_a_folder_in_use(policy_task, out, warm):
-    """A run never writes into a folder that holds something."""
     out.mkdir()
     (out / "mine.txt").write_text("keep")
     with pytest.raises(RunError, match="is not empty"):
-        synthesize(policy_task, out=out, judge=warm)
+        write(on_task, model="builtin")
     assert [path.name for path in out.iterdir()] == ["mine.txt"]
 
 
 @pytest.mark.slow
-def test_a_run_folder_is_self_contained(tmp_path, good_source, warm):
+def test_a_run_folder_is_self_contained(tmp_path, good_source, out, warm):
     """Moved elsewhere it verifies with its own suite, and its controller runs alone."""
     folder = write_small_task(tmp_path / "task", suite="mine")
     (folder / "mine").mkdir()
     test = "def test_own(rollout):\n    assert rollout('nominal').reached, 'no'\n"
     (folder / "mine" / "test_mine.py").write_text(test)
-    out = tmp_path / "run"
-    learner = Script(code(good_source))
     task = load_task(folder, trust=True)
-    assert synthesize(task, learner, out=out, judge=warm).verified
+    assert synthesize(task, Script(code(good_source)), out=out, judge=warm).verified
     moved = tmp_path / "elsewhere" / "moved"
     moved.parent.mkdir()
     out.rename(moved)
@@ -328,25 +341,15 @@ def test_a_run_folder_is_self_contained(tmp_path, good_source, warm):
         (1, [("generate", 1, 0), ("edit", 1, 1), ("generate", 2, 0), ("edit", 2, 1)]),
     ],
 )
-def test_without_refinement_the_prompt_stays(patience, asked, policy_task, out):
+def test_without_refinement_the_prompt_stays(write, on_task, patience, asked, out):
     """No rules are asked for, each new controller is asked for in the same words."""
-    model = Script(*(code(f"{NOTHING}X = {n}\n") for n in range(4)))
-    run = synthesize(
-        policy_task, model, out=out, iterations=2, patience=patience, refine=False
-    )
+    answers = [code(f"{STILL}X = {n}\n") for n in range(4)]
+    terms = {"iterations": 2, "patience": patience}
+    model, run = write(on_task, *answers, refine=False, **terms)
     assert model.asked() == asked
     prompts = {r.prompt for r in model.requests if r.kind == "generate"}
     assert len(prompts) == 1
     assert (run.refine, run.status) == (False, "not verified")
     assert run.setting == ("edit only" if patience else "best of N")
     with pytest.raises(RunError, match="refinement of the prompt"):
-        synthesize(
-            policy_task, Script(), out=halted(out), iterations=2, patience=patience
-        )
-
-
-def halted(folder):
-    """The run as if its last process had been killed."""
-    record = json.loads((folder / "run.json").read_text())
-    (folder / "run.json").write_text(json.dumps(record | {"status": "running"}))
-    return folder
+        write(on_task, out=halted(out), **terms)

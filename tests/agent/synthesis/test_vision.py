@@ -26,7 +26,7 @@ from tdac_agent.runs.journal_state import call_key
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.cost_forecast import cost_of
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import rest_of
 
 AT_ONCE = RetryPolicy(first_wait=0.0)

@@ -10,7 +10,7 @@ from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.models.provider import Reply
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.suite.privileged import (

@@ -15,7 +15,7 @@ from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.pictures import reaches
 from tdac_agent.evaluation.policy import load_controller
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.diagnosis.report import Report

@@ -30,7 +30,7 @@ from rich.console import Console
 
 from tdac_agent import load_task
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.loop import synthesize
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.diagnosis.report import Report
 
 MOST_SECONDS = 300

@@ -11,20 +11,20 @@ from hypothesis import strategies as st
 from script import STILL, Script, code
 
 from tdac_agent.errors import RunError
-from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.history import gather_run
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.runs.selection_record import read_selection
-from tdac_agent.set_synthesis.improve import SetFigures, base_of, finalists
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
-from tdac_agent.set_synthesis.trials import Candidate
 from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.candidates import Candidate, Figures
 from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_envs.core.errors import TaskError
 
-AT_ONCE = RetryPolicy(first_wait=0.0)
 scores = st.floats(0.0, 1.0)
-figures = st.builds(SetFigures, scores, scores, scores, scores)
+names = ("time", "path", "success", "worst")
+figures = st.builds(
+    lambda *values: Figures(dict(zip(names, values, strict=True)), {"time": "time"}),
+    *[scores] * 4,
+)
 
 
 @st.composite
@@ -43,15 +43,15 @@ def test_the_front_is_what_nobody_beats(archive):
     front = archive.front()
     assert front
     for each in archive.members:
-        beaten = any(other.beats(each) for other in archive.members)
+        beaten = any(one.figures.beats(each.figures) for one in archive.members)
         assert beaten == (not any(each is one for one in front))
     assert archive.best().figures.time == max(m.figures.time for m in archive.members)
 
 
 @given(archives())
 def test_the_best_founder_is_a_finalist(archive):
-    chosen = finalists(archive)
-    assert any(base_of(archive) is each for each in chosen)
+    chosen = archive.finalists(4)
+    assert any(archive.base is each for each in chosen)
     assert len(chosen) <= 5
     assert [each.k for each in chosen] == sorted({each.k for each in chosen})
 
@@ -67,19 +67,18 @@ def test_the_shares_are_all_episodes(episodes, improve):
 
 
 @pytest.fixture
-def write(few, tmp_path, warm):
+def improve(write, on_set):
     """Runs with few episodes."""
 
     def run(model, **values):
-        given = {"episodes": 4, "feedback_episodes": 2, "seed": 3, "judge": warm}
-        given |= {"out": tmp_path / "run", "retry": AT_ONCE, "improve": 32, **values}
-        return synthesize_on_set(few, model, **given)
+        given = {"episodes": 4, "improve": 32} | values
+        return write(on_set, model=model, **given)[1]
 
     return run
 
 
 @pytest.mark.slow
-def test_a_better_variation_is_asked_for_and_selected(write, solver, tmp_path):
+def test_a_better_variation_is_asked_for_and_selected(improve, solver, tmp_path):
     """The model sees the parent, its figures, and what was tried with it."""
     slow = solver.replace("def policy(", "def fast(") + (
         "\n\ndef policy(obs):\n    left, right = fast(obs)\n"
@@ -88,7 +87,7 @@ def test_a_better_variation_is_asked_for_and_selected(write, solver, tmp_path):
     quick = slow.replace("0.6", "0.95")
     refused = f"import subprocess\n{slow}"
     model = Script(*map(code, (slow, STILL, slow, refused, quick, slow, slow, slow)))
-    run = write(model)
+    run = improve(model)
     asked = [kind for kind, *_ in model.asked()]
     assert asked == ["generate", *["improve"] * (len(asked) - 1)]
     first, second = (request.prompt for request in model.requests[1:3])
@@ -118,9 +117,8 @@ def test_a_better_variation_is_asked_for_and_selected(write, solver, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_built_in_learner_searches_the_same_way_twice(few, tmp_path, warm):
+def test_the_built_in_learner_searches_the_same_way_twice(improve, tmp_path):
     """With one seed, both folders agree but for times; a killed run ends the same."""
-    given = {"episodes": 4, "feedback_episodes": 2, "seed": 5, "improve": 32}
 
     class Stop(Exception):
         pass
@@ -129,10 +127,10 @@ def test_the_built_in_learner_searches_the_same_way_twice(few, tmp_path, warm):
         if record["event"] == "drive.end" and record.get("k") == 22:
             raise Stop
 
-    one = synthesize_on_set(few, out=tmp_path / "a", judge=warm, **given)
+    one = improve("builtin", out=tmp_path / "a")
     with pytest.raises(Stop):
-        synthesize_on_set(few, out=tmp_path / "b", judge=warm, on_event=stop, **given)
-    other = synthesize_on_set(few, out=tmp_path / "b", judge=warm, **given)
+        improve("builtin", out=tmp_path / "b", on_event=stop)
+    other = improve("builtin", out=tmp_path / "b")
     assert one.status == other.status == "selected"
     for name in ("controller.py", "report.json"):
         assert (tmp_path / "a" / name).read_bytes() == (
@@ -150,14 +148,12 @@ def test_the_built_in_learner_searches_the_same_way_twice(few, tmp_path, warm):
     assert one.attempts == other.attempts
     assert load_run(tmp_path / "b").improve == 32
     with pytest.raises(RunError, match="number of improving episodes 32 instead of 40"):
-        synthesize_on_set(
-            few, out=tmp_path / "b", judge=warm, **given | {"improve": 40}
-        )
+        improve("builtin", out=tmp_path / "b", improve=40)
 
 
-def test_too_few_episodes_are_refused(write):
+def test_too_few_episodes_are_refused(improve):
     with pytest.raises(TaskError, match="improve"):
-        write(Script(), improve=31)
+        improve(Script(), improve=31)
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 from few_worlds import write_set
 
-from tdac_agent.set_synthesis.feedback import REFUSED, set_feedback, summary_of
+from tdac_agent.synthesis.set_reports import REFUSED, set_feedback, summary_of
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 
@@ -28,7 +28,7 @@ def test_a_file_that_may_not_drive(few, warm):
     """Each test that refused it is told."""
     report = verify_episodes(STILL, few, 1, split="dev", judge=warm)
     why = ("test_hygiene[sleep]: line 3", "test_imports: os")
-    empty = {"worlds": 0, "episodes": (), "causes": {}, "scores": None, "told": why}
+    empty = {"count": 0, "episodes": (), "causes": {}, "scores": None, "told": why}
     told = set_feedback(report.model_copy(update=empty))
     assert told.failed == (REFUSED,)
     assert all(f"\n- {line}" in told.text for line in why)

@@ -6,51 +6,43 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.terms import Terms
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 from tdac_envs.ladder.task_sets import TaskSet
 
 
-def verify_hidden(
-    tasks: TaskSet, recorder: Recorder, source: str, judge: WarmJudge, tier: str
-) -> EpisodeReport:
+def hidden_report(tasks: TaskSet, candidate: Candidate, terms: Terms) -> EpisodeReport:
     """The verdict of a sequential test on hidden worlds; the recorded one, if any.
 
     The controller and the set are on record before the salt is drawn.
 
     Args:
         tasks: The task set.
-        recorder: Records the run.
-        source: Source of the selected controller.
-        judge: A warm judge.
-        tier: Sandbox tier.
+        candidate: The selected candidate.
+        terms: What the trials share.
     """
-    folder, raw = recorder.run.folder, source.encode("utf-8", "surrogatepass")
-    about = {"controller_sha256": sha256_of(raw), "sha256": tasks.sha256}
+    recorder, folder = terms.recorder, terms.folder
+    about = {"controller_sha256": candidate.sha256, "sha256": tasks.sha256}
     recorder.event("hidden.start", **about)
     known = recorder.vouches(folder / HIDDEN_FILE)
-    report = _recorded(folder / HIDDEN_FILE, about) if known else None
+    report = _recorded(folder, about) if known else None
     if report is None:
         report = verify_episodes(
-            raw,
+            candidate.raw,
             tasks,
             split="hidden",
             # A salt in a folder from elsewhere may be known.
-            salt_file=drawn_salt(folder / SEALED, reuse=bool(recorder.run.mark)),
+            salt_file=drawn_salt(folder / SEALED, reuse=terms.trusts_record),
             lineage=recorder.run.id,
-            tier=tier,
-            judge=judge,
-            watch=lambda done, reached: recorder.tell(
-                {"event": "drive.step", "what": "hidden", "done": done}
-                | {"reached": reached}
-            ),
+            tier=terms.tier,
+            judge=terms.judge,
+            watch=terms.watch(what="hidden"),
         )
         write_atomic(folder / HIDDEN_FILE, report.model_dump_json(indent=2) + "\n")
         recorder.vouch(folder / HIDDEN_FILE)
@@ -58,9 +50,20 @@ def verify_hidden(
     return report
 
 
-def _recorded(path: Path, about: dict[str, str]) -> EpisodeReport | None:
+def read_hidden_report(folder: Path) -> EpisodeReport:
+    """The verdict in a run folder.
+
+    Raises:
+        OSError: There is none.
+        ValueError: It is damaged.
+    """
+    content = parse_json(read_file(folder / HIDDEN_FILE, RECORD_BYTES))
+    return EpisodeReport.model_validate(content)
+
+
+def _recorded(folder: Path, about: dict[str, str]) -> EpisodeReport | None:
     try:
-        report = EpisodeReport.model_validate(parse_json(read_file(path, RECORD_BYTES)))
+        report = read_hidden_report(folder)
     except (OSError, ValueError, ValidationError):
         return None
     known = report.provenance

@@ -1,28 +1,29 @@
-"""Options of a synthesis, on a task or a task set alike."""
+"""The options of a synthesis: flags of `tdac synth`, and keywords of `synthesize`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from tdac_agent.cli.options import (
-    BUDGET,
-    MODELS,
-    key_over_http_option,
-    seed_option,
-    tier_option,
-)
-from tdac_agent.cli.task_flags import SETS
 from tdac_agent.options import option
+
+if TYPE_CHECKING:
+    from tdac_agent.models.provider import Provider
+    from tdac_agent.prompting.rules import RuleBook
+
+MODELS, BUDGET, SETS = "Models", "Budget", "Task set"
+"""Headings of the help."""
 
 
 @dataclass(frozen=True, slots=True)
 class SynthOptions:
-    """What a synthesis may do: its loop, its models and its limits."""
+    """How a controller is written; see `tdac synth --help`.
 
-    start_from: Path | None = option(
-        None, "Controller to begin with.", "--from", metavar="FILE"
-    )
+    `learner` and `optimizer` may also be providers, `rules` a rule book, and
+    `start_from` the source of a controller.
+    """
+
     iterations: int = option(20, "Maximum iterations.", "-K", "--iterations", least=1)
     patience: int = option(
         1, "Maximum edits per iteration.", "-J", "--patience", least=0
@@ -31,8 +32,7 @@ class SynthOptions:
         1,
         "Number of new controllers to request at the same time; the best one is "
         "repaired. Each counts as an iteration.",
-        "-N",
-        "--candidates",
+        *("-N", "--candidates"),
         least=1,
     )
     improve: int = option(
@@ -41,38 +41,53 @@ class SynthOptions:
         "simulated episodes (disturbed ones on a task), and deliver the best.",
         least=32,
     )
+    start_from: str | Path | None = option(
+        None, "Controller to begin with.", "--from", metavar="FILE", type=Path
+    )
     prompt: str = option(
-        "full", "Prompt template: `full`, `underspecified`, or a file.", metavar="NAME"
+        "full",
+        "Prompt template: `full`, `underspecified`, or a file.",
+        metavar="NAME",
     )
     refine: bool = option(
         True,
         "Turn failures into rules in the prompt, or keep the prompt as it is.",
         "--refine/--no-refine",
     )
-    rules: Path | None = option(
+    rules: Path | RuleBook | None = option(
         None,
         "Rules for the prompt: of earlier runs (`tdac rules export`), or your own.",
         metavar="FILE",
+        type=Path,
     )
     vision: bool = option(
         False, "Show the optimizer a picture of the failure that it is to repair."
     )
-    seed: int | None = seed_option()
-    tier: str = tier_option()
-    learner: str = option(
+    seed: int | None = option(
+        None,
+        "Seed of the jittered starts, or of the choice of worlds on a task set.  "
+        "[default: derived from a secret of this installation]",
+        least=0,
+    )
+    tier: str = option(
+        "auto", "Sandbox tier; `tdac doctor` lists them.", metavar="NAME"
+    )
+    learner: str | Provider = option(
         "builtin",
         "Model that writes controllers: `builtin` (a template, no language model), "
         "`anthropic:MODEL`, `openai:MODEL`, `command:PROGRAM`, `manual:DIR`, "
         "`replay:RUN` or `scripted:SCRIPT`.",
         metavar="MODEL",
         panel=MODELS,
+        type=str,
     )
-    optimizer: str | None = option(
+    optimizer: str | Provider | None = option(
         None,
         "Model that repairs failed controllers and writes rules.  [default: the "
         "learner]",
         metavar="MODEL",
         panel=MODELS,
+        type=str,
     )
     base_url: str | None = option(
         None,
@@ -81,11 +96,15 @@ class SynthOptions:
         metavar="URL",
         panel=MODELS,
     )
-    key_over_http: bool = key_over_http_option()
+    key_over_http: bool = option(
+        False,
+        "Allow sending an API key unencrypted to a server on another machine.",
+        panel=MODELS,
+    )
     max_output: int = option(
         16_000,
-        "Token limit of an answer, thinking included; doubled after an answer that was "
-        "cut off.",
+        "Token limit of an answer, thinking included; doubled after an answer that "
+        "was cut off.",
         least=1,
         panel=MODELS,
     )
@@ -99,8 +118,8 @@ class SynthOptions:
     )
     max_tokens: int | None = option(
         None,
-        "Token limit of the whole run, input plus output.  [default: none; 1000000 for "
-        "a server with unknown prices]",
+        "Token limit of the whole run, input plus output.  [default: none; 1000000 "
+        "for a server with unknown prices]",
         least=0,
         panel=BUDGET,
     )
@@ -126,3 +145,18 @@ class SynthOptions:
         panel=SETS,
         scope="set",
     )
+
+    def changed(self, **values: Any) -> SynthOptions:
+        """The same with other values.
+
+        Raises:
+            TypeError: There is no such option.
+        """
+        known = {each.name for each in fields(self)}
+        unknown = [name for name in values if name not in known]
+        if unknown:
+            raise TypeError(
+                f"synthesize has no option {unknown[0]!r}; the options are "
+                f"{', '.join(sorted(known))}"
+            )
+        return replace(self, **values)

@@ -12,10 +12,9 @@ from script import NO_RULES, STILL, Script, code
 
 from tdac_agent.html_report import make_page
 from tdac_agent.models.picture import LARGEST_SIDE
-from tdac_agent.runs.run_record import load_run
-from tdac_agent.set_synthesis.pictures import world_picture
-from tdac_agent.set_synthesis.resume import resume_set_arguments
-from tdac_agent.set_synthesis.synthesize import synthesize_on_set
+from tdac_agent.runs.resume import resume_arguments
+from tdac_agent.synthesis.set_reports import world_picture
+from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.drawing.canvas import MOVER
@@ -43,7 +42,7 @@ def shown_in(request):
 def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm):
     model = Script(code(BUMP), code(STILL), NO_RULES)
     given = {"episodes": 12, "feedback_episodes": 2, "seed": 3, "judge": warm}
-    run = synthesize_on_set(
+    run = synthesize(
         crowded, model, out=tmp_path / "run", iterations=1, vision=True, **given
     )
     first, edit = model.requests[:2]
@@ -65,7 +64,7 @@ def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm
     assert (
         'alt="A failure of the previous version"' in make_page(run.folder).html.decode()
     )
-    again = resume_set_arguments(load_run(run.folder), {})
+    again = resume_arguments(run.folder)
     assert again["vision"] is True
 
 
@@ -105,7 +104,7 @@ def test_a_variation_is_asked_for_with_a_picture_of_a_failure(
     )
     part = part.replace("def reset(", "def begin(", 1)
     model = Script(*(code(part) for _ in range(9)))
-    synthesize_on_set(
+    synthesize(
         few,
         model,
         out=tmp_path / "run",

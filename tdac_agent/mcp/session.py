@@ -1,4 +1,4 @@
-"""The work of the server on one run: what each tool does, one request at a time."""
+"""The session of the server on one run: what each tool does, one after another."""
 
 from __future__ import annotations
 
@@ -9,21 +9,28 @@ from typing import Any
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.mcp.answers import (
     ChooseAnswer,
+    EpisodeAnswer,
     Left,
     Refused,
     SubmissionLine,
     SubmissionsAnswer,
     SubmitAnswer,
+    hidden_verdict,
+    suite_verdict,
 )
 from tdac_agent.mcp.instructions import instructions
-from tdac_agent.mcp.judging import Judging, Submission
+from tdac_agent.mcp.pictures import draw
 from tdac_agent.mcp.submitted import source_of
 from tdac_agent.mcp.watch import Watch
+from tdac_agent.problems.problem import Problem
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import JOURNAL, Run, candidate_at
-from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.plain import one_line
+from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.hidden import read_hidden_report
+from tdac_agent.synthesis.terms import Chosen
+from tdac_agent.synthesis.trials import Trials, conclude
 from tdac_envs.core.errors import TdacError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
@@ -34,29 +41,31 @@ SUBMIT, CHOOSE, CLIENT = "submit", "choose", "client"
 
 
 @dataclass(slots=True)
-class Desk:
+class Session:
     """A run whose candidates are submitted by agents.
 
     All methods but `watch.stop` are called from one thread, one after another.
 
     Attributes:
-        judging: What the submissions are judged on.
+        problem: What the submissions are for.
+        trials: Tests them.
         watch: Follows the work.
-        submissions: The submissions so far.
+        submissions: The submissions so far; number n is the candidate (n, 0).
         chosen: Number of the submission that was chosen, if one was.
         ready: Whether the record of earlier processes has been read.
     """
 
-    judging: Judging
+    problem: Problem
+    trials: Trials
     watch: Watch
-    submissions: list[Submission] = field(default_factory=list)
+    submissions: list[Candidate] = field(default_factory=list)
     chosen: int | None = None
     ready: bool = False
 
     @property
     def recorder(self) -> Recorder:
         """Records the run."""
-        return self.judging.recorder
+        return self.trials.terms.recorder
 
     @property
     def run(self) -> Run:
@@ -66,9 +75,9 @@ class Desk:
     @property
     def left(self) -> Left:
         """What is left of the budget."""
-        left = self.judging.left(len(self.submissions))
         fixed = self.run.finished or self.chosen is not None
-        return Left(0, left.episodes) if fixed else left
+        left = max(0, self.run.iterations - len(self.submissions))
+        return Left(0 if fixed else left, self.trials.tests_left)
 
     def catch_up(self) -> None:
         """Reads what earlier processes did, and judges what they had not finished.
@@ -80,17 +89,13 @@ class Desk:
             return
         ended = self.run.finished
         while (source := self._source(len(self.submissions) + 1)) is not None:
-            number = len(self.submissions) + 1
-            if ended:
-                self._recall(number, source)
-            else:
-                self._judge(number, source)
+            self._judge(source, recall=ended)
         choices = [each for each in read_records(self._journal) if _is_choice(each)]
         if choices and 1 <= choices[-1]["k"] <= len(self.submissions):
             self.chosen = choices[-1]["k"]
         self.ready = True
         if not ended and self.chosen is not None:
-            self.judging.choose(self.submissions[self.chosen - 1])
+            self._conclude(self.submissions[self.chosen - 1])
         self._end_if_hopeless()
 
     def met(self, client: str) -> None:
@@ -105,8 +110,8 @@ class Desk:
 
     def read_task(self) -> str:
         """What is to be written, and how this server works."""
-        judging = self.judging
-        return instructions(judging.about, self.left, judging.question())
+        problem = self.problem
+        return instructions(problem.called, self.left, problem.question())
 
     def submit(self, text: str, client: str) -> SubmitAnswer:
         """Judges a controller.
@@ -132,7 +137,7 @@ class Desk:
             )
         number = len(self.submissions) + 1
         try:
-            submission = self._judge(number, source, client)
+            submission = self._judge(source, client)
         except (Fault, TdacError) as error:
             # The next start must not judge what the agent will submit again.
             (self._folder(number) / "controller.py").unlink(missing_ok=True)
@@ -143,11 +148,17 @@ class Desk:
 
     def failures(self, number: int) -> str:
         """What failed in a submission."""
-        return self._submission(number).judged.failures
+        result = self.trials.result(self._submission(number))
+        if not result.passed and result.failure is not None:
+            return result.failure.text
+        if self.problem.has_hidden:
+            told = f"nothing failed: {result.summary}"
+            return f"{told}; only choose({number}) can verify it"
+        return "nothing failed: it is verified"
 
     def picture(self, number: int, episode: str) -> bytes:
         """A PNG of an episode of a submission."""
-        return self.judging.picture(self._submission(number), episode)
+        return draw(self.problem, self._submission(number), episode)
 
     def listed(self) -> SubmissionsAnswer:
         """All submissions, and what is left of the budget."""
@@ -155,10 +166,10 @@ class Desk:
         return SubmissionsAnswer(
             submissions=[
                 SubmissionLine(
-                    submission=each.number,
-                    verified=each.judged.verified or self._is_result(each),
-                    can_be_chosen=not each.judged.unfit and not self.run.finished,
-                    summary=each.judged.summary,
+                    submission=each.k,
+                    verified=self._is_verified(each),
+                    can_be_chosen=not self._unfit(each) and not self.run.finished,
+                    summary=self.trials.result(each).summary,
                 )
                 for each in self.submissions
             ],
@@ -168,9 +179,18 @@ class Desk:
             ended=self._ending() if self.run.finished else None,
         )
 
-    def _is_result(self, submission: Submission) -> bool:
-        """Whether it is the verified result of the run."""
-        return self.run.verified and submission.number == self.chosen
+    def _is_verified(self, submission: Candidate) -> bool:
+        """Whether it passed the suite, or is the verified result of the run."""
+        if self.run.verified and submission.k == self.chosen:
+            return True
+        return not self.problem.has_hidden and self.trials.result(submission).passed
+
+    def _unfit(self, submission: Candidate) -> str:
+        """Why it cannot be chosen; empty if it can."""
+        unfit = self.trials.result(submission).unfit
+        if not unfit or self.problem.has_hidden:
+            return unfit
+        return f"{unfit}; only a verified submission can be chosen"
 
     def choose(self, number: int) -> ChooseAnswer:
         """Fixes the controller, gives the verdict, and ends the run.
@@ -185,16 +205,18 @@ class Desk:
         if self.chosen not in (None, number):
             raise Refused(f"submission {self.chosen} was chosen; that is final")
         if not self.run.finished:
-            if submission.judged.unfit:
-                unfit = submission.judged.unfit
+            unfit = self._unfit(submission)
+            if unfit:
                 raise Refused(f"submission {number} cannot be chosen: {unfit}")
             if self.chosen is None:
                 self.recorder.event(CHOOSE, k=number)
                 self.chosen = number
-            self.judging.choose(submission)
+            self._conclude(submission)
         elif self.chosen is None:
             raise Refused(self._ending())
-        return self.judging.verdict(number)
+        if self.problem.has_hidden:
+            return hidden_verdict(number, read_hidden_report(self.run.folder))
+        return suite_verdict(number, verified=self.run.verified)
 
     def close(self) -> None:
         """Records that the run was interrupted, unless it has ended."""
@@ -215,33 +237,49 @@ class Desk:
             return None
         return read_file(path, TEXT_BYTES).decode("utf-8", "surrogatepass")
 
-    def _recall(self, number: int, source: str) -> None:
-        """Reads a submission of a finished run.
+    def _judge(
+        self, source: str, client: str | None = None, *, recall: bool = False
+    ) -> Candidate:
+        """Judges a file, which is written before.
+
+        Args:
+            source: The file.
+            client: Who submits it, if it is new.
+            recall: Whether its result is on record, as in a run that has ended.
 
         Raises:
-            RunError: Its report cannot be read.
+            Fault: The sandbox is broken; the controller neither passes nor fails.
+            RunError: Its recorded result cannot be read.
         """
-        folder = self._folder(number)
-        try:
-            judged = self.judging.recorded(number, folder)
-        except (OSError, ValueError) as error:
-            reason = one_line_reason(error)
-            raise RunError(f"submission {number} cannot be read: {reason}") from error
-        self.submissions.append(Submission(number, source, folder, judged))
-
-    def _judge(self, number: int, source: str, client: str | None = None) -> Submission:
-        """Judges a file, which is written before; a new one has a client."""
-        folder = self.recorder.candidate(number, 0, source)
-        if client is not None:
-            sha256 = sha256_of(source.encode("utf-8", "surrogatepass"))
-            facts = {"sha256": sha256, "client": _named(client)}
-            self.recorder.event(SUBMIT, k=number, **facts)
-        judged = self.judging.judge(number, source, folder)
-        submission = Submission(number, source, folder, judged)
+        number = len(self.submissions) + 1
+        submission = Candidate(number, 0, source, self._folder(number))
+        if recall:
+            try:
+                self.trials.recall(submission)
+            except (OSError, ValueError) as error:
+                why = f"submission {number} cannot be read: {one_line_reason(error)}"
+                raise RunError(why) from error
+        else:
+            self.recorder.candidate(number, 0, source)
+            if client is not None:
+                facts = {"sha256": submission.sha256, "client": _named(client)}
+                self.recorder.event(SUBMIT, k=number, **facts)
+            self.trials.test([submission])
+            result = self.trials.result(submission)
+            notes = (result.said,) if result.said else ()
+            self.recorder.attempted(result.attempt(number, 0, notes))
         self.submissions.append(submission)
         return submission
 
-    def _submission(self, number: int) -> Submission:
+    def _conclude(self, submission: Candidate) -> None:
+        """Delivers a controller and ends the run; repeated after an interruption.
+
+        Raises:
+            Fault: The sandbox is broken; the run goes on, with this choice.
+        """
+        conclude(self.trials, Chosen(submission, self.submissions))
+
+    def _submission(self, number: int) -> Candidate:
         if 1 <= number <= len(self.submissions):
             return self.submissions[number - 1]
         known = len(self.submissions)
@@ -265,13 +303,16 @@ class Desk:
                 f"choose({self.chosen}) gives the verdict"
             )
 
-    def _answer(self, submission: Submission) -> SubmitAnswer:
-        judged, left = submission.judged, self.left
+    def _answer(self, submission: Candidate) -> SubmitAnswer:
+        result, left = self.trials.result(submission), self.left
         return SubmitAnswer(
-            submission=submission.number,
-            verified=judged.verified,
-            summary=judged.summary,
-            episodes=list(judged.episodes),
+            submission=submission.k,
+            verified=not self.problem.has_hidden and result.passed,
+            summary=result.summary,
+            episodes=[
+                EpisodeAnswer(name=name, outcome=outcome, steps=steps)
+                for name, outcome, steps in result.episodes
+            ],
             submissions_left=left.submissions,
             episodes_left=left.episodes,
         )
@@ -280,7 +321,7 @@ class Desk:
         """Ends a run in which nothing can be submitted or chosen any more."""
         if self.run.finished or not self.left.spent:
             return
-        if all(each.judged.unfit for each in self.submissions):
+        if all(map(self._unfit, self.submissions)):
             self.recorder.finish("not verified", reason="all submissions failed")
 
     def _ending(self) -> str:

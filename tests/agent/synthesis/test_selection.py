@@ -5,13 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from tdac_agent.set_synthesis.selection import select
-from tdac_agent.set_synthesis.trials import (
-    BLOCKS,
-    MOST_EPISODES,
-    Candidate,
-    first_world,
-)
+from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.selection import select
+from tdac_agent.synthesis.workload import MOST_EPISODES
+from tdac_agent.synthesis.world_trials import BLOCKS, first_world
 
 
 def chosen(scores, episodes):

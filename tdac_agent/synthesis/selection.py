@@ -5,13 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from tdac_agent.set_synthesis.trials import Candidate
-from tdac_agent.verification.judge.episode_row import Scores, scores_of
-
-
-def scores_of_selected(candidate: Candidate) -> Scores | None:
-    """The scores of a candidate on validation worlds; None without any."""
-    return scores_of(candidate.validation) if candidate.validation else None
+from tdac_agent.synthesis.candidates import Candidate
 
 
 def select(

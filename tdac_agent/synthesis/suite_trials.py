@@ -1,0 +1,318 @@
+"""Trials on a task: its suite tests candidates, and disturbed episodes compare them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from functools import partial
+from queue import SimpleQueue
+
+from tdac_agent.models.picture import LARGEST_SIDE
+from tdac_agent.prompting.feedback import feedback_of
+from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
+from tdac_agent.runs.run_record import Status
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.delivery import (
+    compared,
+    place_verified,
+    task_improvement,
+)
+from tdac_agent.synthesis.disturbed import (
+    disturbed_feedback,
+    failed_picture,
+    seeds_for,
+    successes_of,
+    task_figures,
+    times_of,
+    told,
+)
+from tdac_agent.synthesis.terms import Chosen, Terms
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.diagnosis.model_picture import (
+    FailurePicture,
+    failure_picture,
+)
+from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.store import REPORT_FILE, kept_report
+from tdac_agent.verification.suite_check import prove_suite
+from tdac_agent.verification.verify import kept_report as kept_suite_report
+from tdac_agent.verification.verify import load_trajectories, verify
+from tdac_agent.verification.verify_episodes import verify_episodes
+from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+
+NOT_RUN = "not run"
+IMPROVE = "improve"
+"""Folder of the episodes of a search, inside that of a candidate."""
+
+
+class SuiteTrials:
+    """See `Trials`.
+
+    Args:
+        task: The task.
+        terms: What all tests share.
+    """
+
+    status: Status = "verified"
+    ended = ""
+    needs_new_code = False
+    tests_left = None
+    aim = (
+        "Raise the number of goals that it reaches in disturbed episodes that nobody "
+        "has seen yet, and then its mean time score. It must still pass all tests."
+    )
+
+    def __init__(self, task: Task, terms: Terms) -> None:
+        self.task, self.terms = task, terms
+        self.used = 0
+
+    def prove(self) -> None:
+        """See `Trials`: the reference passes the suite, one that stands still fails."""
+        recorder, judge = self.terms.recorder, self.terms.judge
+        if recorder.past.proven and self.terms.trusts_record:
+            return
+
+        def tell(doing: str) -> None:
+            recorder.tell({"event": "prove.step", "doing": doing})
+
+        recorder.event("prove.start")
+        tier, seed = self.terms.tier, recorder.run.seed
+        proof = prove_suite(
+            self.task, tier=tier, seed=seed, judge=judge, on_progress=tell
+        )
+        facts = proof.model_dump(include={"suite", "suite_sha256", "sandbox", "proven"})
+        recorder.event("prove.end", **facts)
+
+    def test(self, candidates: Sequence[Candidate]) -> None:
+        """See `Trials`: at a time as many as there are cores."""
+        for each in candidates:
+            self.terms.recorder.event("verify.start", k=each.k, j=each.j)
+        if len(candidates) < 2:
+            for each in candidates:
+                each.report = self._verified(each, self.terms.judge)
+            return
+        cores = min(len(candidates), len(os.sched_getaffinity(0)))
+        with ExitStack() as stack:
+            others = [
+                stack.enter_context(WarmJudge(task=self.task)) for _ in range(cores - 1)
+            ]
+            judges: SimpleQueue[WarmJudge] = SimpleQueue()
+            for judge in (self.terms.judge, *others):
+                judges.put(judge)
+
+            def tested(candidate: Candidate) -> Report:
+                judge = judges.get()
+                try:
+                    return self._verified(candidate, judge)
+                finally:
+                    judges.put(judge)
+
+            with ThreadPoolExecutor(cores) as pool:
+                reports = list(pool.map(tested, candidates))
+        for each, report in zip(candidates, reports, strict=True):
+            each.report = report
+
+    def _verified(self, candidate: Candidate, judge: WarmJudge) -> Report:
+        """The report on a candidate; a recorded one is reused."""
+        recorder, folder = self.terms.recorder, candidate.folder
+        seed, file = recorder.run.seed, folder / "report.json"
+        if recorder.vouches(file):
+            kept = kept_suite_report(folder, self.task, candidate.source, seed)
+            if kept is not None:
+                return kept
+        report = verify(
+            folder / "controller.py",
+            self.task,
+            tier=self.terms.tier,
+            seed=seed,
+            out=folder,
+            judge=judge,
+        )
+        recorder.vouch(file)
+        return report
+
+    def go_on(self, candidate: Candidate) -> None:
+        """See `Trials`: the suite has tested everything."""
+
+    def recall(self, candidate: Candidate) -> None:
+        """See `Trials`."""
+        content = parse_json(read_file(candidate.folder / "report.json", RECORD_BYTES))
+        candidate.report = Report.model_validate(content)
+
+    def result(self, candidate: Candidate) -> Result:
+        """See `Trials`."""
+        report = _report(candidate)
+        failure, verdict = feedback_of(report), report.verdict
+        summary = f"{verdict.passed_tests} of {verdict.expected} tests passed"
+        if not report.passed:
+            summary = f"{len(report.failures)} of {verdict.expected} tests failed"
+            if verdict.passed_tests == 0:
+                summary += f", the first because {report.failures[0].message}"
+        return Result(
+            report.passed,
+            (float(report.passed), -len(report.failures)),
+            failure,
+            summary,
+            unfit="" if report.passed else summary,
+            failed=failure.failed,
+            seed=report.provenance.seed,
+            episodes=tuple(
+                (each.name, each.outcome, each.steps)
+                for each in report.episodes
+                if not each.held_out and each.outcome != NOT_RUN
+            ),
+        )
+
+    def picture(self, candidate: Candidate) -> FailurePicture | None:
+        """See `Trials`."""
+        trajectories = load_trajectories(candidate.folder / "trajectories")
+        return failure_picture(
+            self.task, _report(candidate), trajectories, LARGEST_SIDE
+        )
+
+    def can_explore(self, asked: int) -> bool:
+        """See `Trials`."""
+        shares = self.terms.shares
+        return asked < shares.asked and self.used + shares.block <= shares.explore
+
+    def explore(self, candidate: Candidate) -> Explored:
+        """See `Trials`: only a verified candidate drives."""
+        is_variation = candidate.report is None
+        if is_variation:
+            self.test([candidate])
+        report, result = _report(candidate), self.result(candidate)
+        if not report.passed:
+            assert result.failure is not None
+            drove = any(each.outcome != NOT_RUN for each in report.episodes)
+            said, failed = result.failure.line, result.failed
+            return Explored(None, said, failed=failed, drove=drove, seed=result.seed)
+        folder = candidate.folder / IMPROVE
+        driven = self._drive(candidate, IMPROVE, self.terms.shares.block)
+        figures = task_figures(self.task, report, driven)
+        if not is_variation:
+            said = drive_text(figures.time, driven.successes, len(driven.episodes))
+            about = {"k": candidate.k, "j": candidate.j, "said": said}
+            self.terms.recorder.tell({"event": "improve.begin", **about})
+        return Explored(
+            figures,
+            told(driven),
+            passed=True,
+            seed=result.seed,
+            episodes=len(driven.episodes),
+            feedback=disturbed_feedback(driven),
+            picture=partial(failed_picture, self.task, driven, folder),
+        )
+
+    def lines(self, member: Member, best: Member) -> list[str]:
+        """See `Trials`."""
+        own, top = member.figures.by_name, best.figures.rank
+        explored = member.candidate.explored
+        assert explored is not None
+        clearance = self.task.setting.units.figure(own["clearance"])
+        return [
+            f"It passes all tests. In {explored.episodes} disturbed episodes, the same "
+            f"for all controllers ({Disturbance()}):",
+            f"- goals reached: {own['robustness']:.3f}; the best controller so far has "
+            f"{top[0]:.3f}",
+            f"- mean time score (success weighted by time): {own['time']:.3f}; the "
+            f"best controller so far has {top[1]:.3f}",
+            f"- least gap between body and obstacles, on average: {clearance}",
+            f"- time score of the episode without disturbances: {own['nominal']:.3f}",
+        ]
+
+    def finalists(self, archive: Archive) -> list[Candidate]:
+        """See `Trials`: the best member has been decided on."""
+        return [archive.best().candidate]
+
+    def validate(self, candidate: Candidate, count: int) -> None:
+        """See `Trials`: there are no episodes for a selection."""
+
+    def why_none(self, able: Sequence[Candidate]) -> str:
+        """See `Trials`."""
+        del able
+        return ""
+
+    def compare(self, candidate: Candidate) -> dict[str, list[float]]:
+        """See `Trials`."""
+        driven = self._drive(candidate, "comparison", self.terms.shares.comparison)
+        return {"robustness": successes_of(driven), "time": times_of(driven)}
+
+    def secure(self, candidate: Candidate) -> None:
+        """See `Trials`."""
+        place_verified(self.task, candidate, self.terms.recorder)
+        recorder = self.terms.recorder
+        if recorder.run.tau is None:
+            recorder.run.tau = candidate.k
+        recorder.save()
+
+    def deliver(self, chosen: Chosen) -> None:
+        """See `Trials`."""
+        if chosen.archive is None:
+            self.secure(chosen.candidate)
+            return
+        terms, first = self.terms, chosen.archive.members[0].candidate
+        changes = compared(self.compare, first, chosen.candidate)
+        found = task_improvement(
+            terms,
+            self.task,
+            chosen,
+            changes,
+            used=self.used,
+            first_seed=seeds_for(terms.recorder.run, IMPROVE, 0).start,
+            first_comparison=seeds_for(terms.recorder.run, "comparison", 0).start,
+        )
+        text = found.model_dump_json(indent=2) + "\n"
+        write_atomic(terms.folder / IMPROVEMENT_FILE, text)
+        facts = found.model_dump(mode="json", exclude={"members", "stopped"})
+        terms.recorder.event("select.end", **facts)
+        if chosen.candidate is not first:
+            self.secure(chosen.candidate)
+
+    def verify_hidden(self, candidate: Candidate) -> bool:
+        """See `Trials`: there are no hidden worlds, and it passed the suite."""
+        return _report(candidate).passed
+
+    def _drive(self, candidate: Candidate, purpose: str, count: int) -> EpisodeReport:
+        """Drives episodes, the same for all candidates; those on record are reused."""
+        terms, out = self.terms, candidate.folder / purpose
+        about = {"k": candidate.k, "j": candidate.j, "what": purpose, "episodes": count}
+        terms.recorder.event("drive.start", **about)
+        seeds = seeds_for(terms.recorder.run, purpose, count)
+        found = None
+        if terms.recorder.vouches(out / REPORT_FILE):
+            wanted = {
+                "controller_sha256": sha256_of(candidate.raw),
+                "sha256": self.task.sha256(),
+                "disturbance": Disturbance(),
+            }
+            found = kept_report(out, wanted, seeds)
+        if found is None:
+            found = verify_episodes(
+                candidate.raw,
+                self.task,
+                count,
+                first=seeds.start,
+                disturbance=Disturbance(),
+                tier=terms.tier,
+                out=out,
+                trajectories=True,
+                judge=terms.judge,
+                watch=terms.watch(**about),
+            )
+            terms.recorder.vouch(out / REPORT_FILE)
+        self.used += count
+        terms.recorder.event("drive.end", **about, reached=found.successes)
+        return found
+
+
+def _report(candidate: Candidate) -> Report:
+    assert candidate.report is not None
+    return candidate.report

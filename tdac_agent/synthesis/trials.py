@@ -1,0 +1,131 @@
+"""How candidates of a problem are tested, driven, compared and delivered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from tdac_agent.problems.problem import Problem
+from tdac_agent.runs.run_record import Status
+from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.suite_trials import SuiteTrials
+from tdac_agent.synthesis.terms import Chosen, Terms
+from tdac_agent.synthesis.world_trials import WorldTrials
+from tdac_agent.verification.diagnosis.model_picture import FailurePicture
+
+
+class Trials(Protocol):
+    """Tests candidates: `SuiteTrials` or `WorldTrials`.
+
+    Attributes:
+        terms: What all tests share.
+        status: Status of a run that has delivered a controller.
+        ended: Why the writing ends after a candidate with nothing to repair, or
+            without episodes; empty if its pass is the aim of the run.
+        needs_new_code: Whether an iteration without new code ends the writing.
+        aim: What variations are to raise, as an instruction to a model.
+    """
+
+    terms: Terms
+    status: Status
+    ended: str
+    needs_new_code: bool
+    aim: str
+
+    @property
+    def tests_left(self) -> int | None:
+        """Episodes that are left for tests; None if tests take none of a budget."""
+
+    def prove(self) -> None:
+        """Checks the tests before an answer is paid for, once per run.
+
+        Raises:
+            Fault: The reference fails, or a controller that does nothing passes.
+        """
+
+    def test(self, candidates: Sequence[Candidate]) -> None:
+        """Tests candidates once, all alike; recorded results are reused."""
+
+    def go_on(self, candidate: Candidate) -> None:
+        """Tests a candidate until it fails, or no episodes are left."""
+
+    def recall(self, candidate: Candidate) -> None:
+        """Reads the first test of a candidate of a finished run.
+
+        Raises:
+            OSError: It is not on record.
+            ValueError: The record is damaged.
+        """
+
+    def result(self, candidate: Candidate) -> Result:
+        """What came of its tests so far."""
+
+    def picture(self, candidate: Candidate) -> FailurePicture | None:
+        """A picture of its failure."""
+
+    def can_explore(self, asked: int) -> bool:
+        """Whether another variation may be asked for.
+
+        Args:
+            asked: Number of variations that were answered.
+        """
+
+    def explore(self, candidate: Candidate) -> Explored:
+        """Drives a candidate in the episodes of a search, the same for all."""
+
+    def lines(self, member: Member, best: Member) -> list[str]:
+        """The figures of a member of the archive for a model, in lines."""
+
+    def finalists(self, archive: Archive) -> list[Candidate]:
+        """The candidates for the selection after a search."""
+
+    def validate(self, candidate: Candidate, count: int) -> None:
+        """Drives a candidate in its next episodes of the selection."""
+
+    def why_none(self, able: Sequence[Candidate]) -> str:
+        """Why nothing was selected from these."""
+
+    def secure(self, candidate: Candidate) -> None:
+        """Delivers a verified candidate before a search, which may be interrupted."""
+
+    def deliver(self, chosen: Chosen) -> None:
+        """Writes the selected controller, its evidence, and what a search brought.
+
+        It is compared with what the search began with, in episodes that decided
+        nothing.
+        """
+
+    def verify_hidden(self, candidate: Candidate) -> bool:
+        """Whether the delivered controller is verified on hidden worlds."""
+
+
+def trials_of(problem: Problem, terms: Terms) -> Trials:
+    """The trials of a problem.
+
+    Args:
+        problem: A task, or a task set.
+        terms: What all tests share.
+    """
+    if problem.task is not None:
+        return SuiteTrials(problem.task, terms)
+    assert problem.tasks is not None
+    return WorldTrials(problem.tasks, terms)
+
+
+def conclude(trials: Trials, chosen: Chosen) -> None:
+    """Delivers a candidate, verifies it on hidden worlds if wanted, and ends the run.
+
+    Args:
+        trials: The trials.
+        chosen: The candidate.
+    """
+    recorder, selected = trials.terms.recorder, chosen.candidate
+    run, status = recorder.run, trials.status
+    trials.deliver(chosen)
+    if run.tau is None:
+        run.tau = selected.k
+    if run.then_verify:
+        passed = trials.verify_hidden(selected)
+        status = "verified" if passed else "not verified"
+    recorder.finish(status, k=selected.k, j=selected.j, reason=chosen.stopped)

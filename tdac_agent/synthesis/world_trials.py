@@ -1,0 +1,269 @@
+"""Trials on a task set: candidates drive on worlds of `dev`, within a budget."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from tdac_agent.runs.improvement_record import PairedChange
+from tdac_agent.runs.run_record import Status
+from tdac_agent.runs.selection_record import SELECTION_FILE
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.hashes import number_of, sha256_of
+from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.delivery import compared, selection_of
+from tdac_agent.synthesis.hidden import hidden_report
+from tdac_agent.synthesis.set_reports import (
+    figures_of,
+    set_feedback,
+    summary_of,
+    world_picture,
+)
+from tdac_agent.synthesis.terms import Chosen, Terms
+from tdac_agent.synthesis.workload import MOST_EPISODES
+from tdac_agent.verification.diagnosis.model_picture import FailurePicture
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.store import REPORT_FILE, kept_report, read_report
+from tdac_agent.verification.verify_episodes import verify_episodes
+from tdac_envs.ladder.task_sets import TaskSet
+
+BLOCKS = 2**30
+"""Feedback worlds have smaller numbers than this; each other purpose has as many."""
+PURPOSES = ("feedback", "validation", "improve", "comparison")
+"""What worlds are used for, in the order of their numbers."""
+FINALISTS = 4
+"""Most candidates that go on to the selection, beside the best one of the loop."""
+FEEDBACK, EXPLORED = "feedback-{}", "improve-1"
+"""Folders of reports, inside that of a candidate."""
+
+
+def first_world(seed: int, index: int) -> int:
+    """Number of the first feedback world of a run, below `BLOCKS` - `MOST_EPISODES`."""
+    return number_of(f"dev block|{seed}|{index}") % (BLOCKS - MOST_EPISODES)
+
+
+class WorldTrials:
+    """See `Trials`. No world is used twice, nor for two purposes.
+
+    Args:
+        tasks: The task set.
+        terms: What all tests share.
+
+    Attributes:
+        used: Number of episodes that were driven, by purpose.
+    """
+
+    status: Status = "selected"
+    ended = "all feedback episodes were driven"
+    needs_new_code = True
+    aim = "Raise its mean time score on worlds that nobody has seen yet."
+
+    def __init__(self, tasks: TaskSet, terms: Terms) -> None:
+        self.tasks, self.terms = tasks, terms
+        self.used = dict.fromkeys(PURPOSES, 0)
+
+    @property
+    def tests_left(self) -> int:
+        """See `Trials`."""
+        return self.terms.shares.feedback - self.used["feedback"]
+
+    def prove(self) -> None:
+        """See `Trials`: there is no suite."""
+
+    def test(self, candidates: Sequence[Candidate]) -> None:
+        """See `Trials`: all of them drive on the same next worlds.
+
+        If the episodes do not suffice for all, the first ones drive on one world.
+        """
+        if not candidates:
+            return
+        count = min(self.terms.block, max(1, self.tests_left // len(candidates)))
+        first = self.first_for("feedback") + self.used["feedback"]
+        for candidate in candidates:
+            if self.tests_left >= count:
+                out = FEEDBACK.format(len(candidate.feedback) + 1)
+                report = self._drive(candidate, "feedback", first, count, out)
+                candidate.feedback.append(report)
+
+    def go_on(self, candidate: Candidate) -> None:
+        """See `Trials`: it drives on the next worlds."""
+        while self.tests_left and candidate.first_failure is None:
+            self.test([candidate])
+
+    def recall(self, candidate: Candidate) -> None:
+        """See `Trials`."""
+        report = read_report(candidate.folder / FEEDBACK.format(1))
+        assert report is not None
+        candidate.feedback.append(report)
+        self.used["feedback"] += report.count
+
+    def result(self, candidate: Candidate) -> Result:
+        """See `Trials`."""
+        reports, failed = candidate.feedback, candidate.first_failure
+        worlds = sum(each.count for each in reports)
+        reached = sum(each.successes for each in reports)
+        said = f"the goal reached in {reached} of {worlds} worlds"
+        if not reports:
+            said = "not tested: no feedback episodes are left"
+        failure = None
+        if failed is not None:
+            failure, said = set_feedback(failed), summary_of(failed)
+            if worlds > failed.count:
+                before = worlds - failed.count
+                said = f"{before} worlds without a failure, then {said}"
+        score = candidate.feedback_score
+        return Result(
+            failed is None and worlds > 0,
+            (score, candidate.drives),
+            failure,
+            f"{said}; mean score {score:.3f}" if worlds else said,
+            said,
+            unfit="" if worlds else "the static and contract tests refused it",
+            failed=() if failure is None else failure.failed,
+            episodes=tuple(
+                (str(each.index), each.outcome, each.steps)
+                for report in reports
+                for each in report.episodes
+            ),
+        )
+
+    def picture(self, candidate: Candidate) -> FailurePicture | None:
+        """See `Trials`."""
+        failed = candidate.first_failure
+        if failed is None:
+            return None
+        # It ended the tests.
+        folder = candidate.folder / FEEDBACK.format(len(candidate.feedback))
+        return world_picture(self.tasks, failed, folder)
+
+    def can_explore(self, asked: int) -> bool:
+        """See `Trials`."""
+        del asked
+        shares = self.terms.shares
+        return self.used["improve"] + shares.block <= shares.explore
+
+    def explore(self, candidate: Candidate) -> Explored:
+        """See `Trials`."""
+        report = self._driven(candidate, "improve", self.terms.shares.block)
+        if not report.count:
+            said, failed = set_feedback(report).line, tuple(report.told)
+            return Explored(None, said, failed=failed, drove=False)
+        all_reached = report.successes == report.count
+        folder = candidate.folder / EXPLORED
+        return Explored(
+            figures_of(report),
+            f"the goal reached in {report.successes} of {report.count} worlds",
+            passed=all_reached,
+            failed=tuple(report.causes),
+            episodes=report.count,
+            feedback=None if all_reached else set_feedback(report).text,
+            picture=partial(world_picture, self.tasks, report, folder),
+        )
+
+    def lines(self, member: Member, best: Member) -> list[str]:
+        """See `Trials`."""
+        own, explored = member.figures.by_name, member.candidate.explored
+        assert explored is not None
+        return [
+            f"On {explored.episodes} worlds, the same for all controllers:",
+            f"- mean time score (success weighted by time): {own['time']:.3f}; the "
+            f"best controller so far has {best.figures.time:.3f}",
+            f"- on the worst quarter of the worlds: {own['worst']:.3f}",
+            f"- mean path score (success weighted by length): {own['path']:.3f}",
+            f"- goals reached: {own['success']:.3f}",
+        ]
+
+    def finalists(self, archive: Archive) -> list[Candidate]:
+        """See `Trials`."""
+        return archive.finalists(FINALISTS)
+
+    def validate(self, candidate: Candidate, count: int) -> None:
+        """See `Trials`."""
+        done = len(candidate.validation)
+        report = self._driven(candidate, "validation", count, done)
+        candidate.validation.extend(report.episodes)
+
+    def why_none(self, able: Sequence[Candidate]) -> str:
+        """See `Trials`."""
+        if not able:
+            return "no candidate passed the static and contract tests"
+        return "no candidate reached a goal on the validation worlds"
+
+    def compare(self, candidate: Candidate) -> dict[str, list[float]]:
+        """See `Trials`."""
+        report = self._driven(candidate, "comparison", self.terms.shares.comparison)
+        return {"time": [each.time_score for each in report.episodes]}
+
+    def secure(self, candidate: Candidate) -> None:
+        """See `Trials`: nothing is verified before the selection."""
+
+    def deliver(self, chosen: Chosen) -> None:
+        """See `Trials`."""
+        terms, changes = self.terms, dict[str, PairedChange]()
+        if chosen.archive is not None:
+            changes = compared(self.compare, chosen.archive.base, chosen.candidate)
+        selection = selection_of(
+            terms,
+            self.tasks,
+            chosen,
+            changes,
+            self.used,
+            first_feedback=self.first_for("feedback"),
+            first_validation=self.first_for("validation"),
+        )
+        text = selection.model_dump_json(indent=2) + "\n"
+        terms.recorder.deliver(chosen.candidate.source)
+        write_atomic(terms.folder / SELECTION_FILE, text)
+        values = selection.model_dump(mode="json", exclude={"candidates", "stopped"})
+        terms.recorder.event("select.end", **values)
+
+    def verify_hidden(self, candidate: Candidate) -> bool:
+        """See `Trials`."""
+        return hidden_report(self.tasks, candidate, self.terms).passed
+
+    def first_for(self, purpose: str) -> int:
+        """Number of the first world for a purpose."""
+        run = self.terms.recorder.run
+        assert run.seed is not None
+        return PURPOSES.index(purpose) * BLOCKS + first_world(run.seed, run.index)
+
+    def _driven(
+        self, candidate: Candidate, purpose: str, count: int, done: int = 0
+    ) -> EpisodeReport:
+        """Drives on the worlds for a purpose, the same for all, after `done` ones."""
+        first = self.first_for(purpose) + done
+        return self._drive(candidate, purpose, first, count, f"{purpose}-{done + 1}")
+
+    def _drive(
+        self, candidate: Candidate, purpose: str, first: int, count: int, out: str
+    ) -> EpisodeReport:
+        """Drives on worlds of `dev`; a report on record is reused."""
+        terms, folder = self.terms, candidate.folder / out
+        about = {"k": candidate.k, "j": candidate.j, "what": purpose, "worlds": count}
+        terms.recorder.event("drive.start", **about)
+        report = None
+        if terms.recorder.vouches(folder / REPORT_FILE):
+            wanted = {
+                "controller_sha256": sha256_of(candidate.raw),
+                "sha256": self.tasks.sha256,
+                "split": "dev",
+            }
+            report = kept_report(folder, wanted, range(first, first + count))
+        if report is None:
+            report = verify_episodes(
+                candidate.raw,
+                self.tasks,
+                count,
+                split="dev",
+                first=first,
+                tier=terms.tier,
+                out=folder,
+                judge=terms.judge,
+                watch=terms.watch(**about),
+            )
+            terms.recorder.vouch(folder / REPORT_FILE)
+        self.used[purpose] += report.count
+        ended = {"reached": report.successes, "driven": report.count}
+        terms.recorder.event("drive.end", **about, **ended)
+        return report

@@ -1,0 +1,78 @@
+"""A task and a set to write controllers for, and runs with scripted models."""
+
+from dataclasses import dataclass, field
+
+import pytest
+from few_worlds import KNOWN, write_set
+from script import Script
+from small import write_small_task
+
+from tdac_agent import load_task, synthesize
+from tdac_agent.models.retry import RetryPolicy
+from tdac_envs import load_set
+
+ON_SET = {"episodes": 12, "feedback_episodes": 2, "seed": 3}
+
+
+@dataclass
+class Ground:
+    """What controllers are written for, one that solves it, and further arguments."""
+
+    problem: object
+    good: str
+    given: dict = field(default_factory=dict)
+
+    @property
+    def is_task(self):
+        return not self.given
+
+
+@pytest.fixture
+def task(tmp_path):
+    """The small task in the profile `policy`."""
+    return load_task(write_small_task(tmp_path / "task", profile="policy"))
+
+
+@pytest.fixture
+def few(tmp_path):
+    """A set that `known.py` solves."""
+    return load_set(write_set(tmp_path / "few.yaml"))
+
+
+@pytest.fixture(scope="session")
+def solver():
+    """The source of a controller that reaches all goals of `few`."""
+    return KNOWN.read_text()
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "run"
+
+
+@pytest.fixture
+def on_task(task, good_source):
+    return Ground(task, good_source)
+
+
+@pytest.fixture
+def on_set(few, solver):
+    return Ground(few, solver, ON_SET)
+
+
+@pytest.fixture(params=["on_task", "on_set"])
+def ground(request):
+    """A task, and a set of worlds."""
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture
+def write(out, warm):
+    """Runs with prepared answers; returns the model and the run."""
+
+    def run(ground, *answers, model=None, **values):
+        model = model or Script(*answers)
+        given = {"out": out, "judge": warm, "retry": RetryPolicy(first_wait=0.0)}
+        return model, synthesize(ground.problem, model, **given | ground.given | values)
+
+    return run

@@ -1,0 +1,52 @@
+"""Searches whose process is killed with -9 at random moments end the same."""
+
+import json
+
+import pytest
+from few_worlds import write_set
+from killed_synthesis import finish, kill_again_and_again
+from small import write_small_task
+
+CLOCKS = {"started", "seconds", "id", "mark", "child_cpu_seconds"}
+CLOCKS |= {"call_ms_mean", "call_ms_p99"}
+ON_TASK = ("--task", "task")
+ON_SET = ("--set", "few.yaml", "--episodes", "4", "--feedback-episodes", "2")
+
+
+def without_clocks(values):
+    """A record but for what the clock has a say in."""
+    if isinstance(values, list):
+        return [without_clocks(each) for each in values]
+    if not isinstance(values, dict):
+        return values
+    return {k: without_clocks(v) for k, v in values.items() if k not in CLOCKS}
+
+
+def state(folder):
+    """All that a run says of its result, without what the clock has a say in."""
+    records = [
+        without_clocks(json.loads(path.read_text()))
+        for path in sorted(folder.glob("*.json"))
+    ]
+    files = {
+        str(path.relative_to(folder)): path.read_bytes()
+        for pattern in ("controller.*", "*.prompt.md", "trajectories/*.npz")
+        for path in folder.rglob(pattern)
+    }
+    return records, files
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "kills"), [(ON_TASK, 10), (ON_SET, 20)])
+def test_a_search_that_is_killed_again_and_again_ends_the_same(tmp_path, words, kills):
+    """On a task and on a set; later kills hit later steps."""
+    write_small_task(tmp_path / "task", profile="policy")
+    write_set(tmp_path / "few.yaml")
+    words = (*words, "--improve", "32", "--seed", "5")
+    finish(tmp_path, words, "undisturbed")
+    seconds = json.loads((tmp_path / "undisturbed" / "run.json").read_text())["seconds"]
+    most = 3.0 + seconds / 3
+    killed = kill_again_and_again(tmp_path, words, "killed", kills, most)
+    assert killed > kills // 3
+    finish(tmp_path, words, "killed")
+    assert state(tmp_path / "killed") == state(tmp_path / "undisturbed")
