@@ -30,9 +30,10 @@ def show_set_report(report: EpisodeReport, console: Console) -> None:
     if report.refused:
         _print_refused(report, console)
         return
+    first, last = provenance.first, provenance.first + report.count - 1
     say(
-        f"[bold]{escape(provenance.name)}[/] {provenance.sha256[:8]}, worlds 0 to "
-        f"{report.count - 1} of {provenance.split}: {report.successes} reached, "
+        f"[bold]{escape(provenance.name)}[/] {provenance.sha256[:8]}, worlds {first} "
+        f"to {last} of {provenance.split}: {report.successes} reached, "
         f"{report.count - report.successes} failed; {report.seconds:.0f} s"
     )
     if report.scores is not None and report.interval is not None:

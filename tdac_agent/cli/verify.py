@@ -15,7 +15,12 @@ from tdac_agent.cli.controller_choice import (
 )
 from tdac_agent.cli.spinner import Spinner
 from tdac_agent.cli.task_choice import check_scope, check_tier
-from tdac_agent.cli.typed_options import require_flag, typed_fields, words_of
+from tdac_agent.cli.typed_options import (
+    flag_name,
+    require_flag,
+    typed_fields,
+    words_of,
+)
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.judge.child_pool import ChildPool
@@ -44,6 +49,7 @@ def run(
     flags = with_own_set(options.controller, flags)
     check_scope(flags.set_name is not None, flags, options)
     if flags.set_name is not None:
+        _refuse_noise(noise)
         return _verify_on_set(flags.set_name, options, child_pool)
     return _verify_on_task(flags, options, noise, child_pool)
 
@@ -54,11 +60,22 @@ def _check_robust(options: VerifyOptions, noise: NoiseFlags) -> None:
     Raises:
         TaskError: A flag needs another one, or a value is out of range.
     """
-    if options.robust is None:
-        require_flag("--robust N", typed_fields(noise))
+    if options.episodes is None:
+        require_flag("-n N", typed_fields(noise))
     elif options.accept_at is not None:
-        SequentialTest(options.accept_at, options.robust, options.margin)
+        SequentialTest(options.accept_at, options.episodes, options.margin)
     noise.disturbance()
+
+
+def _refuse_noise(noise: NoiseFlags) -> None:
+    """Refuses disturbances of a task.
+
+    Raises:
+        TaskError: There are some.
+    """
+    if typed := typed_fields(noise):
+        names = ", ".join(map(flag_name, typed))
+        raise TaskError(f"a task set has its own disturbances: leave out {names}")
 
 
 def _verify_on_task(
@@ -69,7 +86,7 @@ def _verify_on_task(
             spinner()
         file, task = controller_and_task(options.controller, flags)
     task = allowed(task, options.suite, trust=options.trust)
-    if options.robust is not None:
+    if options.episodes is not None:
         task.disturbed_options(noise.disturbance())
     _freeze()
     with WarmJudge(child_pool) as judge:
@@ -85,7 +102,7 @@ def _verify_on_task(
         if not options.as_json:
             show_report(report, console, options.out, task.folder, units)
         robust = None
-        if options.robust is not None and report.passed:
+        if options.episodes is not None and report.passed:
             robust = _measure(file, task, options, noise, judge)
     if options.as_json:
         print_json(_record(report, options, robust))
@@ -93,7 +110,7 @@ def _verify_on_task(
         from tdac_agent.cli.robust_view import show_robust
 
         show_robust(robust, console, _replay(flags, options, noise), units)
-    elif options.robust is not None:
+    elif options.episodes is not None:
         console.print("robustness not measured: the controller is not verified")
     return 0 if report.passed and (robust is None or robust.passed) else 1
 
@@ -147,17 +164,17 @@ def _measure(
     from tdac_agent.cli.sentences import print_plain
     from tdac_agent.verification.verify_episodes import verify_episodes
 
-    assert options.robust is not None
+    assert options.episodes is not None
     console = Console(stderr=options.as_json)
-    bar = DrivingBar(console, options.robust, "disturbed episodes", is_long=True)
+    bar = DrivingBar(console, options.episodes, "disturbed episodes", is_long=True)
     try:
         with bar:
             return verify_episodes(
                 file,
                 task,
-                options.robust,
+                options.episodes,
                 disturbance=noise.disturbance(),
-                first=options.first_seed,
+                first=options.first,
                 accept_at=options.accept_at,
                 margin=options.margin,
                 tier=options.tier,
@@ -178,8 +195,8 @@ def _measure(
 def _record(
     report: Report, options: VerifyOptions, robust: EpisodeReport | None
 ) -> Any:
-    """The report; `--robust` adds the key `robust`, null if it was not run."""
-    if options.robust is None:
+    """The report; `-n` adds the key `robust`, null if it was not run."""
+    if options.episodes is None:
         return report
     added = None if robust is None else robust.model_dump(mode="json")
     return {**report.model_dump(mode="json"), "robust": added}
@@ -206,15 +223,16 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
     tasks = load_set(name, options.hidden_folder)
     file = _controller_on(tasks, options)
     _freeze()
-    most = options.worlds or most_worlds(tasks, options.split)
+    most = options.episodes or most_worlds(tasks, options.split)
     console = Console(stderr=options.as_json)
     bar = DrivingBar(console, most, f"worlds of {tasks.name}", is_long=True)
     with WarmJudge(child_pool) as judge, bar:
         report = verify_episodes(
             file,
             tasks,
-            options.worlds,
+            options.episodes,
             split=options.split,
+            first=options.first,
             salt_file=options.salt_file,
             tier=options.tier,
             out=options.out,
@@ -243,8 +261,9 @@ def _controller_on(tasks: TaskSet, options: VerifyOptions) -> Path:
         file = controller_of(tasks, "give a file")
     else:
         file = controller_file(options.controller)
-    if options.worlds is not None:
-        tasks.check_count(options.split, options.worlds, "-n")
+    if options.episodes is not None:
+        worlds = (options.first or 0) + options.episodes
+        tasks.check_count(options.split, worlds, "-n")
     return file
 
 

@@ -44,14 +44,14 @@ class VerifyOptions:
     split: str = option(
         "test", "dev, test or hidden.", metavar="NAME", panel=SETS, scope="set"
     )
-    worlds: int | None = option(
+    episodes: int | None = option(
         None,
-        "Drive on N worlds and print the scores, without a verdict.",
+        "Drive N episodes and print the rates: of a task, disturbed ones, if the "
+        "controller is verified; on a set, on N worlds, without a verdict.",
         "-n",
+        "--robust",
         "--worlds",
         least=1,
-        panel=SETS,
-        scope="set",
     )
     salt_file: Path | None = option(
         None,
@@ -68,20 +68,14 @@ class VerifyOptions:
         panel=SETS,
         scope="set",
     )
-    robust: int | None = option(
+    first: int | None = option(
         None,
-        "If the controller is verified, run N disturbed episodes and print their "
-        "success rate.",
-        least=1,
-        panel=ROBUST,
-        scope="task",
-    )
-    first_seed: int | None = option(
-        None,
-        "Seed of the first disturbed episode.  [default: as for --seed]",
+        "Seed of the first disturbed episode, or number of the first world.  "
+        "[default: as for --seed, or 0]",
+        "--first",
+        "--first-seed",
         least=0,
-        panel=ROBUST,
-        needs="--robust N",
+        needs="-n N",
     )
     accept_at: float | None = option(
         None,
@@ -89,11 +83,13 @@ class VerifyOptions:
         "lower by --margin; exit 0 only if it accepts this one.",
         metavar="RATE",
         panel=ROBUST,
-        needs="--robust N",
+        scope="task",
+        needs="-n N",
     )
     margin: float = option(
         0.05,
         "Difference between the two rates of --accept-at.",
         panel=ROBUST,
+        scope="task",
         needs="--accept-at RATE",
     )

@@ -93,8 +93,10 @@ class WorldTrials:
 
     def recall(self, candidate: Candidate) -> None:
         """See `Trials`."""
-        report = read_report(candidate.folder / FEEDBACK.format(1))
-        assert report is not None
+        folder = candidate.folder / FEEDBACK.format(1)
+        report = read_report(folder)
+        if report is None:
+            raise ValueError(f"no report in {folder}")
         candidate.feedback.append(report)
         self.used["feedback"] += report.count
 

@@ -460,8 +460,8 @@ def test_the_decision_is_the_exit_code(tdac, good):
     ("words", "reason"),
     [
         (["verify", "--robust", "0"], "robust"),
-        (["verify", "--delay", "1"], "--delay needs --robust"),
-        (["verify", "--accept-at", "0.9"], "--accept-at needs --robust"),
+        (["verify", "--delay", "1"], "--delay needs -n N"),
+        (["verify", "--accept-at", "0.9"], "--accept-at needs -n N"),
         (["verify", "--robust", "9", "--margin", "0.1"], "--margin needs --accept-at"),
         (["verify", "--robust", "9", "--accept-at", "0.9"], "at least 52 episodes"),
         (["verify", "--robust", "99", "--accept-at", "1"], "below 1"),

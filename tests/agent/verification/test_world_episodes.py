@@ -487,6 +487,19 @@ def test_the_command_tells_a_refused_file(tdac, tmp_path):
     assert last == "not verified"
 
 
+def test_one_flag_for_episodes_and_worlds(tdac):
+    """The words for a task and for a set are the same; a set is not disturbed more."""
+    words = ("verify", "builtin", "--set", "known", "--first", "4")
+    reports = [
+        json.loads(tdac(*words, n, "2", "--json")[1]) for n in ("-n", "--robust")
+    ]
+    assert [each["index"] for each in reports[0]["episodes"]] == [4, 5]
+    assert reports[0]["scores"] == reports[1]["scores"]
+    assert "worlds 4 to 4 of test" in tdac(*words, "-n", "1")[1]
+    code, _, err = tdac(*words, "-n", "2", "--delay", "1")
+    assert (code, "leave out --delay" in err) == (2, True)
+
+
 def test_the_command_counts_hidden_evaluations(tdac, tmp_path, set_yaml):
     """The count is the last line; the second time says when it was driven."""
     set_yaml()
