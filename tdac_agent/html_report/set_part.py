@@ -92,7 +92,7 @@ def set_part_of(history: RunHistory) -> SetPart | None:
             tasks = load_set(run.folder / SET_FILE)
             drawn += itertools.islice(_drawn(tasks, driven), MOST_DRAWN)
         elif failed:
-            problem = remark.removeprefix(f"{run.folder} ")
+            problem = remark.replace(str(run.folder), "the folder", 1)
     except (TdacError, OSError, ValueError) as error:
         problem = str(error)
     hidden = read_hidden(run.folder)

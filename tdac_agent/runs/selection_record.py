@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pydantic import ConfigDict, Field
+from pydantic import AliasChoices, ConfigDict, Field
 
 from tdac_agent.storage.printable_record import StrictRecord, read_record
 from tdac_agent.verification.judge.episode_row import Scores
@@ -98,7 +98,7 @@ class HiddenCounts(StrictRecord):
 
     model_config = ConfigDict(extra="ignore")
 
-    worlds: int
+    count: int = Field(validation_alias=AliasChoices("count", "worlds"))
     successes: int
 
 

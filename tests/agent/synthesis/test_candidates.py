@@ -175,7 +175,7 @@ def test_on_a_set_all_drive_on_the_same_worlds(write, on_set, out):
     assert run.status == "selected"
     assert run.tau == 2
     worlds = {}
-    for path in out.glob("iterations/*/j0/feedback-1/set.json"):
+    for path in out.glob("iterations/*/j0/feedback-1/episodes.json"):
         episodes = json.loads(path.read_text())["episodes"]
         worlds[path.parts[-4]] = [episode["index"] for episode in episodes]
     assert worlds["k01"] == worlds["k02"]

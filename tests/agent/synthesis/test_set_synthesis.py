@@ -176,7 +176,8 @@ def test_the_report_draws_failures_of_the_selected_controller(write, on_set, hal
     record = json.loads((out / "run.json").read_text())
     (out / "run.json").write_text(json.dumps({**record, "mark": ""}))
     page = make_page(out).html.decode()
-    assert "Not drawn: this installation did not begin the run" in page
+    said = "Not drawn: the folder contains a run that this installation did not begin"
+    assert said in page
     assert 'alt="feedback world' not in page
 
 
@@ -211,7 +212,7 @@ def test_then_verify_drives_once_on_hidden_worlds(write, on_set, solver, out):
     text = (out / "hidden.json").read_text()
     assert json.loads(text)["episodes"] == []
     assert json.loads(text)["hidden"]["lineage"] == 1
-    reached = "{successes} of {worlds}".format(**json.loads(text))
+    reached = "{successes} of {count}".format(**json.loads(text))
     said = f"On hidden worlds, it then reached the goal in {reached}."
     assert said in make_page(out).html.decode()
     secret = salt.read_bytes()

@@ -51,7 +51,7 @@ def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm
     assert (np.abs(pixels - MOVER).max(axis=-1) <= 8).any()
     (picture,) = edit.images
     folder = run.folder / "iterations/k01"
-    tested = json.loads((folder / "j0/feedback-1/set.json").read_text())
+    tested = json.loads((folder / "j0/feedback-1/episodes.json").read_text())
     failed = [each for each in tested["episodes"] if each["outcome"] != "reached"]
     assert tested["provenance"]["split"] == "dev"
     assert picture.caption == f"world {failed[0]['index']}: {failed[0]['cause']}"

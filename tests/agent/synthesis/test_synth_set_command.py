@@ -32,9 +32,9 @@ def test_the_built_in_controller(tdac, tmp_path):
     assert code == 0
     assert out.split()[0] == "few"
     assert "2 reached, 0 failed" in out
-    code, out, err = tdac("verify", "run", "--task", "maze", "-n", "2")
+    code, out, err = tdac("verify", "run", "--task", "maze", "--split", "dev")
     assert (code, out) == (2, "")
-    assert "-n needs --set NAME" in err
+    assert "--split needs --set NAME" in err
     code, out, _ = tdac("runs", ".", "--json")
     (row,) = json.loads(out)
     assert (row["status"], row["go_on"]) == ("selected", "")
