@@ -29,6 +29,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TaskError
 
 if TYPE_CHECKING:
+    from tdac_agent.cli.driving_bar import DrivingBar
     from tdac_agent.cli.options import NoiseFlags
     from tdac_agent.cli.task_flags import TaskFlags
     from tdac_agent.cli.verify_options import VerifyOptions
@@ -162,25 +163,21 @@ def _measure(
     from tdac_agent.cli.console import Console
     from tdac_agent.cli.driving_bar import DrivingBar
     from tdac_agent.cli.sentences import print_plain
-    from tdac_agent.verification.verify_episodes import verify_episodes
 
     assert options.episodes is not None
     console = Console(stderr=options.as_json)
     bar = DrivingBar(console, options.episodes, "disturbed episodes", is_long=True)
     try:
         with bar:
-            return verify_episodes(
+            return _driven(
                 file,
                 task,
-                options.episodes,
+                options,
+                judge,
+                bar,
                 disturbance=noise.disturbance(),
-                first=options.first,
                 accept_at=options.accept_at,
                 margin=options.margin,
-                tier=options.tier,
-                out=options.out,
-                judge=judge,
-                watch=bar.show,
             )
     except KeyboardInterrupt:
         episodes, successes = bar.counts
@@ -190,6 +187,30 @@ def _measure(
             rest = "contains the report of the suite, but no episodes.json"
             print_plain(console, f"{options.out} {rest}")
         raise
+
+
+def _driven(
+    file: Path,
+    problem: Task | TaskSet,
+    options: VerifyOptions,
+    judge: WarmJudge,
+    bar: DrivingBar,
+    **own: Any,
+) -> EpisodeReport:
+    """Drives the episodes of a task, or on worlds of a set."""
+    from tdac_agent.verification.verify_episodes import verify_episodes
+
+    return verify_episodes(
+        file,
+        problem,
+        options.episodes,
+        first=options.first,
+        tier=options.tier,
+        out=options.out,
+        judge=judge,
+        watch=bar.show,
+        **own,
+    )
 
 
 def _record(
@@ -213,7 +234,7 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
     from tdac_agent.cli.console import Console, print_json
     from tdac_agent.cli.driving_bar import DrivingBar
     from tdac_agent.cli.set_view import show_next_steps, show_set_report
-    from tdac_agent.verification.verify_episodes import most_worlds, verify_episodes
+    from tdac_agent.verification.verify_episodes import most_worlds
     from tdac_envs.ladder.task_sets import load_set
 
     if options.hidden_folder is not None and options.split != "hidden":
@@ -227,17 +248,9 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
     console = Console(stderr=options.as_json)
     bar = DrivingBar(console, most, f"worlds of {tasks.name}", is_long=True)
     with WarmJudge(child_pool) as judge, bar:
-        report = verify_episodes(
-            file,
-            tasks,
-            options.episodes,
-            split=options.split,
-            first=options.first,
-            salt_file=options.salt_file,
-            tier=options.tier,
-            out=options.out,
-            judge=judge,
-            watch=bar.show,
+        split, salt_file = options.split, options.salt_file
+        report = _driven(
+            file, tasks, options, judge, bar, split=split, salt_file=salt_file
         )
     if report.passed and report.sequential is not None:
         _print_marked(file, report.provenance.sha256, "policy")

@@ -179,7 +179,7 @@ def test_a_junit_file_of_a_set(tdac, tmp_path):
         ("verify a.py --set unknown --paper", "--set brings its own tasks; leave out "),
         ("verify a.py unknown --start 1 2", "leave out --start"),
         ("verify a.py unknown --profile paper", "--profile paper is for single tasks"),
-        ("verify a.py -n 3", "-n needs --set NAME"),
+        ("verify a.py --split dev", "--split needs --set NAME"),
         ("play a.py unknown --episode nominal", "leave out --episode"),
         ("evaluate random unknown --seed 3", "leave out --seed"),
         ("evaluate random --split dev", "--split needs --set NAME"),

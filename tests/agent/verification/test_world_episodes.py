@@ -521,7 +521,6 @@ def test_the_command_counts_hidden_evaluations(tdac, tmp_path, set_yaml):
     ("words", "message"),
     [
         (("--split", "dev"), "--split needs --set NAME"),
-        (("-n", "3"), "-n needs --set NAME"),
         (("--hidden-folder", "x"), "--hidden-folder needs --set NAME"),
         (
             ("--set", "known", "--hidden-folder", "x"),
@@ -534,7 +533,8 @@ def test_the_command_counts_hidden_evaluations(tdac, tmp_path, set_yaml):
         (("--set", "unkown"), r"unknown task set 'unkown'"),
         (("--set", "known", "--task", "maze"), "leave out --task"),
         (("--set", "known", "--paper"), "leave out --paper"),
-        (("--set", "known", "--robust", "3"), "leave out --robust"),
+        (("--set", "known", "--first", "3"), "--first needs -n N"),
+        (("--set", "known", "-n99", "--accept-at", "0.9"), "leave out --accept-at"),
         (("--set", "known", "-n", "0"), "-n"),
         (("--set", "known", "--split", "hidden"), "needs a salt"),
         (("--set", "known", "--salt-file", "no"), "split 'test' has a public salt|no"),
