@@ -153,7 +153,8 @@ def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
     on timing. Episodes after its decision are dropped.
     """
     job.out.mkdir(exist_ok=True)
-    counts, tier, fault, problem = [0, 0], job.tier, None, None
+    counts, fault, problem = [0, 0], None, None
+    tier = job.tier if job.policy.kind == "controller" else UNSANDBOXED
     before = kept_rows(job.rows, job.numbers)
     with ExitStack() as stack:
         paths = [job.out / EPISODES_FILE, *([job.rows] if job.rows else [])]
