@@ -35,6 +35,14 @@ class BenchSet(StrictRecord):
     worlds: int
     salt_sha256: str | None = Field(description="Of hidden worlds.")
 
+    @property
+    def which(self) -> str:
+        """The worlds in words; of a task, its starts."""
+        last = self.worlds - 1
+        if self.split == "jitter":
+            return f"jittered starts 0 to {last}"
+        return f"worlds 0 to {last} of {self.split}"
+
 
 class BenchFile(StrictRecord):
     """A file of an entrant: one, or one for each seed of a training."""

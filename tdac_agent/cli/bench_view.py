@@ -15,8 +15,6 @@ from tdac_agent.cli.titled_table import titled_table
 from tdac_agent.metrics.paired import LEAST_P
 
 NONE = "–"
-JITTER = "jitter"
-"""In place of a split, of a task."""
 # Widest name of an entrant, so that a table fits into 80 columns.
 WIDEST = 14
 FEW = 20
@@ -69,10 +67,7 @@ def show(results: Bench, console: Console) -> None:
 
 
 def _table(own: BenchSet, rows: Sequence[BenchRow], room: int) -> Table:
-    which = f"worlds 0 to {own.worlds - 1} of {own.split}"
-    if own.split == JITTER:
-        which = f"jittered starts 0 to {own.worlds - 1}"
-    table = titled_table(f"{own.name} {own.sha256[:8]}: {which}")
+    table = titled_table(f"{own.name} {own.sha256[:8]}: {own.which}")
     longest = max(len(row.entrant) for row in rows)
     width = max(min(longest, WIDEST + max(room - 80, 0)), len("entrant"))
     table.add_column("entrant", overflow="fold", width=width)

@@ -14,7 +14,6 @@ from tdac_agent.prompting.feedback import feedback_of
 from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
 from tdac_agent.runs.run_record import Status
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.synthesis.archive import Archive, Member
 from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.delivery import (
@@ -31,6 +30,7 @@ from tdac_agent.synthesis.disturbed import (
     times_of,
     told,
 )
+from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
@@ -41,11 +41,8 @@ from tdac_agent.verification.diagnosis.model_picture import (
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.store import REPORT_FILE, kept_report
 from tdac_agent.verification.suite_check import prove_suite
-from tdac_agent.verification.verify import kept_report as kept_suite_report
-from tdac_agent.verification.verify import load_trajectories, verify
-from tdac_agent.verification.verify_episodes import verify_episodes
+from tdac_agent.verification.verify import kept_report, load_trajectories, verify
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
 NOT_RUN = "not run"
@@ -125,7 +122,7 @@ class SuiteTrials:
         recorder, folder = self.terms.recorder, candidate.folder
         seed, file = recorder.run.seed, folder / "report.json"
         if recorder.vouches(file):
-            kept = kept_suite_report(folder, self.task, candidate.source, seed)
+            kept = kept_report(folder, self.task, candidate.source, seed)
             if kept is not None:
                 return kept
         report = verify(
@@ -286,28 +283,10 @@ class SuiteTrials:
         about = {"k": candidate.k, "j": candidate.j, "what": purpose, "episodes": count}
         terms.recorder.event("drive.start", **about)
         seeds = seeds_for(terms.recorder.run, purpose, count)
-        found = None
-        if terms.recorder.vouches(out / REPORT_FILE):
-            wanted = {
-                "controller_sha256": sha256_of(candidate.raw),
-                "sha256": self.task.sha256(),
-                "disturbance": Disturbance(),
-            }
-            found = kept_report(out, wanted, seeds)
-        if found is None:
-            found = verify_episodes(
-                candidate.raw,
-                self.task,
-                count,
-                first=seeds.start,
-                disturbance=Disturbance(),
-                tier=terms.tier,
-                out=out,
-                trajectories=True,
-                judge=terms.judge,
-                watch=terms.watch(**about),
-            )
-            terms.recorder.vouch(out / REPORT_FILE)
+        found = drive_candidate(
+            *(terms, candidate, self.task, seeds, out, about),
+            disturbance=Disturbance(),
+        )
         self.used += count
         terms.recorder.event("drive.end", **about, reached=found.successes)
         return found

@@ -9,10 +9,11 @@ from tdac_agent.runs.improvement_record import PairedChange
 from tdac_agent.runs.run_record import Status
 from tdac_agent.runs.selection_record import SELECTION_FILE
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.storage.hashes import number_of, sha256_of
+from tdac_agent.storage.hashes import number_of
 from tdac_agent.synthesis.archive import Archive, Member
 from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.delivery import compared, selection_of
+from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.hidden import hidden_report
 from tdac_agent.synthesis.set_reports import (
     figures_of,
@@ -24,8 +25,7 @@ from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.store import REPORT_FILE, kept_report, read_report
-from tdac_agent.verification.verify_episodes import verify_episodes
+from tdac_agent.verification.store import read_report
 from tdac_envs.ladder.task_sets import TaskSet
 
 BLOCKS = 2**30
@@ -244,27 +244,10 @@ class WorldTrials:
         terms, folder = self.terms, candidate.folder / out
         about = {"k": candidate.k, "j": candidate.j, "what": purpose, "worlds": count}
         terms.recorder.event("drive.start", **about)
-        report = None
-        if terms.recorder.vouches(folder / REPORT_FILE):
-            wanted = {
-                "controller_sha256": sha256_of(candidate.raw),
-                "sha256": self.tasks.sha256,
-                "split": "dev",
-            }
-            report = kept_report(folder, wanted, range(first, first + count))
-        if report is None:
-            report = verify_episodes(
-                candidate.raw,
-                self.tasks,
-                count,
-                split="dev",
-                first=first,
-                tier=terms.tier,
-                out=folder,
-                judge=terms.judge,
-                watch=terms.watch(**about),
-            )
-            terms.recorder.vouch(folder / REPORT_FILE)
+        numbers = range(first, first + count)
+        report = drive_candidate(
+            *(terms, candidate, self.tasks, numbers, folder, about), split="dev"
+        )
         self.used[purpose] += report.count
         ended = {"reached": report.successes, "driven": report.count}
         terms.recorder.event("drive.end", **about, **ended)
