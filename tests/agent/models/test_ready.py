@@ -195,6 +195,7 @@ def test_a_resumed_run_is_checked_as_well(tdac, canary, good):
     before = Path("run/journal.jsonl").read_text()
     record = json.loads(Path("run/run.json").read_text())
     assert record["base_url"] == url
+    connect.cache_clear()  # a new command would be a new process
     code, _, err = tdac("synth", "--resume", "run")
     assert (code, err.count("\n")) == (3, 1)
     assert f"no server answers at {url}" in err
