@@ -8,16 +8,22 @@ from xml.etree import ElementTree
 
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.verification.verdict import confirmed_text
 
 if TYPE_CHECKING:
     from tdac_agent.verification.diagnosis.report import Report
     from tdac_agent.verification.episode_report import EpisodeReport
 
 
-def write_junit(report: Report, path: Path) -> None:
-    """Writes a JUnit XML file with a test case per expected test."""
+def write_junit(
+    report: Report, path: Path, confirmation: EpisodeReport | None = None
+) -> None:
+    """Writes a JUnit XML file: a case per expected test, and one for blind drives."""
     messages = {failure.test: failure.message for failure in report.failures}
     cases = {name: messages.get(name) for name in report.tests}
+    if confirmation is not None:
+        told = None if confirmation.passed else confirmed_text(confirmation)
+        cases["confirmation::blind drives"] = told
     _write_cases(f"tdac {report.provenance.task}", cases, report.seconds, path)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -107,6 +107,12 @@ class NoiseFlags:
     range_dropout: float | None = option(
         None, f"{RANGE_DROPOUT}  [default: 0]", panel=DISTURBED
     )
+
+    @classmethod
+    def of(cls, disturbance: Disturbance) -> NoiseFlags:
+        """The flags to type for a disturbance: what differs from the defaults."""
+        usual, wanted = asdict(type(disturbance)()), asdict(disturbance)
+        return cls(**{name: v for name, v in wanted.items() if v != usual[name]})
 
     def disturbance(self) -> Disturbance:
         """The disturbance: the typed values, defaults for the others.

@@ -12,6 +12,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.run_view import list_tests
 from tdac_agent.models.budget import format_usd
+from tdac_agent.verification.verdict import COLOURS
 
 _ANSWERS = (
     ("generate", "controller", "controllers"),
@@ -133,9 +134,19 @@ class SynthProgress:
 
     def _show_episodes(self, at: str, record: dict[str, Any]) -> None:
         """Shows how disturbed episodes go, and prints those of the comparison."""
-        reached = f"{record.get('reached', 0)} of {record['episodes']} goals reached"
+        blind = record["what"] == "confirmation"
+        most = record["episodes"]
+        if blind:
+            most = record.get("driven", record.get("done", 0))
+        reached = f"{record.get('reached', 0)} of {most} goals reached"
+        kind = "disturbed episodes"
+        if blind:
+            kind = f"blind drives (at most {record['episodes']})"
         if record["event"] != "drive.end":
-            self.doing(f"{at}  disturbed episodes: {reached}")
+            self.doing(f"{at}  {kind}: {reached}")
+        elif blind:
+            word = "verified" if record["passed"] else "not verified"
+            self.say(f"  {at}", f"{word}: blind drives: {reached}", COLOURS[word])
         elif record["what"] == "comparison":
             self.say(f"  {at}", f"other disturbed episodes: {reached}", "dim")
 
@@ -162,7 +173,8 @@ class SynthProgress:
         elif record["unchanged"]:
             self.say(f"= {at}", note, "yellow")
         elif record["passed"]:
-            self.say(f"✔ {at}", note if self._on_set else "all tests passed", "green")
+            text = note if self._on_set else "all tests passed"
+            self.say(f"✔ {at}", text, "green" if self._on_set else COLOURS["passed"])
         elif self._on_set:
             self.say(f"[red]✘ {at}[/]", f"[red]{note}[/]")
         else:

@@ -17,6 +17,7 @@ from tdac_agent.episodes.trajectory import nominal_first
 from tdac_agent.prompting.feedback import Group, cut, group_failures
 from tdac_agent.tasks.units import UNITS, Units
 from tdac_agent.verification.diagnosis.report import Failure, Report, in_units
+from tdac_agent.verification.verdict import COLOURS
 
 MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""
@@ -65,7 +66,8 @@ def show_report(
         print_sentences(console, LEGEND, "dim")
     if out is not None:
         _show_files(out, console)
-    colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
+    word = "passed" if verdict.passed else "failed"
+    colour = COLOURS["passed" if verdict.passed else "not verified"]
     task = provenance.called or provenance.task
     # Task names are not unique, so the folder is shown, too.
     task += f" of {folder}" if folder is not None and task != provenance.task else ""

@@ -19,6 +19,7 @@ from tdac_agent.verification.episode_report import (
 )
 from tdac_agent.verification.judge.episode_row import Scores
 from tdac_agent.verification.store import REPORT_FILE, TRAJECTORIES
+from tdac_agent.verification.verdict import COLOURS
 
 MOST_CAUSES = 6
 
@@ -51,8 +52,8 @@ def show_set_report(report: EpisodeReport, console: Console) -> None:
         )
     result = report.sequential
     if result is not None:
-        colour = "green" if report.passed else "red"
         verdict = "verified" if report.passed else "not verified"
+        colour = COLOURS[verdict]
         say(
             f"[bold {colour}]{verdict}[/]: {decision_text(result)} after "
             f"{report.count} of at most {result.test.limit} worlds"

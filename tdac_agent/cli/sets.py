@@ -168,7 +168,8 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
         "disturbed": _disturbed(file) or "nothing",
         "horizon": _horizon(file),
         "verified": f"if a sequential test accepts a success rate of {file.bar:g} "
-        f"against {file.bar - MARGIN:g}",
+        f"against {file.bar - MARGIN:g}, and fewer contacts than "
+        f"{100 * file.most_contacts:g} %",
     }
     if file.movers:
         rows["movers"] = "; ".join(_group(group) for group in file.movers)

@@ -49,9 +49,10 @@ ALLOWED = frozenset(
 )
 """Flags that, given with --resume, permit a run from elsewhere to use their values."""
 WITH_RESUME = ALLOWED | {
-    *("resume", "max_cost", "max_tokens", "tier", "as_json", "trust", "then_verify"),
+    *("resume", "max_cost", "max_tokens", "tier", "as_json", "trust"),
+    *("then_verify", "confirm"),
 }
-_EXIT = {"verified": 0, "selected": 0, "budget": 4}
+_EXIT = {"verified": 0, "passed": 0, "selected": 0, "budget": 4}
 
 
 def run(
@@ -134,7 +135,8 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
         )
     check_tier(options.tier)
     console = Console(stderr=run_flags.as_json)
-    more = before.status == "selected" and options.then_verify
+    later = {"selected": options.then_verify, "passed": "confirm" in typed}
+    more = later.get(before.status, False)
     if before.finished and not more:
         check_own(before)
         return _show(before, console, before=before)
@@ -146,6 +148,8 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
         wanted = resume_arguments(run_flags.resume, known, trust=run_flags.trust)
     problem, folder, index = (wanted.pop(n) for n in ("problem", "out", "index"))
     settings = SynthOptions(then_verify=options.then_verify).changed(**wanted)
+    if "confirm" in typed:
+        settings = settings.changed(confirm=options.confirm)
     return write(problem, folder, settings, console, index)
 
 
@@ -214,8 +218,8 @@ def _so_far(folder: Path) -> str:
     # The first error is the one to report.
     with suppress(RunError):
         run = load_run(folder)
-        if run.verified and not run.on_set:
-            result = f"verified in iteration {run.tau}: {run.controller}"
+        if run.passed:
+            result = f"passed all tests in iteration {run.tau}: {run.controller}"
             return f"{result}; to go on improving it: {command}"
     return f"the run so far is in {folder}; to continue: {command}"
 

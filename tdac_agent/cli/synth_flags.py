@@ -58,6 +58,9 @@ def synth(
 ) -> None:
     """Write, test and repair a controller until it is verified.
 
+    It must pass all tests, and then drive blind: from about a hundred disturbed starts,
+    of which one may fail.
+
     With --set, it is written for worlds that it has never seen: the best one on worlds
     of the split dev is selected.
     """

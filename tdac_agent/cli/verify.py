@@ -102,18 +102,32 @@ def _verify_on_task(
             print_plain(console, note)
         if not options.as_json:
             show_report(report, console, options.out, task.folder, units)
-        robust = None
+        robust = confirmation = None
         if options.episodes is not None and report.passed:
             robust = _measure(file, task, options, noise, judge)
+        elif report.passed and options.confirm and not options.paper:
+            confirmation = _confirm(file, task, options, judge)
+    driven = robust or confirmation
+    if options.junit is not None:
+        from tdac_agent.cli.junit import write_junit
+
+        write_junit(report, options.junit, confirmation)
     if options.as_json:
-        print_json(_record(report, options, robust))
+        print_json(_record(report, options, robust, confirmation))
     elif robust is not None:
         from tdac_agent.cli.robust_view import show_robust
 
         show_robust(robust, console, _replay(flags, options, noise), units)
+    elif confirmation is not None:
+        from tdac_agent.cli.robust_view import show_confirmation
+
+        drove_with = confirmation.provenance.disturbance
+        assert drove_with is not None
+        play = _replay(flags, options, type(noise).of(drove_with))
+        show_confirmation(confirmation, console, play[1:], units)
     elif options.episodes is not None:
-        console.print("robustness not measured: the controller is not verified")
-    return 0 if report.passed and (robust is None or robust.passed) else 1
+        console.print("robustness not measured: the controller failed its tests")
+    return 0 if report.passed and (driven is None or driven.passed) else 1
 
 
 def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) -> Report:
@@ -135,10 +149,6 @@ def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) ->
     if report.passed and not report.provenance.paper:
         about = report.provenance
         _print_marked(file, about.task_sha256, about.profile)
-    if options.junit is not None:
-        from tdac_agent.cli.junit import write_junit
-
-        write_junit(report, options.junit)
     return report
 
 
@@ -189,6 +199,23 @@ def _measure(
         raise
 
 
+def _confirm(
+    file: Path, task: Task, options: VerifyOptions, judge: WarmJudge
+) -> EpisodeReport:
+    """Drives blind, with a progress bar; in a run folder, with the number there."""
+    from tdac_agent.cli.console import Console
+    from tdac_agent.cli.driving_bar import DrivingBar
+    from tdac_agent.verification.confirmation import CONFIRMATION, confirm
+    from tdac_agent.verification.judge.confirming import confirming_test
+
+    console, most = Console(stderr=options.as_json), confirming_test().limit
+    with DrivingBar(console, most, "blind drives", is_long=True) as bar:
+        out = None if options.out is None else options.out / CONFIRMATION
+        return confirm(
+            file, task, tier=options.tier, out=out, judge=judge, watch=bar.show
+        )
+
+
 def _driven(
     file: Path,
     problem: Task | TaskSet,
@@ -214,13 +241,16 @@ def _driven(
 
 
 def _record(
-    report: Report, options: VerifyOptions, robust: EpisodeReport | None
+    report: Report,
+    options: VerifyOptions,
+    robust: EpisodeReport | None,
+    confirmation: EpisodeReport | None,
 ) -> Any:
-    """The report; `-n` adds the key `robust`, null if it was not run."""
-    if options.episodes is None:
-        return report
-    added = None if robust is None else robust.model_dump(mode="json")
-    return {**report.model_dump(mode="json"), "robust": added}
+    """The report with the key `robust` or `confirmation`, null if it was not run."""
+    measured = options.episodes is not None
+    name, found = ("robust", robust) if measured else ("confirmation", confirmation)
+    added = None if found is None else found.model_dump(mode="json")
+    return {**report.model_dump(mode="json"), name: added}
 
 
 def _replay(flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags) -> list[str]:

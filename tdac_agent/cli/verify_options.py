@@ -29,7 +29,16 @@ class VerifyOptions:
     controller: str = option(..., CONTROLLER, argument=True)
     profile: Profile | None = profile_option()
     paper: bool = option(
-        False, "Run only the nominal episode, as in the paper.", scope="task"
+        False,
+        "Run only the nominal episode and end at `passed`, as in the paper.",
+        scope="task",
+    )
+    confirm: bool = option(
+        True,
+        "Drive what passes all tests blind, from 93 disturbed starts; it is verified "
+        "if at most one of these drives fails. Without it, end at `passed`.",
+        "--confirm/--no-confirm",
+        scope="task",
     )
     suite: Path | None = suite_option(scope="task")
     trust: bool = trust_option(scope="task")
@@ -46,8 +55,8 @@ class VerifyOptions:
     )
     episodes: int | None = option(
         None,
-        "Drive N episodes and print the rates: of a task, disturbed ones, if the "
-        "controller is verified; on a set, on N worlds, without a verdict.",
+        "Drive N episodes and print the rates: of a task, disturbed ones, instead of "
+        "the blind drives; on a set, on N worlds. Neither is a verdict.",
         "-n",
         "--robust",
         "--worlds",

@@ -322,19 +322,21 @@ def prepared(
     """A fitted entrant, ready to drive: on a task, `builtin` is written here.
 
     Returns:
-        The entrant, and whether it is verified, if it was written. If no candidate is,
-        it is the last one.
+        The entrant, and whether it passed its tests, if it was written. If no candidate
+        did, it is the last one.
     """
     if entrant.kind != "builtin" or isinstance(problem, TaskSet):
         return entrant, True
-    source, verified = _written_for(problem, tier)
-    return replace(entrant, source=source, sha256=sha256_of(source)), verified
+    source, passed = _written_for(problem, tier)
+    return replace(entrant, source=source, sha256=sha256_of(source)), passed
 
 
 def _written_for(task: Task, tier: str) -> tuple[bytes, bool]:
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
-        run = synthesize(task, BUILTIN, out=Path(name) / "run", tier=tier)
-        if run.verified:
+        run = synthesize(
+            task, BUILTIN, out=Path(name) / "run", tier=tier, confirm=False
+        )
+        if run.passed:
             return run.controller.read_bytes(), True  # raw read: our temporary folder
         candidates = sorted((run.folder / "iterations").rglob("controller.py"))
         return candidates[-1].read_bytes(), False  # raw read: our temporary folder

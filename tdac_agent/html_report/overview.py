@@ -72,7 +72,7 @@ def _kind(
         "first_pass": _rate(row, "first_pass"),
         "cs_K": _rate(row, "cs_K"),
         "tau_mean": _number(row["tau_mean"], ".1f"),
-        **_means(row),
+        **_means(row, "passed"),
     }
 
 
@@ -89,14 +89,14 @@ def _set_kinds(histories: Sequence[RunHistory]) -> Iterator[dict[str, Any]]:
             "rate": _rate(row, "rate"),
             "time_score": _rate(row, "time_score"),
             "episodes_mean": _number(row["episodes_mean"], ",.0f"),
-            **_means(row),
+            **_means(row, "verified"),
         }
 
 
-def _means(row: dict[str, Any]) -> dict[str, str]:
+def _means(row: dict[str, Any], word: str) -> dict[str, str]:
     return {
-        "tokens_per_verified": _number(row["tokens_per_verified"], ",.0f"),
-        "cost_per_verified": _number(row["cost_per_verified"], ".3f"),
+        "tokens_each": _number(row[f"tokens_per_{word}"], ",.0f"),
+        "cost_each": _number(row[f"cost_per_{word}"], ".3f"),
         "seconds_mean": _number(row["seconds_mean"], ",.0f"),
     }
 

@@ -258,7 +258,7 @@ def _uses(
     if run.on_set and run.tau is not None:
         verify = ["tdac", "verify", f"{name}/controller.py", *problem]
         yield shlex.join(verify), "verify the controller on public worlds"
-    elif run.verified:
+    elif run.passed:
         yield shlex.join(["tdac", "verify", name]), "verify the controller again"
         video = ["tdac", "play", name, "--video", "drive.mp4"]
         yield shlex.join(video), "record a video of the drive"

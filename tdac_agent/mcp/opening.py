@@ -123,8 +123,9 @@ def _new_run(problem: Problem, out: Path, episodes: int) -> Run:
     problem.check()
     own_seeds = lasting_secret() is not None
     facts: dict[str, Any] = {"seed": None if own_seeds else drawn_seed()}
+    facts["confirm"] = not problem.has_hidden
     if problem.has_hidden:
-        facts = {"seed": drawn_seed(), "episodes": episodes, "then_verify": True}
+        facts |= {"seed": drawn_seed(), "episodes": episodes, "then_verify": True}
         facts["feedback_episodes"] = FEEDBACK_EPISODES
     return new_run(
         problem,

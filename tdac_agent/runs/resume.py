@@ -188,6 +188,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "iterations": run.iterations,
         "patience": run.patience,
         "candidates": run.candidates,
+        "confirm": run.confirm,
         "improve": run.improve,
         **_of_episodes(run),
         "seed": run.seed,

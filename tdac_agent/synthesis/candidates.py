@@ -31,6 +31,7 @@ class Result:
         failed: What failed.
         seed: Seed of its jittered starts, if its tests had one.
         episodes: Name, outcome and steps of the episodes that may be told.
+        confirmed: Result of its blind confirmation; None without one.
     """
 
     passed: bool
@@ -42,6 +43,7 @@ class Result:
     failed: tuple[str, ...] = ()
     seed: int | None = None
     episodes: tuple[tuple[str, str, int], ...] = ()
+    confirmed: bool | None = None
 
     @property
     def works(self) -> bool:
@@ -56,8 +58,9 @@ class Result:
             k=k,
             j=j,
             valid=True,
-            passed=self.passed,
+            passed=self.passed or self.confirmed is False,
             failed_tests=self.failed,
+            confirmed=self.confirmed,
             seed=self.seed,
             notes=notes,
             unchanged=not new,
@@ -134,6 +137,7 @@ class Candidate:
         source: Its source.
         folder: Its folder.
         report: The report of a suite; None before it was tested by one.
+        confirmation: The report of its blind confirmation, if there was one.
         feedback: Reports on feedback worlds, in order.
         validation: Its episodes on validation worlds.
         explored: What came of it in a search, if it took part in one.
@@ -144,6 +148,7 @@ class Candidate:
     source: str
     folder: Path
     report: Report | None = None
+    confirmation: EpisodeReport | None = None
     feedback: list[EpisodeReport] = field(default_factory=list)
     validation: list[EpisodeRow] = field(default_factory=list)
     explored: Explored | None = None

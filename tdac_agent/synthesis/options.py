@@ -63,6 +63,13 @@ class SynthOptions:
     vision: bool = option(
         False, "Show the optimizer a picture of the failure that it is to repair."
     )
+    confirm: bool = option(
+        True,
+        "Drive what passes all tests blind, from about a hundred disturbed starts; a "
+        "controller is verified if at most one of these drives fails. Without it, the "
+        "run ends at `passed`.",
+        "--confirm/--no-confirm",
+    )
     seed: int | None = option(
         None,
         "Seed of the jittered starts, or of the choice of worlds on a task set.  "

@@ -67,9 +67,10 @@ def synthesize(
 ) -> Run:
     """Writes, tests and repairs controllers, and delivers the best one.
 
-    On a task, the first controller that passes its suite is delivered, or with
-    `improve` the best variation of it. On a task set, controllers drive on worlds of
-    `dev`, and the best one is selected on further worlds.
+    On a task, a controller that passes its suite drives blind (`confirm`); the first
+    one that is confirmed is delivered, or with `improve` the best variation of it. On a
+    task set, controllers drive on worlds of `dev`, and the best one is selected on
+    further worlds.
 
     If `out` contains the same run, unfinished, that run is resumed: recorded answers
     and results are reused (docs/models.md).
@@ -89,8 +90,9 @@ def synthesize(
         **keywords: Fields of `SynthOptions` that replace those of `options`.
 
     Returns:
-        The run: `verified`, `selected` (on a task set without `then_verify`), `not
-        verified`, or `budget`. If it has a controller, that is `run.controller`.
+        The run: `verified`, `passed` (on a task without `confirm`), `selected` (on a
+        task set without `then_verify`), `not verified`, or `budget`. If it has a
+        controller, that is `run.controller`.
 
     Raises:
         TypeError: There is no option of this name.
@@ -185,6 +187,8 @@ def _recorded(
         facts["feedback_episodes"] = wanted.feedback_episodes
         known = before is not None and before.then_verify
         facts["then_verify"] = wanted.then_verify or known
+    else:
+        facts["confirm"] = wanted.confirm or (before is not None and before.confirm)
     # The worlds of a set, and the episodes of a search, follow from it.
     needed = problem.has_hidden or wanted.improve > 0
     facts["seed"] = settled_seed(wanted.seed, models[0], before, needed=needed)
@@ -210,13 +214,14 @@ def _source(given: str | Path | None) -> str | None:
 
 
 def _is_over(before: Run, now: Run) -> bool:
-    """Whether nothing is left to do in a run; a selected one may be verified later.
+    """Whether nothing is left to do; what passed or was selected may be verified later.
 
     Raises:
         RunError: It is another run, or one that this installation did not begin.
     """
     check_same(before, now)
-    over = before.finished and not (now.then_verify and before.status == "selected")
+    later = {"selected": now.then_verify, "passed": now.confirm}
+    over = before.finished and not later.get(before.status, False)
     if over:
         check_own(before)
     return over
@@ -258,12 +263,14 @@ def _write(dialogue: Dialogue, trials: Trials, given: str | None) -> None:
     archive, asked = None, 0
     works = any(trials.result(each).works for each in able)
     if trials.terms.recorder.run.improve and works:
-        trials.secure(able[0])
+        trials.secure(max(able, key=lambda each: trials.result(each).rank))
         search = ImprovingSearch(dialogue, trials, written)
         stopped = search.run(able) or stopped
         archive, asked = search.archive, search.asked
         able = trials.finalists(archive)
     validation = trials.terms.shares.validation
+    if not validation:  # the tests have decided
+        able.sort(key=lambda each: trials.result(each).rank, reverse=True)
     chosen = select(able, validation, trials.validate) if able else None
     if chosen is None or (validation and not chosen.score):
         reason = trials.why_none(able)

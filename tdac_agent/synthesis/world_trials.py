@@ -64,6 +64,11 @@ class WorldTrials:
         self.used = dict.fromkeys(PURPOSES, 0)
 
     @property
+    def confirms(self) -> bool:
+        """See `Trials`."""
+        return self.terms.recorder.run.then_verify
+
+    @property
     def tests_left(self) -> int:
         """See `Trials`."""
         return self.terms.shares.feedback - self.used["feedback"]
@@ -200,7 +205,7 @@ class WorldTrials:
     def secure(self, candidate: Candidate) -> None:
         """See `Trials`: nothing is verified before the selection."""
 
-    def deliver(self, chosen: Chosen) -> None:
+    def deliver(self, chosen: Chosen) -> Candidate:
         """See `Trials`."""
         terms, changes = self.terms, dict[str, PairedChange]()
         if chosen.archive is not None:
@@ -219,10 +224,11 @@ class WorldTrials:
         write_atomic(terms.folder / SELECTION_FILE, text)
         values = selection.model_dump(mode="json", exclude={"candidates", "stopped"})
         terms.recorder.event("select.end", **values)
+        return chosen.candidate
 
-    def verify_hidden(self, candidate: Candidate) -> bool:
+    def confirm(self, candidate: Candidate) -> EpisodeReport:
         """See `Trials`."""
-        return hidden_report(self.tasks, candidate, self.terms).passed
+        return hidden_report(self.tasks, candidate, self.terms)
 
     def first_for(self, purpose: str) -> int:
         """Number of the first world for a purpose."""

@@ -19,9 +19,9 @@ from tdac_agent.verification.episode_report import (
     clock_dependence,
     summarise,
 )
+from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.episode_job import EpisodeJob
-from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.ledger import SEQUENTIAL, HiddenEvaluation, on_record
@@ -53,7 +53,7 @@ class Request:
         episodes: The task or the task set.
         part: Which of its episodes.
         source: Source of a controller without a file.
-        test: A sequential test that ends them early; then there are no scores.
+        test: A test that may end them early; then there are no scores.
         lineage: Id of the run that wrote a controller, if one did.
         patience: Time-outs after which the rest is skipped; None for never.
         tier: Sandbox tier; `auto` for the best one on this machine.
@@ -66,7 +66,7 @@ class Request:
     episodes: Episodes
     part: Part
     source: bytes | None = None
-    test: SequentialTest | None = None
+    test: EndingTest | None = None
     lineage: str | None = None
     patience: int | None = None
     tier: str = "auto"

@@ -16,6 +16,7 @@ from tdac_agent.metrics.rates import rate_of_runs
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.units import Place
+from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores, scores_of
 from tdac_agent.verification.judge.sequential import (
     Characteristics,
@@ -97,14 +98,26 @@ class Interval(StrictRecord):
     method: Literal["Clopper-Pearson", "bootstrap over worlds"] = "Clopper-Pearson"
 
 
+class ContactResult(StrictRecord):
+    """What a sequential test found about contacts."""
+
+    contacts: int = Field(description="Episodes in which something was touched.")
+    decision: Decision
+    at_refused_rate: Characteristics
+    at_accepted_rate: Characteristics
+
+
 class SequentialResult(StrictRecord):
-    """The decision of a sequential test, and its error rates."""
+    """The decision of a test that may end the episodes, and its error rates."""
 
     decision: Decision
-    test: SequentialTest
+    test: EndingTest
     refuse_at: float = Field(description="Success rate that the test should reject.")
     at_refused_rate: Characteristics
     at_accepted_rate: Characteristics
+    contact: ContactResult | None = Field(
+        None, description="Of drives without a contact, on a task set."
+    )
 
 
 class HiddenCount(StrictRecord):
@@ -216,7 +229,7 @@ class EpisodeReport(StrictRecord):
 def summarise(
     provenance: EpisodeProvenance,
     episodes: Sequence[EpisodeRow],
-    test: SequentialTest | None,
+    test: EndingTest | None,
     seconds: float,
     *,
     told: bool = True,
@@ -229,7 +242,7 @@ def summarise(
     Args:
         provenance: What they apply to.
         episodes: The episodes, in the order of their numbers.
-        test: The sequential test that may have stopped them.
+        test: The test that may have stopped them.
         seconds: Wall time, s.
         told: Whether single episodes may be reported.
         different: Number of different worlds, if each is driven several times.
@@ -262,7 +275,7 @@ def summarise(
         causes=dict(Counter(cause_of(episode) for episode in failed).most_common()),
         told=checks.failures or (tuple(texts[:MOST_TOLD]) if told else ()),
         episodes=tuple(episodes) if told else (),
-        sequential=None if test is None else result_of(test, successes, len(failed)),
+        sequential=None if test is None else result_of(test, episodes),
         child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),
         seconds=round(seconds, 3),
         clock_dependent=clock_dependent,
@@ -327,10 +340,14 @@ def clock_dependence(
     return f"in {over} of {len(used)} episodes it used over half of its CPU budget"
 
 
-def result_of(test: SequentialTest, successes: int, failures: int) -> SequentialResult:
+def result_of(test: EndingTest, episodes: Sequence[EpisodeRow]) -> SequentialResult:
     """The decision of a test, with its error rates."""
+    successes = sum(each.success for each in episodes)
+    touched = sum(each.touched for each in episodes)
+    contact = test.contact if isinstance(test, SequentialTest) else None
     return SequentialResult(
-        decision=test.decide(successes, failures),
+        contact=None if contact is None else _of_contacts(contact, touched, episodes),
+        decision=test.decide(successes, len(episodes) - successes, touched),
         test=test,
         refuse_at=test.refuse_at,
         at_refused_rate=test.characteristics(test.refuse_at),
@@ -338,10 +355,29 @@ def result_of(test: SequentialTest, successes: int, failures: int) -> Sequential
     )
 
 
+def _of_contacts(
+    test: SequentialTest, touched: int, episodes: Sequence[EpisodeRow]
+) -> ContactResult:
+    return ContactResult(
+        contacts=touched,
+        decision=test.decide(len(episodes) - touched, touched),
+        at_refused_rate=test.characteristics(test.refuse_at),
+        at_accepted_rate=test.characteristics(test.accept_at),
+    )
+
+
 def decision_text(result: SequentialResult) -> str:
     """What a sequential test decided."""
+    contact = result.contact
     if result.decision == "accepted":
-        return f"accepted at {percent(result.test.accept_at)}"
+        text = f"accepted at {percent(result.test.accept_at)}"
+        if contact is None:
+            return text
+        most = percent(1.0 - contact.at_refused_rate.rate)
+        return f"{text}, contacts below {most}"
+    if contact is not None and contact.decision == "rejected":
+        most = percent(1.0 - contact.at_refused_rate.rate)
+        return f"rejected, since {contact.contacts} contacts are too many for {most},"
     if result.decision == "rejected":
         return f"rejected at {percent(result.test.accept_at)}"
     return "undecided, therefore not accepted,"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from tdac_agent.verification.drive_episodes import Request, drive
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.sequential import (
+    CLEAN,
     MARGIN,
     MOST_EPISODES,
     SequentialTest,
@@ -159,6 +161,9 @@ def part_of_set(
     count = most_worlds(tasks, split) if worlds is None else worlds
     bar = tasks.file.bar if accept_at is None and worlds is None else accept_at
     test = None if bar is None else SequentialTest(bar, count, margin)
+    if test is not None and accept_at is None:
+        clean = CLEAN - (1.0 - tasks.file.most_contacts)
+        test = replace(test, contact=SequentialTest(CLEAN, count, clean))
     return Part(range(begin, begin + count), split, salt_file), test
 
 

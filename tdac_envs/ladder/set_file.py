@@ -89,6 +89,9 @@ class AdmissionSpec(StrictModel):
     tries: int = Field(200, ge=1, le=100_000, description="Most drafts of a world.")
 
 
+MOST_CONTACTS = 0.05
+
+
 class DisturbanceSpec(StrictModel):
     """The disturbances of the set; `docs/disturbances.md` defines them."""
 
@@ -160,6 +163,12 @@ class SetFile(StrictModel):
     cpu: CpuSpec = CpuSpec()
     bar: float = Field(
         0.95, gt=0.05, lt=1, description="Success rate of a verified controller."
+    )
+    most_contacts: float = Field(
+        MOST_CONTACTS,
+        gt=0.01,
+        lt=1,
+        description="Share of episodes with a contact at which none is verified.",
     )
 
     @model_validator(mode="before")
@@ -291,8 +300,11 @@ class SetFile(StrictModel):
                 the place of the files.
         """
         out = {"description", "files"}
+        # Such sets keep the hash that they had before.
         if not self.movers:
-            out.add("movers")  # Such sets keep the hash that they had before.
+            out.add("movers")
+        if self.most_contacts == MOST_CONTACTS:
+            out.add("most_contacts")
         values = self.model_dump(mode="json", by_alias=True, exclude=out)
         if self.files is not None:
             splits = list(self.files.splits)

@@ -46,7 +46,7 @@ class Robustness:
         """Shows what has been measured, and which video is finished."""
         if not self._card.visible:
             run = readable_run(folder)
-            if run is None or not run.verified or run.on_set:
+            if run is None or not run.passed or run.on_set:
                 return
             self._card.visible = True
         job = job_of(self._place, self._out)

@@ -164,7 +164,7 @@ class Report(StrictRecord):
 
     @property
     def passed(self) -> bool:
-        """Whether the controller is verified."""
+        """Whether the controller passed all tests."""
         return self.verdict.passed
 
 

@@ -20,10 +20,10 @@ from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.drivers import PolicySpec, driver_of
 from tdac_agent.verification.judge.episode_row import EpisodeRow, driven_row
 from tdac_agent.verification.judge.in_order import in_order
-from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import (
     CHECKED_STEPS,
     CHECKS_FILE,
@@ -74,7 +74,7 @@ class EpisodeJob(BaseModel):
     policy: PolicySpec
     numbers: tuple[int, ...]
     checks: bool = False
-    test: SequentialTest | None = None
+    test: EndingTest | None = None
     told: bool = True
     patience: int | None = None
     tier: str
@@ -153,7 +153,7 @@ def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
     on timing. Episodes after its decision are dropped.
     """
     job.out.mkdir(exist_ok=True)
-    counts, fault, problem = [0, 0], None, None
+    counts, fault, problem = [0, 0, 0], None, None
     tier = job.tier if job.policy.kind == "controller" else UNSANDBOXED
     before = kept_rows(job.rows, job.numbers)
     with ExitStack() as stack:
@@ -177,6 +177,7 @@ def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
                     file.write(done.row.model_dump_json() + "\n")
                     file.flush()
                 counts[not done.row.success] += 1
+                counts[2] += done.row.touched
                 if job.test and job.test.decide(*counts) != "undecided":
                     break
         except SandboxError as error:

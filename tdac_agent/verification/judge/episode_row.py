@@ -93,6 +93,11 @@ class EpisodeRow(StrictRecord):
         return self.outcome == "reached" and not self.collisions
 
     @property
+    def touched(self) -> bool:
+        """Whether something was touched."""
+        return self.outcome == "collision" or self.collisions > 0
+
+    @property
     def number(self) -> int:
         """Its seed, or the number of its world."""
         number = self.index if self.seed is None else self.seed

@@ -1,0 +1,60 @@
+"""The blind confirmation of a candidate of a run; one on record is reused."""
+
+from __future__ import annotations
+
+from tdac_agent.storage.files import write_atomic
+from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.terms import Terms
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.confirmation import (
+    CONFIRMATION,
+    CONFIRMATION_FILE,
+    confirm,
+    confirming_seeds,
+    kept_confirmation,
+)
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.store import REPORT_FILE
+
+
+def drive_blind(
+    terms: Terms, task: Task, candidate: Candidate, number: int
+) -> EpisodeReport:
+    """The confirmation of a candidate.
+
+    Args:
+        terms: What the trials share.
+        task: The task.
+        candidate: A candidate that passed the suite.
+        number: Number of the confirmation in the run, from 1.
+    """
+    recorder, out = terms.recorder, candidate.folder / CONFIRMATION
+    seeds, file = confirming_seeds(candidate.raw, task, number), out / REPORT_FILE
+    most = {"episodes": len(seeds), "number": number}
+    about = {"k": candidate.k, "j": candidate.j, "what": CONFIRMATION, **most}
+    recorder.event("drive.start", **about)
+    found = None
+    if recorder.vouches(file):
+        found = kept_confirmation(out, candidate.raw, task, number)
+    if found is None:
+        found = confirm(
+            *(candidate.raw, task, number),
+            tier=terms.tier,
+            out=out,
+            judge=terms.judge,
+            watch=terms.watch(**about),
+        )
+        recorder.vouch(file)
+    facts = {"reached": found.successes, "driven": found.count}
+    recorder.event("drive.end", **about, **facts, passed=found.passed)
+    return found
+
+
+def keep_confirmation(terms: Terms, candidate: Candidate) -> None:
+    """Writes the confirmation of the delivered candidate beside its report."""
+    file, found = terms.folder / CONFIRMATION_FILE, candidate.confirmation
+    if found is None:
+        file.unlink(missing_ok=True)
+        return
+    write_atomic(file, found.model_dump_json(indent=2) + "\n")
+    terms.recorder.vouch(file)
