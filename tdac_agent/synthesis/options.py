@@ -69,6 +69,7 @@ class SynthOptions:
         "controller is verified if at most one of these drives fails. Without it, the "
         "run ends at `passed`.",
         "--confirm/--no-confirm",
+        scope="task",
     )
     seed: int | None = option(
         None,
