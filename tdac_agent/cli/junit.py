@@ -24,9 +24,10 @@ def write_junit(report: Report, path: Path) -> None:
 def write_set_junit(report: EpisodeReport, path: Path) -> None:
     """Writes a JUnit XML file with a test case per test and per public world."""
     split = report.provenance.split
-    failed = "; ".join(report.told) or "failed"
     cases = {
-        f"static::{name}": failed if result == "failed" else None
+        name if "::" in name else f"static::{name}": _reason(name, report.told)
+        if result == "failed"
+        else None
         for name, result in report.tests.items()
     }
     for each in report.episodes:
@@ -36,6 +37,12 @@ def write_set_junit(report: EpisodeReport, path: Path) -> None:
         decision = report.sequential.decision
         cases[f"{split}::decision"] = None if decision == "accepted" else decision
     _write_cases(f"tdac {report.provenance.name}", cases, report.seconds, path)
+
+
+def _reason(test: str, told: tuple[str, ...]) -> str:
+    """Why a test failed, from the lines about all that did."""
+    lines = (line.removeprefix(f"{test}: ") for line in told if line.startswith(test))
+    return next(lines, "failed")
 
 
 def _write_cases(

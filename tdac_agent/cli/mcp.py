@@ -9,19 +9,17 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from tdac_agent.cli.mcp_flags import McpOptions
-from tdac_agent.cli.task_choice import chosen
+from tdac_agent.cli.task_choice import chosen_problem
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import typed_fields
 from tdac_agent.library.listing import next_folder
 from tdac_agent.runs.run_record import Agent
-from tdac_agent.tasks.task import Task
-from tdac_agent.tasks.trust import allowed
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
-from tdac_envs.ladder.task_sets import TaskSet
 
 if TYPE_CHECKING:
     from tdac_agent.mcp.session import Session
+    from tdac_agent.problems.problem import Problem
 
 
 def run(flags: TaskFlags, options: McpOptions) -> None:
@@ -63,12 +61,9 @@ def run(flags: TaskFlags, options: McpOptions) -> None:
         os._exit(130)
 
 
-def _named(flags: TaskFlags) -> Task | TaskSet:
+def _named(flags: TaskFlags) -> Problem:
     """The task or the task set of the flags."""
-    problem = chosen(flags)
-    if isinstance(problem, TaskSet):
-        return problem
-    return allowed(problem, None, trust=False)
+    return chosen_problem(flags).allowed(None, trust=False)
 
 
 def _serve_http(session: Session, port: int, token: str | None) -> None:

@@ -10,7 +10,6 @@ from functools import partial
 from queue import SimpleQueue
 
 from tdac_agent.models.picture import LARGEST_SIDE
-from tdac_agent.prompting.feedback import feedback_of
 from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
 from tdac_agent.runs.run_record import Status
 from tdac_agent.storage.files import write_atomic
@@ -32,6 +31,7 @@ from tdac_agent.synthesis.disturbed import (
 )
 from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.terms import Chosen, Terms
+from tdac_agent.synthesis.tested import failed_tests, recorded_report, suite_result
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.model_picture import (
@@ -43,9 +43,7 @@ from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
-NOT_RUN = "not run"
 IMPROVE = "improve"
 """Folder of the episodes of a search, inside that of a candidate."""
 
@@ -141,32 +139,11 @@ class SuiteTrials:
 
     def recall(self, candidate: Candidate) -> None:
         """See `Trials`."""
-        content = parse_json(read_file(candidate.folder / "report.json", RECORD_BYTES))
-        candidate.report = Report.model_validate(content)
+        candidate.report = recorded_report(candidate)
 
     def result(self, candidate: Candidate) -> Result:
         """See `Trials`."""
-        report = _report(candidate)
-        failure, verdict = feedback_of(report), report.verdict
-        summary = f"{verdict.passed_tests} of {verdict.expected} tests passed"
-        if not report.passed:
-            summary = f"{len(report.failures)} of {verdict.expected} tests failed"
-            if verdict.passed_tests == 0:
-                summary += f", the first because {report.failures[0].message}"
-        return Result(
-            report.passed,
-            (float(report.passed), -len(report.failures)),
-            failure,
-            summary,
-            unfit="" if report.passed else summary,
-            failed=failure.failed,
-            seed=report.provenance.seed,
-            episodes=tuple(
-                (each.name, each.outcome, each.steps)
-                for each in report.episodes
-                if not each.held_out and each.outcome != NOT_RUN
-            ),
-        )
+        return suite_result(_report(candidate))
 
     def picture(self, candidate: Candidate) -> FailurePicture | None:
         """See `Trials`."""
@@ -185,12 +162,9 @@ class SuiteTrials:
         is_variation = candidate.report is None
         if is_variation:
             self.test([candidate])
-        report, result = _report(candidate), self.result(candidate)
+        report = _report(candidate)
         if not report.passed:
-            assert result.failure is not None
-            drove = any(each.outcome != NOT_RUN for each in report.episodes)
-            said, failed = result.failure.line, result.failed
-            return Explored(None, said, failed=failed, drove=drove, seed=result.seed)
+            return failed_tests(report)
         folder = candidate.folder / IMPROVE
         driven = self._drive(candidate, IMPROVE, self.terms.shares.block)
         figures = task_figures(self.task, report, driven)
@@ -202,7 +176,7 @@ class SuiteTrials:
             figures,
             told(driven),
             passed=True,
-            seed=result.seed,
+            seed=report.provenance.seed,
             episodes=len(driven.episodes),
             feedback=disturbed_feedback(driven),
             picture=partial(failed_picture, self.task, driven, folder),
