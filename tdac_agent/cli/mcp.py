@@ -19,7 +19,6 @@ from tdac_envs.core.extras import install_command
 
 if TYPE_CHECKING:
     from tdac_agent.mcp.session import Session
-    from tdac_agent.problems.problem import Problem
 
 
 def run(flags: TaskFlags, options: McpOptions) -> None:
@@ -38,7 +37,8 @@ def run(flags: TaskFlags, options: McpOptions) -> None:
 
     out, http = options.out, options.http
     known = begun(out) if out is not None and not typed_fields(flags) else None
-    problem = known.problem if known else _named(flags)
+    problem = known.problem if known else chosen_problem(flags)
+    problem = problem.allowed(options.suite, trust=False)
     most = options.episodes or (known.episodes if known else EPISODES)
     folder = out or next_folder(problem.name)
     agent: Agent = "over HTTP" if http else "unconfined"
@@ -59,11 +59,6 @@ def run(flags: TaskFlags, options: McpOptions) -> None:
         # The thread that reads stdin would keep the process.
         print("interrupted", file=sys.stderr, flush=True)
         os._exit(130)
-
-
-def _named(flags: TaskFlags) -> Problem:
-    """The task or the task set of the flags."""
-    return chosen_problem(flags).allowed(None, trust=False)
 
 
 def _serve_http(session: Session, port: int, token: str | None) -> None:
