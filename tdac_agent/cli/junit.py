@@ -41,7 +41,8 @@ def write_set_junit(report: EpisodeReport, path: Path) -> None:
 
 def _reason(test: str, told: tuple[str, ...]) -> str:
     """Why a test failed, from the lines about all that did."""
-    lines = (line.removeprefix(f"{test}: ") for line in told if line.startswith(test))
+    head = f"{test}: "
+    lines = (line.removeprefix(head) for line in told if line.startswith(head))
     return next(lines, "failed")
 
 

@@ -1,10 +1,12 @@
 """The user's own tests on a task set: they come before the first world."""
 
 import json
+from xml.etree import ElementTree
 
 import pytest
 from few_worlds import KNOWN, write_set
 
+from tdac_agent.cli.junit import write_set_junit
 from tdac_agent.errors import Fault
 from tdac_agent.problems.task_set import SetProblem
 from tdac_agent.verification.own_tests import kept_tests, run_own_tests
@@ -93,6 +95,9 @@ def test_who_fails_them_drives_on_no_world(few, suite, warm, tmp_path):
     kept = json.loads((tmp_path / "report.json").read_text())
     assert kept["failures"][0]["diagnosis"]["cause"] == "no motion"
     assert report.provenance.sha256 == before
+    write_set_junit(report, tmp_path / "junit.xml")
+    failed = ElementTree.parse(tmp_path / "junit.xml").findall("testcase[failure]")
+    assert [f"{each.get('classname')}::{each.get('name')}" for each in failed] == [OWN]
 
 
 @pytest.mark.slow
