@@ -30,9 +30,10 @@ def write_junit(
 def write_set_junit(report: EpisodeReport, path: Path) -> None:
     """Writes a JUnit XML file with a test case per test and per public world."""
     split = report.provenance.split
-    failed = "; ".join(report.told) or "failed"
     cases = {
-        f"static::{name}": failed if result == "failed" else None
+        name if "::" in name else f"static::{name}": _reason(name, report.told)
+        if result == "failed"
+        else None
         for name, result in report.tests.items()
     }
     for each in report.episodes:
@@ -42,6 +43,13 @@ def write_set_junit(report: EpisodeReport, path: Path) -> None:
         decision = report.sequential.decision
         cases[f"{split}::decision"] = None if decision == "accepted" else decision
     _write_cases(f"tdac {report.provenance.name}", cases, report.seconds, path)
+
+
+def _reason(test: str, told: tuple[str, ...]) -> str:
+    """Why a test failed, from the lines about all that did."""
+    head = f"{test}: "
+    lines = (line.removeprefix(head) for line in told if line.startswith(head))
+    return next(lines, "failed")
 
 
 def _write_cases(

@@ -10,6 +10,7 @@ import typer
 
 from tdac_agent.cli.typed_options import typed_fields
 from tdac_agent.options import option
+from tdac_agent.synthesis.options import SUITE
 
 if TYPE_CHECKING:
     from tdac_agent.tasks.disturbance import Disturbance
@@ -45,9 +46,7 @@ tier_option = partial(
     option, "auto", "Sandbox tier; `tdac doctor` lists them.", metavar="NAME"
 )
 out_option = partial(option, None, metavar="DIR")
-suite_option = partial(
-    option, None, "Folder with additional test_*.py files to run.", metavar="DIR"
-)
+suite_option = partial(option, None, SUITE, metavar="DIR")
 trust_option = partial(
     option,
     False,

@@ -22,6 +22,10 @@ _ANSWERS = (
 )
 FINAL = frozenset({"validation", "comparison"})
 """Purposes of worlds whose results are printed."""
+CHECKS = {
+    False: "checking the suite: reference must pass, do-nothing must fail",
+    True: "checking your tests: they must run on a controller that does nothing",
+}
 VERBS = {
     "generate": "writing",
     "edit": "editing",
@@ -66,8 +70,7 @@ class SynthProgress:
         if kind in {"run.start", "run.resume"}:
             self._print_heading(record)
         elif kind == "prove.start":
-            check = "checking the suite: reference must pass, do-nothing must fail"
-            self._console.print(f"  {check}", style="dim")
+            self._console.print(f"  {CHECKS[self._on_set]}", style="dim")
             self._spinner.update(text="checking the suite")
         elif kind == "prove.step":
             self._spinner.update(text=f"checking the suite: {record['doing']} …")

@@ -12,6 +12,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.robust_view import error_rates, rate_text
 from tdac_agent.cli.sentences import print_command, print_plain, print_sentences
+from tdac_agent.verification.diagnosis.report import OWN
 from tdac_agent.verification.episode_report import (
     EpisodeReport,
     HiddenCount,
@@ -37,6 +38,8 @@ def show_set_report(report: EpisodeReport, console: Console) -> None:
         f"to {last} of {provenance.split}: {report.successes} reached, "
         f"{report.count - report.successes} failed; {report.seconds:.0f} s"
     )
+    if own := [name for name in report.tests if name.startswith(f"{OWN}/")]:
+        say(f"tests of your own: all {len(own)} passed")
     if report.scores is not None and report.interval is not None:
         say(_scores(report, report.scores))
         say(rate_text(report.scores.success, report.interval))

@@ -18,14 +18,13 @@ from tdac_agent.cli.progress import SynthProgress
 from tdac_agent.cli.run_view import show_run, show_selection
 from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.synth_flags import RunFlags
-from tdac_agent.cli.task_choice import check_tier, chosen
+from tdac_agent.cli.task_choice import check_tier, chosen_problem
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import flag_name
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.library.listing import next_folder
 from tdac_agent.models.provider import Provider
 from tdac_agent.models.ready import check_ready
-from tdac_agent.problems.choice import problem_of
 from tdac_agent.problems.problem import Problem
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.resume import (
@@ -40,7 +39,6 @@ from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
-from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
 
 RECORDED = ("learner", "optimizer", "base_url", "max_cost", "max_tokens")
@@ -72,12 +70,10 @@ def run(
     check_models(options)
     console = Console(stderr=run_flags.as_json)
     with console.status("preparing the task …"):
-        problem = chosen(flags, options, run_flags)
-        if isinstance(problem, Task):
-            problem = problem.with_profile(run_flags.profile)
-            problem = allowed(problem, run_flags.suite, trust=run_flags.trust)
+        problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
+        problem = problem.allowed(options.suite, trust=run_flags.trust)
     folder = run_flags.out or next_folder(problem.name)
-    return write(problem_of(problem), folder, options, console)
+    return write(problem, folder, options, console)
 
 
 def write(
@@ -140,7 +136,7 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
     if before.finished and not more:
         check_own(before)
         return _show(before, console, before=before)
-    everything = {**_values(options), "suite": run_flags.suite}
+    everything = _values(options)
     known = {name: everything[name] for name in ALLOWED & set(typed)}
     known |= {n: everything[n] for n in ("max_cost", "max_tokens", "tier")}
     check_ready_again(before, known)

@@ -12,7 +12,6 @@ from tdac_agent.cli.options import (
     json_option,
     out_option,
     profile_option,
-    suite_option,
     trust_option,
 )
 from tdac_agent.cli.task_flags import TaskFlags
@@ -27,8 +26,7 @@ app = typer.Typer()
 class RunFlags:
     """The flags of `tdac synth` about the run as a whole."""
 
-    profile: Profile | None = profile_option(scope="task")
-    suite: Path | None = suite_option(scope="task")
+    profile: Profile | None = profile_option()
     out: Path | None = out_option(
         "Run folder; an unfinished run of the same command in it is continued.  "
         "[default: runs/TASK-N]"
@@ -39,7 +37,7 @@ class RunFlags:
     dry_run: bool = option(
         False, "Print the first prompt and the maximum cost; ask no model."
     )
-    trust: bool = trust_option(scope="task")
+    trust: bool = trust_option()
     as_json: bool = json_option()
 
 

@@ -18,7 +18,7 @@ from tdac_agent.cli.task_changes import (
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import flag_name, typed_fields
 from tdac_agent.options import flag_of
-from tdac_agent.runs.ownership import load_task
+from tdac_agent.runs.ownership import load_set_problem, load_task
 from tdac_agent.sandbox import TIERS
 from tdac_agent.tasks.registry import environment_with_key
 from tdac_agent.tasks.task import Task
@@ -26,6 +26,7 @@ from tdac_agent.tasks.task_file import (
     MAP_FILES,
     SET_FILE,
     TASK_FILE,
+    Profile,
     bundled_tasks,
 )
 from tdac_envs.core.errors import TaskError, hint
@@ -34,6 +35,7 @@ from tdac_envs.map2d.source import check_exists
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 
 if TYPE_CHECKING:
+    from tdac_agent.problems.problem import Problem
     from tdac_envs.ladder.task_sets import TaskSet
 
 NAMING = {
@@ -151,6 +153,43 @@ def chosen(flags: TaskFlags, *options: Any) -> Task | TaskSet:
     from tdac_envs.ladder.task_sets import load_set
 
     return load_set(flags.set_name)
+
+
+def chosen_problem(
+    flags: TaskFlags, *options: Any, profile: Profile | None = None
+) -> Problem:
+    """What the flags name; the tests that it brings may need a permission.
+
+    Args:
+        flags: The flags.
+        options: Further options of the command, whose scope is checked.
+        profile: The profile of a task.
+
+    Raises:
+        TaskError: Flags contradict each other, or it cannot be used.
+    """
+    flags = with_named_file(flags)
+    check_scope(flags.set_name is not None, flags, *options)
+    if flags.set_name is None:
+        from tdac_agent.problems.single_task import TaskProblem  # slow to import
+
+        return TaskProblem(chosen_task(flags).with_profile(profile))
+    check_set_profile(profile)
+    return load_set_problem(flags.set_name)
+
+
+def check_set_profile(profile: str | None) -> None:
+    """Refuses the profile `paper` on a task set.
+
+    Raises:
+        TaskError: It is wanted.
+    """
+    if profile == "paper":
+        raise TaskError(
+            "a task set has only the profile policy: the functions of the profile "
+            "paper plan on the one map that a task has, and each world has its own; "
+            "leave out --profile paper"
+        )
 
 
 def chosen_single(flags: TaskFlags) -> Task:

@@ -14,7 +14,7 @@ from tdac_agent.cli.controller_choice import (
     with_own_set,
 )
 from tdac_agent.cli.spinner import Spinner
-from tdac_agent.cli.task_choice import check_scope, check_tier
+from tdac_agent.cli.task_choice import check_scope, check_set_profile, check_tier
 from tdac_agent.cli.typed_options import (
     flag_name,
     require_flag,
@@ -264,23 +264,33 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
     from tdac_agent.cli.console import Console, print_json
     from tdac_agent.cli.driving_bar import DrivingBar
     from tdac_agent.cli.set_view import show_next_steps, show_set_report
-    from tdac_agent.verification.verify_episodes import most_worlds
-    from tdac_envs.ladder.task_sets import load_set
+    from tdac_agent.runs.ownership import load_set_problem
+    from tdac_agent.verification.verify_episodes import SEED_ON_SETS, most_worlds
 
     if options.hidden_folder is not None and options.split != "hidden":
         raise TaskError("--hidden-folder needs --split hidden")
-    if options.profile == "paper":
-        raise TaskError("--profile paper is for single tasks: leave it out with --set")
-    tasks = load_set(name, options.hidden_folder)
+    check_set_profile(options.profile)
+    problem = load_set_problem(name, options.hidden_folder)
+    problem = problem.allowed(options.suite, trust=options.trust)
+    tasks, suite = problem.tasks, problem.suite
+    if options.seed is not None and suite is None:
+        raise TaskError(SEED_ON_SETS)
     file = _controller_on(tasks, options)
     _freeze()
     most = options.episodes or most_worlds(tasks, options.split)
     console = Console(stderr=options.as_json)
     bar = DrivingBar(console, most, f"worlds of {tasks.name}", is_long=True)
     with WarmJudge(child_pool) as judge, bar:
-        split, salt_file = options.split, options.salt_file
         report = _driven(
-            file, tasks, options, judge, bar, split=split, salt_file=salt_file
+            file,
+            tasks,
+            options,
+            judge,
+            bar,
+            split=options.split,
+            salt_file=options.salt_file,
+            suite=suite,
+            seed=options.seed,
         )
     if report.passed and report.sequential is not None:
         _print_marked(file, report.provenance.sha256, "policy")

@@ -40,10 +40,10 @@ class VerifyOptions:
         "--confirm/--no-confirm",
         scope="task",
     )
-    suite: Path | None = suite_option(scope="task")
-    trust: bool = trust_option(scope="task")
+    suite: Path | None = suite_option()
+    trust: bool = trust_option()
     tier: str = tier_option()
-    seed: int | None = seed_option(scope="task")
+    seed: int | None = seed_option()
     junit: Path | None = option(None, "Write a JUnit XML report.", metavar="FILE")
     out: Path | None = out_option(
         "Folder for report.json or episodes.json, the trajectories and a picture of "

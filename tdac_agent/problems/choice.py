@@ -6,10 +6,10 @@ from pathlib import Path
 
 from tdac_agent.problems.problem import Problem
 from tdac_agent.problems.single_task import TaskProblem, kept_task
-from tdac_agent.problems.task_set import SetProblem
+from tdac_agent.problems.task_set import SetProblem, kept_set
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
-from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.ladder.task_sets import TaskSet
 
 
 def problem_of(about: Task | TaskSet | Problem) -> Problem:
@@ -29,5 +29,5 @@ def kept_problem(folder: Path) -> Problem | None:
         TaskError: The task or the task set cannot be read.
     """
     if (folder / SET_FILE).is_file():
-        return SetProblem(load_set(folder / SET_FILE))
+        return kept_set(folder)
     return kept_task(folder) if (folder / TASK_FILE).is_file() else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -17,6 +16,7 @@ from tdac_agent.tasks.provenance import origin, versions
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.set_files import write_set
 from tdac_agent.verification.judge.worlds import SetWorlds, TaskWorld
 from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.task import EPuckTask
@@ -312,10 +312,3 @@ def planner_sha256() -> str:
     files = (space_time.__file__, orca_driver.__file__)
     # raw read: shipped
     return sha256_of(b"".join(Path(file).read_bytes() for file in files))
-
-
-def write_set(tasks: TaskSet, path: Path) -> Path:
-    """Writes the set file of a set, for other processes; returns its path."""
-    values = tasks.file.model_dump(mode="json", by_alias=True)
-    path.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
-    return path

@@ -174,6 +174,11 @@ class Candidate:
         return any(report.count for report in self.feedback)
 
     @property
+    def refused(self) -> bool:
+        """Whether it failed a suite, so that it does not drive."""
+        return self.report is not None and not self.report.passed
+
+    @property
     def first_failure(self) -> EpisodeReport | None:
         """The report that ended its tests; None if it has not failed so far."""
         failed = (r for r in self.feedback if not r.count or r.successes < r.count)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.candidates import Candidate, Result
+from tdac_agent.synthesis.disturbed import confirmation_feedback
 from tdac_agent.synthesis.terms import Terms
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.confirmation import (
@@ -13,8 +16,10 @@ from tdac_agent.verification.confirmation import (
     confirming_seeds,
     kept_confirmation,
 )
+from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.store import REPORT_FILE
+from tdac_agent.verification.verdict import confirmed_text
 
 
 def drive_blind(
@@ -48,6 +53,34 @@ def drive_blind(
     facts = {"reached": found.successes, "driven": found.count}
     recorder.event("drive.end", **about, **facts, passed=found.passed)
     return found
+
+
+def confirmed_result(
+    tested: Result, report: Report, confirmation: EpisodeReport
+) -> Result:
+    """The result of a candidate that drove blind.
+
+    Args:
+        tested: What the suite found.
+        report: The report of the suite.
+        confirmation: The confirmation.
+    """
+    said = confirmed_text(confirmation)
+    failure, passed = tested.failure, confirmation.passed
+    if not passed:
+        failure = confirmation_feedback(report, confirmation)
+    assert failure is not None
+    first, *rest = tested.rank
+    return replace(
+        tested,
+        passed=passed,
+        rank=(first + float(passed), *rest),
+        failure=failure,
+        summary=f"{tested.summary}; {said}",
+        said=said,
+        failed=failure.failed,
+        confirmed=passed,
+    )
 
 
 def keep_confirmation(terms: Terms, candidate: Candidate) -> None:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 MODELS, BUDGET, SETS = "Models", "Budget", "Task set"
 """Headings of the help."""
+SUITE = "Folder with additional test_*.py files to run."
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,7 @@ class SynthOptions:
         metavar="FILE",
         type=Path,
     )
+    suite: Path | None = option(None, SUITE, metavar="DIR")
     vision: bool = option(
         False, "Show the optimizer a picture of the failure that it is to repair."
     )

@@ -11,20 +11,22 @@ from functools import partial
 from queue import SimpleQueue
 
 from tdac_agent.models.picture import LARGEST_SIDE
-from tdac_agent.prompting.feedback import feedback_of
 from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
 from tdac_agent.runs.run_record import Confirmation, Status
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.archive import Archive, Member
 from tdac_agent.synthesis.candidates import Candidate, Explored, Result
-from tdac_agent.synthesis.confirming import drive_blind, keep_confirmation
+from tdac_agent.synthesis.confirming import (
+    confirmed_result,
+    drive_blind,
+    keep_confirmation,
+)
 from tdac_agent.synthesis.delivery import (
     compared,
     place_verified,
     task_improvement,
 )
 from tdac_agent.synthesis.disturbed import (
-    confirmation_feedback,
     disturbed_feedback,
     failed_picture,
     seeds_for,
@@ -35,6 +37,7 @@ from tdac_agent.synthesis.disturbed import (
 )
 from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.terms import Chosen, Terms
+from tdac_agent.synthesis.tested import failed_tests, recorded_report, suite_result
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.confirmation import CONFIRMATION
@@ -48,9 +51,7 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verdict import confirmed_text
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
-NOT_RUN = "not run"
 IMPROVE = "improve"
 """Folder of the episodes of a search, inside that of a candidate."""
 
@@ -154,39 +155,15 @@ class SuiteTrials:
 
     def recall(self, candidate: Candidate) -> None:
         """See `Trials`."""
-        content = parse_json(read_file(candidate.folder / "report.json", RECORD_BYTES))
-        candidate.report = Report.model_validate(content)
+        candidate.report = recorded_report(candidate)
 
     def result(self, candidate: Candidate) -> Result:
         """See `Trials`."""
         report, confirmation = _report(candidate), candidate.confirmation
-        failure, verdict = feedback_of(report), report.verdict
-        summary = f"{verdict.passed_tests} of {verdict.expected} tests passed"
-        if confirmation is not None:
-            summary += f"; {confirmed_text(confirmation)}"
-            if not confirmation.passed:
-                failure = confirmation_feedback(report, confirmation)
-        if not report.passed:
-            summary = f"{len(report.failures)} of {verdict.expected} tests failed"
-            if verdict.passed_tests == 0:
-                summary += f", the first because {report.failures[0].message}"
-        confirmed = None if confirmation is None else confirmation.passed
-        return Result(
-            report.passed and confirmed is not False,
-            (float(report.passed) + float(confirmed or 0), -len(report.failures)),
-            failure,
-            summary,
-            said="" if confirmation is None else confirmed_text(confirmation),
-            unfit="" if report.passed else summary,
-            failed=failure.failed,
-            confirmed=confirmed,
-            seed=report.provenance.seed,
-            episodes=tuple(
-                (each.name, each.outcome, each.steps)
-                for each in report.episodes
-                if not each.held_out and each.outcome != NOT_RUN
-            ),
-        )
+        result = suite_result(report)
+        if confirmation is None:
+            return result
+        return confirmed_result(result, report, confirmation)
 
     def picture(self, candidate: Candidate) -> FailurePicture | None:
         """See `Trials`."""
@@ -209,12 +186,9 @@ class SuiteTrials:
         is_variation = candidate.report is None
         if is_variation:
             self.test([candidate])
-        report, result = _report(candidate), self.result(candidate)
+        report = _report(candidate)
         if not report.passed:
-            assert result.failure is not None
-            drove = any(each.outcome != NOT_RUN for each in report.episodes)
-            said, failed = result.failure.line, result.failed
-            return Explored(None, said, failed=failed, drove=drove, seed=result.seed)
+            return failed_tests(report)
         folder = candidate.folder / IMPROVE
         driven = self._drive(candidate, IMPROVE, self.terms.shares.block)
         figures = task_figures(self.task, report, driven)
@@ -226,7 +200,7 @@ class SuiteTrials:
             figures,
             told(driven),
             passed=True,
-            seed=result.seed,
+            seed=report.provenance.seed,
             episodes=len(driven.episodes),
             feedback=disturbed_feedback(driven),
             picture=partial(failed_picture, self.task, driven, folder),

@@ -108,6 +108,8 @@ def synthesize(
     given = {name: value for name, value in named.items() if value is not None}
     wanted = (options or SynthOptions()).changed(**keywords, **given)
     about = problem_of(problem)
+    if wanted.suite is not None:
+        about = about.permitted(wanted.suite)
     _check(wanted, about)
     models = _models(wanted, about)
     template, book = load_template(wanted.prompt), book_of(wanted.rules)

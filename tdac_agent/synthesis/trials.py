@@ -121,7 +121,7 @@ def trials_of(problem: Problem, terms: Terms) -> Trials:
     if problem.task is not None:
         return SuiteTrials(problem.task, terms)
     assert problem.tasks is not None
-    return WorldTrials(problem.tasks, terms)
+    return WorldTrials(problem.tasks, terms, problem.suite)
 
 
 def conclude(trials: Trials, chosen: Chosen) -> None:

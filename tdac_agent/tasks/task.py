@@ -27,8 +27,10 @@ from tdac_agent.tasks.task_file import (
     check_frame,
     read_task_file,
 )
+from tdac_agent.tasks.units import Units
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import printable
+from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose
 
 SENSORS_FILE = Path(__file__).parents[2] / "tdac_envs" / "controller_kit" / "sensors.py"
@@ -71,10 +73,19 @@ class Task:
         return self.setting.nominal
 
     @property
+    def progress_fraction(self) -> float:
+        """Share of the distance that may be left in the progress test."""
+        return self.spec.progress.fraction
+
+    @property
     def progress_steps(self) -> int:
         """Step limit of the progress test."""
-        default = max(MIN_PROGRESS_STEPS, math.ceil(0.16 * self.nominal.horizon))
-        return self.spec.progress.steps or default
+        return self.spec.progress.steps or progress_steps(self.nominal.horizon)
+
+    @property
+    def told_units(self) -> Units | None:
+        """Units of diagnoses for models; None for those of the environment."""
+        return None
 
     def with_profile(self, profile: Profile | None) -> Task:
         """Returns the task with another profile; None keeps its own.
@@ -106,6 +117,10 @@ class Task:
     def pictures(self) -> Pictures:
         """Returns an object that draws this task's episodes."""
         return self.environment.pictures(self.setting)
+
+    def seen(self, observation: Observation) -> Observation:
+        """An observation as a controller gets it."""
+        return self.setting.seen(observation)
 
     def start_check(self) -> Callable[[Pose], bool]:
         """Returns a function: whether an episode may begin at a feasible start.
@@ -150,6 +165,11 @@ class Task:
         """Returns the hash of all that determines an episode and the progress test."""
         facts = {**self.setting.facts(), "progress": self.spec.progress.model_dump()}
         return sha256_of_json(facts)
+
+
+def progress_steps(horizon: int) -> int:
+    """Default step limit of the progress test, for episodes of `horizon` steps."""
+    return max(MIN_PROGRESS_STEPS, math.ceil(0.16 * horizon))
 
 
 def read_task(

@@ -38,6 +38,7 @@ from tdac_agent.verification.judge.worlds import (
     TaskEpisodes,
     TaskWorld,
     Worlds,
+    public_split,
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
@@ -230,8 +231,8 @@ def _checked(run: EpisodeRun) -> tuple[Checks, str]:
         return Checks(results=results), job.tier
     assert isinstance(worlds, SetEpisodes)
     # A public world, so that a failure tells nothing of hidden ones.
-    public, own = ("dev", "test", "train"), worlds.worlds
-    split = next((s for s in public if worlds.tasks.count(s) != 0), own.split)
+    own = worlds.worlds
+    split = public_split(worlds.tasks) or own.split
     shown = own.model_copy(update={"split": split, "salt_file": None})
     # Here and not in a worker pool, so that its processes share what this loads.
     drive = partial(_drive, replace(run, worlds=shown.opened()), 0, CHECKED_STEPS)

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from tdac_agent.episodes.trajectory import Rollout
-from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.report import Episode
 from tdac_agent.verification.judge.jobs import Findings
 from tdac_agent.verification.judge.judge import NOMINAL, Judge, Key, rollout_key
+from tdac_agent.verification.judge.suite_episode import SuiteTask
 
 
 def driven(judge: Judge) -> list[Rollout]:
@@ -24,7 +24,10 @@ def driven(judge: Judge) -> list[Rollout]:
 
 
 def findings_of(
-    judge: Judge, expected: list[str], shown: Units | None = None
+    judge: Judge,
+    expected: list[str],
+    shown: Units | None = None,
+    checks: dict[str, str | None] | None = None,
 ) -> Findings:
     """The findings of a settled judge.
 
@@ -32,6 +35,7 @@ def findings_of(
         judge: The judge.
         expected: The tests that had to run.
         shown: Units that the user reads, if they are not the environment's.
+        checks: Static and contract tests on a task set.
     """
     task = judge.task
     rollouts = judge.rollouts
@@ -42,7 +46,7 @@ def findings_of(
         and (rollout.held_out or rollout.outcome not in ("reached", "stopped"))
     }
     diagnoses = {
-        key: diagnose(rollout, task.nominal).model_dump_json()
+        key: diagnose(rollout, task.nominal, task.told_units).model_dump_json()
         for key, rollout in failed.items()
     }
     texts = {} if shown is None else failed
@@ -57,6 +61,7 @@ def findings_of(
         tier=judge.tier,
         child_cpu_seconds=round(judge.cpu_seconds, 3),
         fault=judge.fault,
+        checks=checks or {},
     )
 
 
@@ -72,8 +77,8 @@ def _named(key: Key, rollouts: Mapping[Key, Rollout]) -> Rollout:
     return replace(rollout, name="run_episode")
 
 
-def _episode(rollout: Rollout, task: Task) -> Episode:
-    fraction, within = task.spec.progress.fraction, task.progress_steps + 1
+def _episode(rollout: Rollout, task: SuiteTask) -> Episode:
+    fraction, within = task.progress_fraction, task.progress_steps + 1
     figures = {}
     for kind, suffix in (("geodesic", ""), ("euclidean", "_euclidean")):
         distances = rollout.distances(kind)

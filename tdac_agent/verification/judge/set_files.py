@@ -1,4 +1,7 @@
-"""What a controller for a task set may read: the same in all worlds but for the map."""
+"""Files of a task set: for the judge, and what a controller may read.
+
+That is the same in all worlds but for the map.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,15 @@ from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import CpuSpec, DisturbanceSpec, SetFile
-from tdac_envs.ladder.task_sets import AnyTask
+from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
+
+
+def write_set(tasks: TaskSet, path: Path) -> Path:
+    """Writes the set file of a set, for other processes; returns its path."""
+    values = tasks.file.model_dump(mode="json", by_alias=True)
+    path.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
+    return path
 
 
 def write_files(folder: Path, file: SetFile, task: AnyTask) -> None:

@@ -37,6 +37,7 @@ from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.state import SPEED
 
 FOREVER = 1 << 62
+PUBLIC = ("dev", "test", "train")
 
 
 class Worlds(Protocol):
@@ -131,6 +132,11 @@ class SetWorlds(BaseModel):
             **folder,
         )
         return SetEpisodes(env, self)
+
+
+def public_split(tasks: TaskSet) -> str | None:
+    """A split whose worlds may be told of; None if a set has none."""
+    return next((name for name in PUBLIC if tasks.count(name) != 0), None)
 
 
 @dataclass(frozen=True, slots=True)

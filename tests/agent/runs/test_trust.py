@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from few_worlds import KNOWN, write_set
 from small import write_small_task
 
 from tdac_agent import load_task
@@ -39,6 +40,7 @@ from tdac_agent.tasks.task import display_name
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.trust import NotTrustedError, tree_sha256
 from tdac_agent.verification.verify import verify
+from tdac_envs import load_set
 
 TEST = "def test_own(rollout):\n    assert rollout('nominal').reached\n"
 
@@ -54,6 +56,27 @@ def made(tmp_path_factory, warm):
     run = synthesize(task, out=folder / "run", iterations=1, judge=warm)
     assert run.verified
     return run.folder
+
+
+@pytest.fixture(scope="module")
+def made_on_set(tmp_path_factory, warm):
+    """Such a run on a task set."""
+    folder = tmp_path_factory.mktemp("own")
+    few = load_set(write_set(folder / "few.yaml"))
+    (folder / "tests").mkdir()
+    (folder / "tests" / "test_own.py").write_text(TEST)
+    given = {"out": folder / "run", "suite": folder / "tests", "judge": warm}
+    few_episodes = {"episodes": 2, "feedback_episodes": 1, "start_from": KNOWN}
+    run = synthesize(few, "builtin", iterations=1, patience=0, **given, **few_episodes)
+    assert run.status == "selected"
+    assert run.suite_sha256
+    return run.folder
+
+
+@pytest.fixture
+def run_on_set(made_on_set, tmp_path):
+    """A copy of it, elsewhere."""
+    return Path(shutil.copytree(made_on_set, tmp_path / "elsewhere" / "moved"))
 
 
 @pytest.fixture
@@ -85,13 +108,28 @@ def test_own_folders_need_nothing(tdac, run):
     assert tdac("synth", "--resume", run)[0] == 0
 
 
+def test_own_folders_on_sets_need_nothing(tdac, run_on_set):
+    """Their tests are run again, and gone on with; a foreign one asks."""
+    code, out, err = tdac("verify", run_on_set, "-n", 1)
+    assert (code, err) == (0, "")
+    assert "tests of your own: all 1 passed" in out
+    assert tdac("synth", "--resume", run_on_set)[0] == 0
+    (run_on_set / "suite" / "test_own.py").write_text("raise SystemExit\n")
+    code, out, err = tdac("verify", run_on_set, "-n", 1)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert f"wants to run the tests in {run_on_set}/suite (sha256" in err
+
+
 @pytest.mark.slow
-def test_a_permission_holds_once(tdac, run):
+@pytest.mark.parametrize("ground", ["run", "run_on_set"])
+def test_a_permission_holds_once(tdac, request, ground):
     """`--suite` or `--trust`, which lists what it allows; nothing of it is kept."""
+    run = request.getfixturevalue(ground)
+    words = ("verify", run, *["-n", 1] * (ground == "run_on_set"))
     test = run / "suite" / "test_own.py"
     test.write_text(f"{TEST}\n\ndef test_more():\n    pass\n")
     before = {p: p.read_bytes() for p in run.rglob("*.*") if p.is_file()}
-    refused = tdac("verify", run)
+    refused = tdac(*words)
     assert (refused[0], refused[1]) == (2, "")
     assert refused[2].count("\n") == 1
     short = tree_sha256(run / "suite")[:12]
@@ -100,10 +138,10 @@ def test_a_permission_holds_once(tdac, run):
         f"wants to {wish}: allow it with --suite {run}/suite, or with --trust"
         in (refused[2])
     )
-    code, _, err = tdac("verify", run, "--trust")
+    code, _, err = tdac(*words, "--trust")
     assert (code, err) == (0, f"trusted for this command only: {run} may {wish}\n")
-    assert tdac("verify", run, "--suite", run / "suite")[0] == 0
-    assert tdac("verify", run) == refused
+    assert tdac(*words, "--suite", run / "suite")[0] == 0
+    assert tdac(*words) == refused
     assert {p: p.read_bytes() for p in run.rglob("*.*") if p.is_file()} == before
 
 

@@ -90,7 +90,7 @@ def test_a_level_without_a_built_in_controller(tdac, tmp_path):
         (("--set", "knwn"), "did you mean 'known'?"),
         (("--set", "known", "--task", "maze"), "leave out --task"),
         (("--set", "known", "--instructions", "x"), "leave out --instructions"),
-        (("--set", "known", "--suite", "x"), "leave out --suite"),
+        (("--set", "known", "--suite", "x"), "no suite 'x': no such folder"),
         (("--set", "known", "--episodes", "1"), "'--episodes'"),
         (("--set", "known", "--feedback-episodes", "0"), "'--feedback-episodes'"),
         (("--set", "known", "--prompt", "underspecified"), "is for a single task"),

@@ -99,7 +99,7 @@ def test_a_kept_confirmation_is_that_of_one_controller_and_number(
 
 
 def test_verify_tells_passed_from_verified(tdac, good, good_source, tmp_path):
-    """`--no-confirm` and `--paper` end at passed; a failed confirmation exits with 1."""
+    """`--no-confirm` and `--paper` end at passed; a failed confirmation exits 1."""
     file, junit = good / "controller.py", tmp_path / "junit.xml"
     for flag in ("--no-confirm", "--paper"):
         code, out, _ = tdac("verify", file, "--task", good, flag)
