@@ -1,19 +1,25 @@
 """Blind confirmations: what they accept, and that nobody can know their starts."""
 
-import json
 import xml.etree.ElementTree as ET
 
 import pytest
+from script import Script, code
 
-from tdac_agent.cli.main import main  # noqa: F401 - the `tdac` fixture runs it
+import tdac_agent
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.confirmation import (
     DISTURBANCE,
     confirm,
     confirming_seeds,
     kept_confirmation,
+    read_confirmation,
 )
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.verdict import confirmed_text, verified_text
+from tdac_agent.verification.verdict import (
+    confirmed_text,
+    delivered_text,
+    verified_text,
+)
 
 SOMETIMES = """
 
@@ -34,9 +40,35 @@ policy.seen = False
 """What makes a controller fail in a share of all drives, which its start decides."""
 
 
+UNLESS_IT_SLIPS = f"""
+
+import math
+
+_steer, _last, _first = policy, [], []
+
+
+def policy(obs):
+    pose, speeds = [float(v) for v in obs["pose"]], obs["wheel_speeds"]
+    mean = float(speeds[0] + speeds[1]) / 2
+    if _last and mean > 0.3:
+        moved = math.hypot(pose[0] - _last[0], pose[1] - _last[1]) / mean
+        _first.append(moved)
+        if abs(moved - _first[0]) > 0.005 * moved:
+            raise ValueError("it slipped")
+    _last[:] = pose
+    return _steer(obs)
+"""
+"""What makes a controller fail if its wheels slip, which no test of the suite does."""
+
+
 def failing(source, percent):
     """A controller that fails on purpose in so many percent of all drives."""
     return source + SOMETIMES.format(percent=percent)
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "run"
 
 
 def test_a_good_controller_is_confirmed(small_task, good_source, warm, tmp_path):
@@ -101,28 +133,70 @@ def test_a_kept_confirmation_is_that_of_one_controller_and_number(
 def test_verify_tells_passed_from_verified(tdac, good, good_source, tmp_path):
     """`--no-confirm` and `--paper` end at passed; a failed confirmation exits 1."""
     file, junit = good / "controller.py", tmp_path / "junit.xml"
+    file.write_text(good_source + UNLESS_IT_SLIPS)
+    words = ("verify", file, "--task", good)
     for flag in ("--no-confirm", "--paper"):
-        code, out, _ = tdac("verify", file, "--task", good, flag)
+        code, out, _ = tdac(*words, flag)
         assert code == 0
         assert "passed: " in out
         assert "verified" not in out
-    # A file that passes the suite, as the seed of its starts decides, may fail later.
-    file.write_text(failing(good_source, 40))
-    words = ("verify", file, "--task", good, "--seed", passing_seed(tdac, file, good))
     code, out, _ = tdac(*words, "--junit", junit)
     assert code == 1
-    assert "not verified: 2 of " in out
+    assert "not verified: 2 of 2 blind drives failed; at most 1 of 93 may" in out
     assert "replay the first of them: tdac play" in out
     cases = {case.get("name"): case for case in ET.parse(junit).iter("testcase")}
     assert cases["blind drives"].find("failure") is not None
-    code, out, _ = tdac(*words, "--json")
-    assert json.loads(out)["confirmation"]["successes"] >= 0
 
 
-def passing_seed(tdac, file, task):
-    """A seed of the suite with which a file that sometimes fails passes."""
-    for seed in range(200):
-        words = ("verify", file, "--task", task, "--no-confirm", "--seed", seed)
-        if tdac(*words)[0] == 0:
-            return seed
-    return pytest.fail("no seed found")
+def test_a_run_goes_on_after_a_failed_confirmation(small_task, good_source, warm, out):
+    """Its failures are told to the model; the next confirmation has more drives."""
+    model = Script(code(good_source + UNLESS_IT_SLIPS), code(good_source))
+    run = tdac_agent.synthesize(small_task, model, out=out, iterations=1, judge=warm)
+    assert (run.status, run.verified, run.passed) == ("verified", True, True)
+    assert [each.passed for each in run.confirmations] == [False, True]
+    assert run.confirmations[1].episodes == 125
+    assert [each.confirmed for each in run.attempts] == [False, True]
+    assert all(each.passed for each in run.attempts)
+    told = model.requests[1]
+    assert "All tests passed. Then it drove blind" in told.prompt
+    assert "it slipped" in told.prompt
+    assert read_confirmation(out).passed
+    assert delivered_text(run) == "in iteration 1 (2 candidates, 2 confirmations)"
+
+
+def test_a_run_that_is_never_confirmed(small_task, good_source, warm, out):
+    """It delivers what passed, and says what the blind drives showed."""
+    model = Script(code(good_source + UNLESS_IT_SLIPS))
+    once = {"iterations": 1, "patience": 0, "refine": False}
+    run = tdac_agent.synthesize(small_task, model, out=out, judge=warm, **once)
+    assert (run.status, run.verified, run.passed) == ("not verified", False, True)
+    assert run.reason == "2 of 2 blind drives failed; at most 1 of 110 may"
+    assert run.controller.is_file()
+
+
+def test_what_passed_is_confirmed_later(small_task, good_source, warm, out):
+    """By the same command without `--no-confirm`; nothing is asked or tested again."""
+    given = {"out": out, "iterations": 1, "judge": warm}
+    model = Script(code(good_source))
+    run = tdac_agent.synthesize(small_task, model, confirm=False, **given)
+    assert (run.status, run.confirmations) == ("passed", [])
+    run = tdac_agent.synthesize(small_task, model, **given)
+    assert (run.status, len(run.confirmations)) == ("verified", 1)
+    assert len(model.requests) == 1
+
+
+def test_a_forged_confirmation_is_not_believed(small_task, good_source, warm, out):
+    """A run that goes on drives again what it did not write itself."""
+    source = good_source + UNLESS_IT_SLIPS
+    given = {"out": out, "iterations": 1, "patience": 0, "refine": False, "judge": warm}
+    tdac_agent.synthesize(small_task, Script(code(source)), confirm=False, **given)
+    forged = out / "iterations" / "k01" / "j0" / "confirmation"
+    report = confirm(good_source, small_task, 1, out=forged, judge=warm)
+    seeds = confirming_seeds(source.encode(), small_task, 1)
+    facts = {"controller_sha256": sha256_of(source), "first": seeds.start}
+    about = report.provenance.model_copy(update=facts)
+    report = report.model_copy(update={"provenance": about})
+    (forged / "episodes.json").write_text(report.model_dump_json())
+    assert kept_confirmation(forged, source.encode(), small_task, 1) is not None
+    run = tdac_agent.synthesize(small_task, Script(), **given)
+    assert run.status == "not verified"
