@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tdac_agent.models.vendors import forms
 from tdac_agent.options import option
 
 if TYPE_CHECKING:
@@ -77,8 +78,8 @@ class SynthOptions:
     learner: str | Provider = option(
         "builtin",
         "Model that writes controllers: `builtin` (a template, no language model), "
-        "`anthropic:MODEL`, `openai:MODEL`, `command:PROGRAM`, `manual:DIR`, "
-        "`replay:RUN` or `scripted:SCRIPT`.",
+        f"{', '.join(forms(mark='`'))}, `command:PROGRAM`, `manual:DIR`, `replay:RUN` "
+        "or `scripted:SCRIPT`.",
         metavar="MODEL",
         panel=MODELS,
         type=str,
@@ -93,7 +94,7 @@ class SynthOptions:
     )
     base_url: str | None = option(
         None,
-        "Server of the `openai:` or `anthropic:` models (vLLM, Ollama, LM Studio, …), "
+        "Server of the models, instead of the vendor's (vLLM, Ollama, LM Studio, …), "
         "for example http://localhost:8000/v1.",
         metavar="URL",
         panel=MODELS,

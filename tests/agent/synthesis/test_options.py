@@ -29,7 +29,7 @@ def test_defaults_are_those_of_the_providers_and_the_record():
 
 def test_the_options_import_nothing_slow():
     """The command reads them when it starts."""
-    slow = "numpy", "pydantic", "jinja2", "tdac_envs", "tdac_agent.models"
+    slow = "numpy", "pydantic", "jinja2", "tdac_envs", "tdac_agent.models.provider"
     words = (
         "import sys, tdac_agent.synthesis.options;"
         f"print([each for each in {slow} if each in sys.modules])"
