@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field, JsonValue
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.budget import Enough
@@ -130,6 +130,9 @@ class Run(PrintableRecord):
     )
     then_verify: bool = Field(
         False, description="Whether the selected controller drives on hidden worlds."
+    )
+    options: dict[str, JsonValue] = Field(
+        {}, description="Options of the synthesis that have no field of their own."
     )
     agent: Agent = Field(
         "",
