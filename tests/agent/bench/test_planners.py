@@ -5,7 +5,7 @@ import json
 import pytest
 import yaml
 
-from tdac_agent.planners.names import PLANNERS, planner_names
+from tdac_agent.planners.names import FOLDER, PLANNERS, planner_names
 from tdac_agent.planners.planner import (
     TUNED,
     levels_of,
@@ -49,7 +49,7 @@ def test_dwa_arrives(warm):
 @pytest.mark.slow
 def test_values_on_record_are_of_this_file():
     """Known constants, within their ranges, on levels of the planner."""
-    tuned = json.loads(json.loads((FOLDER / TUNED).read_text())
+    tuned = json.loads((FOLDER / TUNED).read_text())
     for name, levels in tuned.items():
         assert set(levels) <= {*levels_of(name), "barn", "barn-slow"}
         for level, values in levels.items():
