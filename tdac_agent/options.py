@@ -33,7 +33,8 @@ class Flag:
         identity: Whether a run with another value is another run; a resumed run then
             has the recorded value, and no other.
         recorded: Whether the record of a run keeps the value as it is, which must then
-            be one of JSON.
+            be one of JSON. A resumed run takes it from the record, whoever made that;
+            so an option that a user has to permit must not be recorded here.
     """
 
     help: str

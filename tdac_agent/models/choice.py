@@ -241,7 +241,8 @@ def _check_url(url: str, named: Sequence[str]) -> None:
             f"--base-url is for {' and '.join(forms())}; no such model is used"
         )
     if len(kinds) > 1:
-        variables = [VENDORS[kind].base_url for kind in sorted(kinds & {*VENDORS})]
+        asked = sorted(kinds & {*VENDORS} or VENDORS)
+        variables = [VENDORS[kind].base_url for kind in asked]
         raise ProviderError(
             f"--base-url cannot be used for {' and '.join(sorted(kinds))} at once; set "
             f"{' or '.join(variables)} for one of them"

@@ -219,13 +219,13 @@ class SynthOptions:
         }
 
     @property
-    def counts(self) -> dict[str, int]:
-        """The least value of each whole number that is not the default."""
+    def least(self) -> dict[str, int]:
+        """The least value of each whole number whose value is not its default."""
         return {
             field.name: int(flag.least)
             for field, flag in _flags(self)
             if type(field.default) is int and flag.least is not None
-            if getattr(self, field.name) != field.default
+            if getattr(self, field.name) is not field.default
         }
 
     def restored(self, values: Mapping[str, Any]) -> SynthOptions:

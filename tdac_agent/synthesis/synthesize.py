@@ -155,7 +155,7 @@ def _check(wanted: SynthOptions, problem: Problem) -> None:
     Raises:
         TaskError: A number is out of range, or the problem cannot be used.
     """
-    for name, least in wanted.counts.items():
+    for name, least in wanted.least.items():
         whole_number(name, getattr(wanted, name), least)
     if problem.has_hidden:
         whole_number("episodes", wanted.episodes, 2, MOST_EPISODES)
