@@ -8,9 +8,9 @@ from typing import Literal
 
 import typer
 
-from tdac_agent.cli.options import json_option, out_option, tier_option
+from tdac_agent.cli.shared_options import json_option, out_option, tier_option
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 from tdac_agent.planners.names import planner_list
 
 bench_app = typer.Typer(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tdac_agent.models.vendors import forms
-from tdac_agent.options import Flag, flag_of, option
+from tdac_agent.option_fields import Flag, flag_of, option
 
 if TYPE_CHECKING:
     from tdac_agent.models.provider import Provider

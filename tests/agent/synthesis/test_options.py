@@ -17,7 +17,7 @@ from tdac_agent.cli import synth_flags
 from tdac_agent.cli.typed_options import typed_options
 from tdac_agent.errors import RunError
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.options import flag_of, option
+from tdac_agent.option_fields import flag_of, option
 from tdac_agent.runs.ownership import is_own_folder, load_task
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.synthesis import synthesize as synthesis
