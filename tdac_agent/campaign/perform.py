@@ -189,6 +189,7 @@ def _synthesize(
     folder.parent.mkdir(parents=True, exist_ok=True)
     limits = SET_LIMITS if problem.has_hidden else ()
     settings = {name: getattr(cell, name) for name in (*SETTINGS, *limits)}
+    settings |= dict(cell.options)
     return synthesize(
         problem,
         learner,

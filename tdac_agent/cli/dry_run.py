@@ -12,7 +12,8 @@ from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.models.budget import format_usd
 from tdac_agent.models.choice import Options, check_name, missing_for_name
 from tdac_agent.models.prices import SHIPPED, load_prices, price_file
-from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
+from tdac_agent.models.tariff import MAX_COST
+from tdac_agent.models.vendors import vendor_of
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 from tdac_agent.synthesis.options import SynthOptions
@@ -114,7 +115,7 @@ def _unbounded(forecast: CostForecast) -> list[str]:
     return [
         f"--max-tokens N, since no price of {name} is known to limit the run's cost"
         for name in forecast.unknown_prices
-        if name.partition(":")[0] in BY_VENDOR
+        if vendor_of(name) is not None
     ]
 
 

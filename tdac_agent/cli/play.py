@@ -16,9 +16,9 @@ from tdac_agent.cli.controller_choice import (
 )
 from tdac_agent.cli.display import has_display
 from tdac_agent.cli.film import film_of
-from tdac_agent.cli.options import NoiseFlags
 from tdac_agent.cli.play_flags import PlayOptions
 from tdac_agent.cli.printed import show_printed
+from tdac_agent.cli.shared_options import NoiseFlags
 from tdac_agent.cli.task_choice import check_scope, check_tier
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import require_flag, typed_fields

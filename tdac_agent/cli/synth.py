@@ -33,7 +33,7 @@ from tdac_agent.runs.resume import (
     resume_arguments,
     resume_line,
 )
-from tdac_agent.runs.run_record import AGENT, Run, load_run
+from tdac_agent.runs.run_record import AGENT, RUN_FILE, Run, load_run
 from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.synthesis.synthesize import synthesize
@@ -42,14 +42,9 @@ from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
 
 RECORDED = ("learner", "optimizer", "base_url", "max_cost", "max_tokens")
-ALLOWED = frozenset(
-    {"learner", "optimizer", "base_url", "key_over_http", "prompt", "suite", "seed"}
-)
-"""Flags that, given with --resume, permit a run from elsewhere to use their values."""
-WITH_RESUME = ALLOWED | {
-    *("resume", "max_cost", "max_tokens", "tier", "as_json", "trust"),
-    *("then_verify", "confirm"),
-}
+WITH_RESUME = frozenset({"resume", "trust", "as_json"})
+"""Flags of a run as a whole that may be given with --resume; options of the synthesis
+may unless they are part of the run's identity."""
 _EXIT = {"verified": 0, "passed": 0, "selected": 0, "budget": 4}
 
 
@@ -111,14 +106,15 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
     """Continues a run with its own settings; returns the exit code.
 
     Args:
-        options: Limits and tier may be new; others permit a run from elsewhere to use
-            its own values.
+        options: Limits and tier, among others, may be new; models, server, template and
+            seed permit a run from elsewhere to use its own values.
         run_flags: Folder of the run, and whether a run from elsewhere may run and
             contact all that it names.
         typed: Names of the flags on the command line.
     """
     assert run_flags.resume is not None
-    _refuse_others(typed, TaskFlags(), options, run_flags)
+    may = {each.name for each in fields(options)} - options.identity.keys()
+    _refuse_others(typed, WITH_RESUME | may, TaskFlags(), options, run_flags)
     before = load_run(run_flags.resume)
     if before.learner == AGENT:
         command = resume_line(before, run_flags.resume)
@@ -137,30 +133,39 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
         check_own(before)
         return _show(before, console, before=before)
     everything = _values(options)
-    known = {name: everything[name] for name in ALLOWED & set(typed)}
-    known |= {n: everything[n] for n in ("max_cost", "max_tokens", "tier")}
+    known = {name: everything[name] for name in may & set(typed)}
     check_ready_again(before, known)
     with console.status("preparing the task …"):
         wanted = resume_arguments(run_flags.resume, known, trust=run_flags.trust)
     problem, folder, index = (wanted.pop(n) for n in ("problem", "out", "index"))
-    settings = SynthOptions(then_verify=options.then_verify).changed(**wanted)
-    if "confirm" in typed:
-        settings = settings.changed(confirm=options.confirm)
+    settings = _restored(options, before).changed(**wanted)
     return write(problem, folder, settings, console, index)
+
+
+def _restored(options: SynthOptions, before: Run) -> SynthOptions:
+    """The options of a run that have no field of their own in its record.
+
+    Raises:
+        RunError: The record has an option that there is not.
+    """
+    try:
+        return type(options)().restored(before.options)
+    except ValueError as error:
+        raise RunError(f"{before.folder / RUN_FILE}: {error}") from error
 
 
 def _values(options: SynthOptions) -> dict[str, Any]:
     return {field.name: getattr(options, field.name) for field in fields(options)}
 
 
-def _refuse_others(typed: Collection[str], *options: Any) -> None:
+def _refuse_others(typed: Collection[str], may: Collection[str], *options: Any) -> None:
     """Refuses flags whose values --resume takes from the run folder.
 
     Raises:
         RunError: Such a flag is given; the message names it.
     """
     known = [field for each in options for field in fields(each)]
-    wrong = [each for each in known if each.name in set(typed) - WITH_RESUME]
+    wrong = [each for each in known if each.name in set(typed) - set(may)]
     if wrong:
         names = ", ".join(map(flag_name, wrong))
         raise RunError(f"--resume continues a run as it was begun: leave out {names}")

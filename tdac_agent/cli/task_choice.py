@@ -17,7 +17,7 @@ from tdac_agent.cli.task_changes import (
 )
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import flag_name, typed_fields
-from tdac_agent.options import flag_of
+from tdac_agent.option_fields import flag_of
 from tdac_agent.runs.ownership import load_set_problem, load_task
 from tdac_agent.sandbox import TIERS
 from tdac_agent.tasks.registry import environment_with_key

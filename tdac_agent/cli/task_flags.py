@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 TASK = "Bundled task (`maze`, `epuck`, …), task.yaml, or run folder"
 MAP_FILE = "Map image, ROS map.yaml, MovingAI .map, .npy grid"

@@ -30,7 +30,7 @@ from tdac_envs.core.errors import TaskError
 
 if TYPE_CHECKING:
     from tdac_agent.cli.driving_bar import DrivingBar
-    from tdac_agent.cli.options import NoiseFlags
+    from tdac_agent.cli.shared_options import NoiseFlags
     from tdac_agent.cli.task_flags import TaskFlags
     from tdac_agent.cli.verify_options import VerifyOptions
     from tdac_agent.tasks.task import Task

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from tdac_agent.cli.options import (
+from tdac_agent.cli.shared_options import (
     CONTROLLER,
     Profile,
     json_option,
@@ -17,7 +17,7 @@ from tdac_agent.cli.options import (
     trust_option,
 )
 from tdac_agent.cli.task_flags import SETS
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 ROBUST = "Robustness"
 

@@ -20,7 +20,8 @@ from tdac_agent.episodes.sb3_file import (
 )
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.controller_file import check_controller
-from tdac_agent.planners.planner import planner_names, planner_on
+from tdac_agent.planners.names import planner_names
+from tdac_agent.planners.planner import planner_on
 from tdac_agent.problems.episodes import episodes_of, planner_sha256
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.storage.hashes import sha256_of, sha256_of_file

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 
-from tdac_agent.html_report.scene import data_address
+from tdac_agent.html_report.figures import drawn
 from tdac_agent.metrics import (
     ASSUMPTIONS,
     Rate,
@@ -23,7 +22,7 @@ from tdac_agent.metrics import (
     summarise_sets,
 )
 from tdac_agent.metrics.table import KIND
-from tdac_agent.plots import figure_bytes, plot_cumulative_success, plot_success_rates
+from tdac_agent.plots import plot_cumulative_success, plot_success_rates
 from tdac_agent.runs.history import RunHistory
 
 MOST_CURVES = 8
@@ -136,11 +135,6 @@ def _figures(frames: RunFrames) -> tuple[tuple[str, str], ...]:
         ),
     }
     return tuple((name, drawn(figure)) for name, figure in figures.items())
-
-
-def drawn(figure: Figure) -> str:
-    """A figure as a data URL; browsers never run scripts in the SVG of an `<img>`."""
-    return data_address(figure_bytes(figure), "image/svg+xml")
 
 
 def format_seconds(seconds: float) -> str:

@@ -10,7 +10,8 @@ from typing import Any
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.animation import animations
-from tdac_agent.html_report.overview import drawn, format_seconds
+from tdac_agent.html_report.figures import drawn
+from tdac_agent.html_report.overview import format_seconds
 from tdac_agent.html_report.scene import TaskPicture, data_address
 from tdac_agent.html_report.set_part import set_part_of
 from tdac_agent.models.budget import format_usd

@@ -112,7 +112,7 @@ def open_session(
             run.episodes or 0, validation=0, explore=0, block=1, comparison=0
         )
         with WarmJudge(task=problem.task, watch=watch.poll) as judge:
-            terms = Terms(recorder, judge, TIER, parts, FEEDBACK_EPISODES)
+            terms = Terms(recorder, judge, parts, SynthOptions(tier=TIER))
             yield Session(problem, trials_of(problem, terms), watch)
 
 

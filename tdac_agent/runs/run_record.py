@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field, JsonValue
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.budget import Enough
@@ -154,6 +154,9 @@ class Run(PrintableRecord):
     )
     confirmations: list[Confirmation] = Field(
         default_factory=list, description="Of a task, in the order of their numbers."
+    )
+    options: dict[str, JsonValue] = Field(
+        {}, description="Options of the synthesis that have no field of their own."
     )
     agent: Agent = Field(
         "",

@@ -44,12 +44,6 @@ from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import TaskSet
 
-ALIKE = (
-    *("iterations", "patience", "candidates", "improve", "refine"),
-    *("base_url", "max_output"),
-)
-"""Options that the record of a run keeps as they are."""
-
 
 def synthesize(
     problem: Task | TaskSet | Problem,
@@ -128,16 +122,16 @@ def synthesize(
     account = account_of(models, before, *limits, budget)
     with hold_folder(out), ExitStack() as stack:
         before = existing_run(out)
-        if before is not None and _is_over(before, run):
+        if before is not None and _is_over(before, run, wanted):
             return before
         recorder = open_record(about, run, before, account, template, source, on_event)
         asking = account.budget, account.tariffs, retry or RetryPolicy()
-        calls = Calls(recorder, *asking, wanted.max_output)
+        calls = Calls(recorder, *asking, wanted)
         dialogue = Dialogue(about, *models, calls, book, template)
         dialogue.begin()
         warm = judge or stack.enter_context(WarmJudge(task=about.task))
-        parts, block = shares(run.episodes, wanted.improve), wanted.feedback_episodes
-        terms = Terms(recorder, warm, wanted.tier, parts, block)
+        parts = shares(run.episodes, wanted.improve)
+        terms = Terms(recorder, warm, parts, wanted)
         return _run(dialogue, trials_of(about, terms), source)
 
 
@@ -163,9 +157,8 @@ def _check(wanted: SynthOptions, problem: Problem) -> None:
     Raises:
         TaskError: A number is out of range, or the problem cannot be used.
     """
-    whole_number("iterations", wanted.iterations, 1)
-    whole_number("patience", wanted.patience, 0)
-    whole_number("candidates", wanted.candidates, 1)
+    for name, least in wanted.least.items():
+        whole_number(name, getattr(wanted, name), least)
     if problem.has_hidden:
         whole_number("episodes", wanted.episodes, 2, MOST_EPISODES)
         whole_number("feedback_episodes", wanted.feedback_episodes, 1, MOST_EPISODES)
@@ -183,10 +176,10 @@ def _recorded(
     before: Run | None,
 ) -> dict[str, Any]:
     """What the record of a run keeps of its options."""
-    facts = {name: getattr(wanted, name) for name in ALIKE}
+    kept = wanted.recorded("set" if problem.has_hidden else "task")
+    facts = {name: value for name, value in kept.items() if name in Run.model_fields}
+    facts["options"] = {n: value for n, value in kept.items() if n not in facts}
     if problem.has_hidden:
-        facts["episodes"] = wanted.episodes
-        facts["feedback_episodes"] = wanted.feedback_episodes
         known = before is not None and before.then_verify
         facts["then_verify"] = wanted.then_verify or known
     else:
@@ -194,9 +187,7 @@ def _recorded(
     # The worlds of a set, and the episodes of a search, follow from it.
     needed = problem.has_hidden or wanted.improve > 0
     facts["seed"] = settled_seed(wanted.seed, models[0], before, needed=needed)
-    facts["vision"] = checked_vision(
-        wanted.vision, models[1].name, wanted.patience, wanted.improve
-    )
+    checked_vision(wanted.vision, models[1].name, wanted.patience, wanted.improve)
     return facts
 
 
@@ -215,13 +206,13 @@ def _source(given: str | Path | None) -> str | None:
         raise ControllerFileError(message) from error
 
 
-def _is_over(before: Run, now: Run) -> bool:
+def _is_over(before: Run, now: Run, wanted: SynthOptions) -> bool:
     """Whether nothing is left to do; what passed or was selected may be verified later.
 
     Raises:
         RunError: It is another run, or one that this installation did not begin.
     """
-    check_same(before, now)
+    check_same(before, now, wanted.identity)
     later = {"selected": now.then_verify, "passed": now.confirm}
     over = before.finished and not later.get(before.status, False)
     if over:

@@ -149,8 +149,8 @@ def measured(
     """The odometry of one robot, shape (2,), or of many, shape (n, 2).
 
     Args:
-        state: `Robot.state`.
-        constants: `Robot.constants`.
+        state: The `state` of a robot, or of many.
+        constants: Their `constants`.
         noise: Factors of the noise, shape (2,) or (n, 2), or 1.0.
         limits: Of `odometry_limits`, shape (2,) or (n, 2).
     """

@@ -83,7 +83,7 @@ class DriveSetup:
         return self.variation != "nominal" or self.source is not None
 
     def constants(self) -> NDArray[np.float64]:
-        """`Robot.constants` of the nominal task."""
+        """The constants of a robot on the nominal task, as in `stepping`."""
         raise NotImplementedError
 
     def shared_constants(self, speed: float, reach: float, friction: float) -> Any:

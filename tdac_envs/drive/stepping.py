@@ -1,7 +1,7 @@
 """Parts of a compiled step shared by all environments: motion, reward, episode end.
 
 A robot's state is kept in a few arrays. The constants below are the indices of the
-entries that all environments have; `Map2DRobot` and `EPuckRobot` document them.
+entries that all environments have; `Map2DArrays` and `EPuckArrays` document them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _TWO_PI = 2.0 * math.pi
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Robot = TypeVar("Robot", bound=tuple[NDArray[Any], ...])
-"""The arrays of a robot: `Map2DRobot` or `EPuckRobot`."""
+"""The arrays of a robot: `Map2DArrays` or `EPuckArrays`."""
 
 # Entries of `constants`.
 AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)

@@ -42,7 +42,7 @@ class EPuckSetup(DriveSetup):
         return surroundings(task.ground, self.webots, self.goal_visible, reach)
 
     def constants(self) -> NDArray[np.float64]:
-        """`EPuckRobot.constants` of the nominal task."""
+        """`EPuckArrays.constants` of the nominal task."""
         task = self.nominal
         friction = task.ground.world.friction
         shared = self.shared_constants(task.max_wheel_speed, RANGE, friction)
@@ -51,7 +51,7 @@ class EPuckSetup(DriveSetup):
         return constants
 
     def enter(self, constants: NDArray[np.float64], task: EPuckTask) -> None:
-        """Sets what `EPuckRobot.constants` tells of the world of a task."""
+        """Sets what `EPuckArrays.constants` tells of the world of a task."""
         ground = task.ground
         constants[FRICTION] = ground.world.friction
         constants[FLOOR:] = (

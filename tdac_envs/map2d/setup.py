@@ -113,7 +113,7 @@ class Map2DSetup(DriveSetup):
                 return replace(drawn, movers=movers), noise
 
     def constants(self) -> NDArray[np.float64]:
-        """`Map2DRobot.constants` of the nominal task."""
+        """`Map2DArrays.constants` of the nominal task."""
         robot = self.nominal.robot
         own = robot.max_wheel_speed, robot.range_max, FRICTION
         return np.array(self.shared_constants(*own), np.float64)

@@ -23,6 +23,7 @@ from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
+from tdac_agent.synthesis.options import SynthOptions
 
 QUESTION = Request("generate", "What?", sample=(0, 1, 0), max_tokens=100)
 TARIFF = Tariff(price=Price(input=1000, output=1000))
@@ -67,7 +68,9 @@ def make(tmp_path):
         budget.restore({f"{run.id}/{call}": a for call, a in past.taken.items()})
         retry = RetryPolicy(first_wait=0.0)
         recorder = Recorder(run, past)
-        return Calls(recorder, budget, {"script": TARIFF}, retry, max_output=100)
+        return Calls(
+            recorder, budget, {"script": TARIFF}, retry, SynthOptions(max_output=100)
+        )
 
     return calls
 

@@ -21,7 +21,7 @@ from tdac_agent.models.prices import Price, PriceList
 from tdac_agent.models.provider import PermanentFault, Request
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.models.tariff import Tariff
-from tdac_agent.models.tokens import PICTURE_TOKENS
+from tdac_agent.models.tokens import picture_tokens
 from tdac_agent.runs.journal_state import call_key
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
@@ -245,7 +245,7 @@ def test_a_forecast_counts_the_pictures(vendor):
     edits, variations = 2 * 2, 4
     assert shown.pictures == edits + variations
     assert shown.questions == blind.questions
-    usd = PICTURE_TOKENS[vendor.partition(":")[0]] * PRICES.models[vendor].input / 1e6
+    usd = picture_tokens(vendor) * PRICES.models[vendor].input / 1e6
     assert shown.cost_once - blind.cost_once == pytest.approx(8 * usd)
     assert shown.cost_most - blind.cost_most == pytest.approx(3 * 8 * usd)
     assert shown.first_cost == blind.first_cost

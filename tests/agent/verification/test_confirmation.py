@@ -40,7 +40,7 @@ policy.seen = False
 """What makes a controller fail in a share of all drives, which its start decides."""
 
 
-UNLESS_IT_SLIPS = f"""
+UNLESS_IT_SLIPS = """
 
 import math
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from tdac_agent.cli.typed_options import typed_fields
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 from tdac_agent.synthesis.options import SUITE
 
 if TYPE_CHECKING:
