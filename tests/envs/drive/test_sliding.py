@@ -277,7 +277,8 @@ class TestAmongSolids:
         pytest.importorskip("pymunk")
         world = read_world(
             "#VRML_SIM R2023b utf8\nE-puck { }\n"
-            "Wall { translation 0.3 0 0 size 0.2 9 .1 }",
+            "Wall { translation 0.3 0 0 size 0.2 9 .1 }\n"
+            'Floor { contactMaterial "rubber" }',  # on which the tyres have a grip of 1
             goal=(-0.1, 0.0),
         )
         world = replace(world, contacts=(Contact(friction=friction),))
