@@ -319,8 +319,8 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             self._assign(i, task)
             self._noises[i] = None if noise is self._randoms[i] else noise
         if self._disturbances.hidden:
-            constants = self.robots.constants
-            self._disturbances.hide(robots.tolist(), constants, self._noise)
+            constants, chosen = self.robots.constants, robots.tolist()
+            self._disturbances.hide(chosen, self.tasks, constants, self._noise)
 
     def _assign(self, i: int, task: Any) -> None:
         self._tasks_change = True

@@ -52,8 +52,8 @@ from tdac_envs.epuck.gaps import listed_at, nearest_of, remaining_path
 from tdac_envs.epuck.infrared import in_sight, sense
 from tdac_envs.epuck.prisms import Array, Index
 
-WHEEL_RADIUS, AXLE_LENGTH = 0.02, 0.052
-"""Wheel radius of an e-puck and distance between its wheels, m."""
+WHEEL_RADIUS = 0.02
+"""Wheel radius of an e-puck, m."""
 MOST_TURNED = 1e4
 """Limit of the observed wheel angles, rad."""
 

@@ -21,10 +21,10 @@ class EPuckArrays(NamedTuple):
     `kernels._arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (29,), float64: axle length (m), full wheel speed (rad/s), dt
-            (s), body radius, sensor range (m), fraction of a wheel's speed that remains
-            after one step, delay (steps), whether a contact ends the
-            episode, distance of a step at full speed (m); reward weights: progress,
+        constants: Shape (29,), float64: effective axle (m), full wheel speed (rad/s),
+            dt (s), body radius, sensor range (m), fraction of a wheel's speed that
+            remains after one step, delay (steps), whether a contact ends the episode,
+            distance of a step at full speed (m); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (m), horizon (steps);
             coefficient of friction between body and solids; gains of the left and
             right wheel; scales of the measured distance and turn; relative radii of the

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.drive.setup import DriveSetup
-from tdac_envs.drive.stepping import FRICTION
+from tdac_envs.drive.stepping import AXLE, FRICTION
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import FLOOR, N_CONSTANTS
 from tdac_envs.epuck.nearby import NearbyParts, surroundings
@@ -53,6 +53,7 @@ class EPuckSetup(DriveSetup):
     def enter(self, constants: NDArray[np.float64], task: EPuckTask) -> None:
         """Sets what `EPuckArrays.constants` tells of the world of a task."""
         ground = task.ground
+        constants[AXLE] = task.axle_length
         constants[FRICTION] = ground.world.friction
         constants[FLOOR:] = (
             ground.floor,

@@ -11,7 +11,7 @@ from typing import ClassVar
 from tdac_agent.builtin.template import Remedy, Template, Tuned, tunable
 from tdac_agent.verification.diagnosis.report import Cause
 from tdac_agent.verification.suite.contract import time_step
-from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.epuck.task import EPuckTask
 
 # An e-puck with a plan gets stuck if its sensors falsely report an obstacle.
@@ -86,7 +86,7 @@ def template_for(task: EPuckTask) -> Template[EPuckParameters]:
     facts = {
         "time_step": time_step(task.dt),
         "wheel_radius": WHEEL_RADIUS,
-        "axle_length": AXLE_LENGTH,
+        "axle_length": task.axle_length,
         "max_wheel_speed": task.max_wheel_speed,
         "goal_tolerance": task.goal_tolerance,
     }
