@@ -3,6 +3,7 @@
 from tdac_agent.models.provider import Reply
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+AHEAD = "def policy(obs):\n    return 1.0, 1.0\n"
 NO_RULES = Reply("```json\n[]\n```")
 
 

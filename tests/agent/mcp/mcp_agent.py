@@ -20,7 +20,6 @@ from mcp_types import Implementation
 
 NAME = Implementation(name="scripted", version="7")
 TOKEN = "a-token-of-these-tests"
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 @dataclass

@@ -182,7 +182,7 @@ RUN = Run(
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=100)
 @given(st.data())
 def test_a_damaged_run(tmp_path_factory, data):
     """Whatever happened to a run.json: one clear line, or a run of that folder."""

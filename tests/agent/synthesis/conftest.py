@@ -3,13 +3,11 @@
 from dataclasses import dataclass, field
 
 import pytest
-from few_worlds import KNOWN, write_set
 from script import Script
 from small import write_small_task
 
 from tdac_agent import load_task, synthesize
 from tdac_agent.models.retry import RetryPolicy
-from tdac_envs import load_set
 
 ON_SET = {"episodes": 12, "feedback_episodes": 2, "seed": 3}
 
@@ -31,23 +29,6 @@ class Ground:
 def task(tmp_path):
     """The small task in the profile `policy`."""
     return load_task(write_small_task(tmp_path / "task", profile="policy"))
-
-
-@pytest.fixture
-def few(tmp_path):
-    """A set that `known.py` solves."""
-    return load_set(write_set(tmp_path / "few.yaml"))
-
-
-@pytest.fixture(scope="session")
-def solver():
-    """The source of a controller that reaches all goals of `few`."""
-    return KNOWN.read_text()
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run"
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 import yaml
+from script import STILL
 
 from tdac_agent.verification.store import (
     MARK,
@@ -17,7 +18,6 @@ from tdac_agent.verification.store import (
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 COUNT = 4
 
 
