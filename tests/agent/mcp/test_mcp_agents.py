@@ -5,7 +5,8 @@ import stat
 
 import pytest
 from few_worlds import KNOWN, half_of
-from mcp_agent import STILL, converse, journal, over_stdio, record
+from mcp_agent import converse, journal, over_stdio, record
+from script import STILL
 
 from tdac_agent import load_task
 from tdac_agent.environments.map2d.builtin import MapParameters, template_for

@@ -7,7 +7,8 @@ from urllib.parse import urlsplit
 
 import pytest
 from few_worlds import write_set
-from mcp_agent import STILL, TOKEN, Running, converse, over_http, record
+from mcp_agent import TOKEN, Running, converse, over_http, record
+from script import STILL
 
 
 @pytest.fixture(scope="module")

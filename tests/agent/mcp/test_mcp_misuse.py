@@ -9,7 +9,8 @@ from pathlib import Path
 
 import anyio
 import pytest
-from mcp_agent import STILL, converse, record, words
+from mcp_agent import converse, record, words
+from script import STILL
 
 SECONDS = 90
 

@@ -7,13 +7,13 @@ import anyio
 import pytest
 from few_worlds import write_set
 from mcp_agent import (
-    STILL,
     converse,
     journal,
     over_http,
     over_stdio,
     record,
 )
+from script import STILL
 
 SECONDS = 60
 SPIN = "def policy(obs):\n    return 0.3, -0.3\n"

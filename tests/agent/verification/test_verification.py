@@ -256,6 +256,7 @@ def test_wrong_actions_are_refused(answer):
     assert len(wrong_action(value)) < 200
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("answer", ["(float('nan'), 0.5)", "None"])
 def test_wrong_actions_fail(small_task, answer, warm):
     """A policy with such an answer fails in its first step, and is told why."""
@@ -266,7 +267,7 @@ def test_wrong_actions_fail(small_task, answer, warm):
     assert report.episodes[0].steps == 0
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     "answer",
     [
@@ -321,7 +322,7 @@ BROKEN = {
 }
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("name", BROKEN)
 def test_broken_files_fail(small_task, tmp_path, name, warm):
     """A file that is no controller fails with one clear line."""
