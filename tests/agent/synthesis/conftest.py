@@ -57,3 +57,14 @@ def write(out, warm):
         return model, synthesize(ground.problem, model, **given | ground.given | values)
 
     return run
+
+
+@pytest.fixture
+def improve(write):
+    """Runs that improve what works, with few episodes."""
+
+    def run(ground, model="builtin", **values):
+        few = {"seed": 3, "iterations": 6} if ground.is_task else {"episodes": 4}
+        return write(ground, model=model, **{"improve": 32} | few | values)[1]
+
+    return run

@@ -4,7 +4,6 @@ import json
 import shutil
 
 import pytest
-import yaml
 from script import STILL
 
 from tdac_agent.verification.store import (
@@ -22,15 +21,9 @@ COUNT = 4
 
 
 @pytest.fixture
-def problem(request, small_task, tmp_path):
+def problem(request, small_task, level):
     """A task, or a set of short episodes."""
-    if request.param == "task":
-        return small_task
-    short = {"factor": 1.0, "least": 40, "most": 40}
-    path = tmp_path / "few.yaml"
-    values = {"name": "few", "worlds": [{"name": "clutter"}], "horizon": short}
-    path.write_text(yaml.safe_dump(values))
-    return load_set(path)
+    return small_task if request.param == "task" else load_set(level)
 
 
 def drive(problem, out, warm, watch=None):
