@@ -31,3 +31,9 @@ class Script:
 
     def asked(self):
         return [(r.kind, *r.sample[1:]) for r in self.requests]
+
+
+class Paid(Script):
+    """A script whose answers cost tokens, as many as are reserved."""
+
+    paid = True

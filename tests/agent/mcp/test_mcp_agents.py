@@ -4,8 +4,9 @@ import os
 import stat
 
 import pytest
+from changed_run import journal
 from few_worlds import KNOWN, half_of
-from mcp_agent import converse, journal, over_stdio, record
+from mcp_agent import converse, over_stdio, record
 from script import STILL
 
 from tdac_agent import load_task

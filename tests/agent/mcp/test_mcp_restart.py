@@ -5,10 +5,10 @@ import time
 
 import anyio
 import pytest
+from changed_run import journal
 from few_worlds import write_set
 from mcp_agent import (
     converse,
-    journal,
     over_http,
     over_stdio,
     record,

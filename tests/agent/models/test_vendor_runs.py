@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from changed_run import journal
 from fault_server import ANTHROPIC, MODEL, OPENAI, PATHS, answers, begins, fails
 from script import STILL
 from small import write_small_task
@@ -28,10 +29,6 @@ def code(vendor, source):
 @pytest.fixture
 def task_file(tmp_path):
     return write_small_task(tmp_path / "task", profile="policy") / "task.yaml"
-
-
-def journal(folder):
-    return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from changed_run import journal
 from script import AHEAD, STILL
 from small import write_small_task
 
@@ -96,8 +97,7 @@ def check_life(folder):
     assert first.edits == (f"k=2: was {SLOW!r}",)
     assert "test_end_to_end.py::test_reaches_goal" in first.evidence
     assert (second.status, second.ended) == ("dropped", 2)
-    lines = (folder / "journal.jsonl").read_text().splitlines()
-    notes = [r["notes"] for r in map(json.loads, lines) if r["event"] == "rules"]
+    notes = [record["notes"] for record in journal(folder, "rules")]
     assert notes[0][2] == "not added: it repeats R2"
     assert "not added: it repeats R2, which was ended in k=2" in notes[2]
 

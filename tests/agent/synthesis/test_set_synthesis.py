@@ -7,7 +7,7 @@ import stat
 
 import pytest
 from few_worlds import KNOWN, half_of, write_set
-from script import AHEAD, NO_RULES, STILL, Script, code
+from script import AHEAD, NO_RULES, STILL, Paid, code
 
 from tdac_agent import synthesize
 from tdac_agent.errors import RunError
@@ -130,12 +130,6 @@ def test_no_question_without_episodes_for_its_answer(write, on_set):
 def selection_or_none(run):
     path = run.folder / "report.json"
     return selection(run.folder) if path.exists() else None
-
-
-class Paid(Script):
-    """A script whose answers cost tokens, as many as are reserved."""
-
-    paid = True
 
 
 FOR_ONE = 30_000

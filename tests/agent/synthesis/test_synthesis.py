@@ -8,7 +8,8 @@ import sys
 
 import pytest
 import script
-from script import AHEAD, NO_RULES, STILL, Script
+from changed_run import journal
+from script import AHEAD, NO_RULES, STILL, Paid, Script
 from small import write_small_task
 
 from tdac_agent import load_task, synthesize
@@ -27,14 +28,6 @@ GARBAGE = Reply("\n\n  lorem \x1b[31mipsum\n" + "dolor sit amet " * 99)
 
 def code(source):
     return script.code(source, tokens_in=10, tokens_out=5)
-
-
-class Paid(Script):
-    paid = True
-
-
-def journal(folder):
-    return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
 def halted(folder):

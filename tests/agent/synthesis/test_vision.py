@@ -9,6 +9,7 @@ from dataclasses import replace
 from datetime import date
 
 import pytest
+from changed_run import journal
 from PIL import Image
 from script import AHEAD, NO_RULES, Script, code
 from small import write_small_task
@@ -49,11 +50,6 @@ def seen(task, good_source, tmp_path_factory, warm):
     run = synthesize(task, model, out=out, seed=4, vision=True, judge=warm)
     assert run.verified
     return out, model
-
-
-def journal(folder, event):
-    lines = (folder / "journal.jsonl").read_text().splitlines()
-    return [each for each in map(json.loads, lines) if each["event"] == event]
 
 
 @pytest.mark.slow
