@@ -29,6 +29,13 @@ def small_task(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def policy_task(tmp_path_factory):
+    """The small task in the profile `policy`."""
+    folder = tmp_path_factory.mktemp("policy")
+    return load_task(write_small_task(folder, profile="policy"))
+
+
+@pytest.fixture(scope="session")
 def good_source(small_task):
     """A controller that is verified on the small task."""
     task = small_task

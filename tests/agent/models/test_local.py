@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 from script import STILL
-from small import write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault, ProviderError
@@ -33,12 +32,6 @@ from tdac_agent.synthesis.synthesize import synthesize
 from tdac_envs.core.extras import install_command
 
 QUESTION = Request("generate", "Wände? ÄÖ\n" * 20_000)
-
-
-@pytest.fixture(scope="module")
-def policy_task(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("task")
-    return load_task(write_small_task(folder, profile="policy"))
 
 
 @pytest.fixture

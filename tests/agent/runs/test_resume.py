@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 import yaml
 from script import NO_RULES, STILL, Script, code
-from small import write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
@@ -25,12 +24,6 @@ from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
-
-
-@pytest.fixture(scope="module")
-def policy_task(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("task")
-    return load_task(write_small_task(folder, profile="policy"))
 
 
 def events(folder, name):

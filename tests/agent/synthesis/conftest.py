@@ -4,9 +4,8 @@ from dataclasses import dataclass, field
 
 import pytest
 from script import Script
-from small import write_small_task
 
-from tdac_agent import load_task, synthesize
+from tdac_agent import synthesize
 from tdac_agent.models.retry import RetryPolicy
 
 ON_SET = {"episodes": 12, "feedback_episodes": 2, "seed": 3}
@@ -25,10 +24,9 @@ class Ground:
         return not self.given
 
 
-@pytest.fixture
-def task(tmp_path):
-    """The small task in the profile `policy`."""
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
+@pytest.fixture(scope="session")
+def task(policy_task):
+    return policy_task
 
 
 @pytest.fixture

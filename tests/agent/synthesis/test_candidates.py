@@ -11,7 +11,6 @@ import pytest
 from script import AHEAD, NO_RULES, STILL, code
 from small import write_small_task
 
-from tdac_agent import load_task
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.metrics import frames_of
@@ -64,7 +63,7 @@ def ask(write, on_task):
 
 
 @pytest.mark.slow
-def test_the_best_of_three_is_repaired(ask, good_source, tmp_path):
+def test_the_best_of_three_is_repaired(ask, task, good_source):
     """All are asked at the same time, and each is an iteration."""
     answers = {
         ("generate", 1, 0): code(RAISES),
@@ -89,7 +88,7 @@ def test_the_best_of_three_is_repaired(ask, good_source, tmp_path):
     frames = frames_of([run])
     assert frames.runs["done"].tolist() == [3]
     with pytest.raises(RunError, match="number of candidates 3 instead of 1"):
-        synthesize(load_task(tmp_path / "task"), model, out=run.folder, iterations=6)
+        synthesize(task, model, out=run.folder, iterations=6)
 
 
 def test_equal_answers_are_tested_once(ask, good_source):

@@ -79,7 +79,7 @@ def test_what_was_learnt_on_one_task_is_given_to_the_next(
     assert "given at the beginning" in said
     assert "given; more tests failed than before in" in said
     # Other rules make another run.
-    err = refused("synth", "--task", tmp_path / "task", "--out", tmp_path / "next")
+    err = refused("synth", "--task", task.folder, "--out", tmp_path / "next")
     assert "different given rules" in err
 
 

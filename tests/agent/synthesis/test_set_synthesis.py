@@ -23,6 +23,7 @@ def selection(folder):
     return Selection.model_validate_json((folder / "report.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_repaired_candidate_is_selected(write, on_set, solver, out, few):
     """The failure is told; all episodes count; a pass on dev is not `verified`."""
     model, run = write(on_set, code(STILL), code(solver))

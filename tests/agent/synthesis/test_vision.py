@@ -14,7 +14,6 @@ from PIL import Image
 from script import AHEAD, NO_RULES, Script, code
 from small import write_small_task
 
-from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.html_report import make_page
 from tdac_agent.models.picture import LARGEST_SIDE
@@ -32,13 +31,6 @@ from tdac_agent.synthesis.workload import rest_of
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 PLACE = "iterations/k01/j1"
-
-
-@pytest.fixture(scope="module")
-def task(tmp_path_factory):
-    return load_task(
-        write_small_task(tmp_path_factory.mktemp("task"), profile="policy")
-    )
 
 
 @pytest.fixture(scope="module")
