@@ -292,10 +292,9 @@ def test_no_help_names_a_python_type(tdac, command):
     )
 
 
-def test_the_grid_as_a_ros_map(tdac, tmp_path):
+def test_the_grid_as_a_ros_map(tdac, done, tmp_path):
     """It is the same map, and says its resolution, which somebody has to state."""
-    code, text, errors = tdac("map", "office", "--yaml", "--resolution", 0.05)
-    assert code == 0, errors
+    text = done("map", "office", "--yaml", "--resolution", 0.05)
     assert "office-map/map.yaml (0.05 m per px)" in text
     again = tdac("map", "office-map/map.yaml", "--json")
     cells = np.load("office-map/occupancy.npy")

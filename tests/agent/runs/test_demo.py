@@ -23,10 +23,9 @@ def recorded():
 
 
 @pytest.mark.slow
-def test_the_demo_is_the_recorded_run_with_live_tests(recorded, tdac):
+def test_the_demo_is_the_recorded_run_with_live_tests(recorded, done):
     """The same candidates fail and pass as when it was recorded; none is paid for."""
-    code, out, _ = tdac("demo", "--json")
-    assert code == 0
+    out = done("demo", "--json")
     run = json.loads(out)
     assert run["status"] == "verified"
     assert run["learner"] == "replay:demo"

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from changed_run import journal
 from damage import altered_json, torn
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -23,10 +24,6 @@ from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import Attempt, Run, load_run
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.synthesize import synthesize
-
-
-def journal(folder):
-    return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
 def test_each_call_is_on_record_before_and_after(
@@ -182,7 +179,7 @@ RUN = Run(
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=100)
 @given(st.data())
 def test_a_damaged_run(tmp_path_factory, data):
     """Whatever happened to a run.json: one clear line, or a run of that folder."""

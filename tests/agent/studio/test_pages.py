@@ -139,6 +139,7 @@ def open_plan(browser, plan):
     says(browser, "A path of")
 
 
+@pytest.mark.slow
 def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     """By clicks alone; the page shows the command, and the candidate drives."""
     open_plan(page, plan)
@@ -174,6 +175,7 @@ def test_no_request_leaves_this_machine(browser, page, studio):
             assert name.startswith((studio.base, "data:", "blob:")), name
 
 
+@pytest.mark.slow
 def test_a_goal_that_cannot_be_reached(page, plan):
     """The reason is shown, and nothing can be started."""
     open_plan(page, plan)
@@ -387,6 +389,7 @@ def test_the_map_is_beside_its_controls(page, studio):
     resize(page, "desktop")
 
 
+@pytest.mark.slow
 def test_a_map_and_what_was_found_are_in_sight(page, studio, tmp_path):
     """A tall one too, and on a phone, where the controls are below the map."""
     picture = np.full((900, 300), 255, np.uint8)

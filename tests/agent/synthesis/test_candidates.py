@@ -8,10 +8,9 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from script import NO_RULES, STILL, code
+from script import AHEAD, NO_RULES, STILL, code
 from small import write_small_task
 
-from tdac_agent import load_task
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.metrics import frames_of
@@ -23,7 +22,6 @@ from tdac_agent.synthesis.side_by_side import side_by_side
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import whole
 
-BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
 RAISES = "def policy(obs):\n    raise ValueError\n"
 
 
@@ -65,11 +63,11 @@ def ask(write, on_task):
 
 
 @pytest.mark.slow
-def test_the_best_of_three_is_repaired(ask, good_source, tmp_path):
+def test_the_best_of_three_is_repaired(ask, task, good_source):
     """All are asked at the same time, and each is an iteration."""
     answers = {
         ("generate", 1, 0): code(RAISES),
-        ("generate", 2, 0): code(BUMP),
+        ("generate", 2, 0): code(AHEAD),
         ("generate", 3, 0): code(STILL),
         ("edit", 2, 1): code(good_source),
         ("edit", 3, 1): code(good_source),
@@ -90,7 +88,7 @@ def test_the_best_of_three_is_repaired(ask, good_source, tmp_path):
     frames = frames_of([run])
     assert frames.runs["done"].tolist() == [3]
     with pytest.raises(RunError, match="number of candidates 3 instead of 1"):
-        synthesize(load_task(tmp_path / "task"), model, out=run.folder, iterations=6)
+        synthesize(task, model, out=run.folder, iterations=6)
 
 
 def test_equal_answers_are_tested_once(ask, good_source):
@@ -154,7 +152,7 @@ def test_a_fault_loses_no_answer_of_the_others(ask, good_source):
 def test_without_a_success_there_are_all_iterations(ask):
     """K = 6 in two groups; one edit and one summary each."""
     answers = {("generate", k, 0): code(f"{STILL}\nA = {k}\n") for k in range(1, 7)}
-    answers |= {("edit", k, 1): code(BUMP) for k in (1, 4)}
+    answers |= {("edit", k, 1): code(AHEAD) for k in (1, 4)}
     answers |= {("summarise", k, 1): NO_RULES for k in (1, 4)}
     model = Table(answers, together=3)
     run = ask(model)

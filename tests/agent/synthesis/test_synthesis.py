@@ -8,7 +8,8 @@ import sys
 
 import pytest
 import script
-from script import NO_RULES, STILL, Script
+from changed_run import journal
+from script import AHEAD, NO_RULES, STILL, Paid, Script
 from small import write_small_task
 
 from tdac_agent import load_task, synthesize
@@ -19,7 +20,6 @@ from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.verification.verify import verify
 from tdac_envs.core.errors import TaskError
 
-BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
 LEARNT = ("Drive towards the goal.", "Do not stand still.")
 OPERATIONS = [{"op": "add", "scope": "code", "text": text} for text in LEARNT]
 RULES = Reply(f"```json\n{json.dumps(OPERATIONS)}\n```", tokens_in=7)
@@ -28,14 +28,6 @@ GARBAGE = Reply("\n\n  lorem \x1b[31mipsum\n" + "dolor sit amet " * 99)
 
 def code(source):
     return script.code(source, tokens_in=10, tokens_out=5)
-
-
-class Paid(Script):
-    paid = True
-
-
-def journal(folder):
-    return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
 def halted(folder):
@@ -99,6 +91,7 @@ def test_an_interrupt_leaves_a_readable_run(write, ground, out):
         write(ground, iterations=3)
 
 
+@pytest.mark.slow_after(1)
 def test_a_given_controller_is_tried_first(write, ground, tmp_path):
     """`start_from` replaces the first answer of the learner; a path is read."""
     file = tmp_path / "given.py"
@@ -124,7 +117,7 @@ def test_the_budget_ends_a_run_that_more_tokens_continue(write, ground):
     _, run = write(ground, model=model, max_tokens=one, iterations=1)
     assert run.status == "budget"
     assert "--max-tokens" in str(run.enough)
-    model = Paid(code(BUMP), NO_RULES)
+    model = Paid(code(AHEAD), NO_RULES)
     _, run = write(ground, model=model, max_tokens=500_000, iterations=1)
     assert model.asked()[0] == ("edit", 1, 1)
     assert run.status == "not verified"

@@ -103,7 +103,7 @@ def test_ranges_equal_analytic_ray_and_square_intersections(scene):
     assert_exact(scene)
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(scenes())
 def test_ranges_equal_those_of_the_env(scene):
     """The controller's rays are the judge's rays, corner and border cases included."""

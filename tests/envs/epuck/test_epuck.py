@@ -9,6 +9,7 @@ import sys
 import gymnasium as gym
 import numpy as np
 import pytest
+from simple_policies import drive
 from world_texts import text
 
 from tdac_envs import TaskError, WorldError, bundled_worlds, read_world
@@ -31,15 +32,6 @@ def walled_env(thickness=0.002, **options):
     wall = f"Wall {{ translation 0.3 0 0 size {thickness} 0.4 0.1 }}"
     options = {"start": (0.0, 0.0, 0.0), "goal": (0.6, 0.0), **options}
     return open_env(wall, **options)
-
-
-def drive(env, action, steps=10_000):
-    """The last step of some with one action, up to the end of the episode."""
-    for _ in range(steps):
-        result = env.step(action)
-        if result[2] or result[3]:
-            break
-    return result
 
 
 def drive_square(env, axle, side):

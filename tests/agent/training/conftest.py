@@ -1,0 +1,12 @@
+"""Trainings in this process."""
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def threads():
+    """Training sets the number of threads of the whole process."""
+    torch = pytest.importorskip("torch")
+    before = torch.get_num_threads()
+    yield
+    torch.set_num_threads(before)
