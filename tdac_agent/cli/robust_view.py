@@ -47,6 +47,8 @@ def show_robust(
         f"{report.successes} of {report.count} episodes reached the goal without a "
         f"contact{f' ({others})' if others else ''}; they took {report.seconds:.0f} s"
     )
+    for line in report.gap_lines(units):
+        say(f"  {line}")
     if report.time_outs:
         say(
             f"[yellow]warning: {report.time_outs} of them timed out, also when retried "

@@ -15,7 +15,12 @@ from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
 from tdac_agent.runs.run_record import Status
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.archive import Archive, Member
-from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.candidates import (
+    Candidate,
+    Explored,
+    Result,
+    ToldEpisode,
+)
 from tdac_agent.synthesis.delivery import (
     compared,
     place_verified,
@@ -162,7 +167,7 @@ class SuiteTrials:
             failed=failure.failed,
             seed=report.provenance.seed,
             episodes=tuple(
-                (each.name, each.outcome, each.steps)
+                ToldEpisode(each.name, each.outcome, each.steps, each.smallest_gap)
                 for each in report.episodes
                 if not each.held_out and each.outcome != NOT_RUN
             ),
