@@ -15,7 +15,7 @@ from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
 from tdac_envs.epuck.task import EPuckTask
 
-RESERVE = 0.002
+RESERVE = 0.0025
 """Margin beyond the kept gap, m."""
 
 # An e-puck with a plan gets stuck if its sensors falsely report an obstacle.
