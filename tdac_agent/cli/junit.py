@@ -11,6 +11,7 @@ from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.verdict import confirmed_text
 
 if TYPE_CHECKING:
+    from tdac_agent.verification.diagnosis.gap import Gap
     from tdac_agent.verification.diagnosis.report import Report
     from tdac_agent.verification.episode_report import EpisodeReport
 
@@ -24,7 +25,11 @@ def write_junit(
     if confirmation is not None:
         told = None if confirmation.passed else confirmed_text(confirmation)
         cases["confirmation::blind drives"] = told
-    _write_cases(f"tdac {report.provenance.task}", cases, report.seconds, path)
+    title, gap = f"tdac {report.provenance.task}", report.smallest_gap
+    _write_cases(
+        title, cases, report.seconds, path, gap, report.provenance.unit,
+        len(report.too_close),
+    )  # fmt: skip
 
 
 def write_set_junit(report: EpisodeReport, path: Path) -> None:
@@ -42,7 +47,11 @@ def write_set_junit(report: EpisodeReport, path: Path) -> None:
     if report.sequential is not None:
         decision = report.sequential.decision
         cases[f"{split}::decision"] = None if decision == "accepted" else decision
-    _write_cases(f"tdac {report.provenance.name}", cases, report.seconds, path)
+    title, gap = f"tdac {report.provenance.name}", report.smallest_gap
+    _write_cases(
+        title, cases, report.seconds, path, gap, report.provenance.unit,
+        report.too_close,
+    )  # fmt: skip
 
 
 def _reason(test: str, told: tuple[str, ...]) -> str:
@@ -53,9 +62,18 @@ def _reason(test: str, told: tuple[str, ...]) -> str:
 
 
 def _write_cases(
-    title: str, cases: dict[str, str | None], seconds: float, path: Path
+    title: str,
+    cases: dict[str, str | None],
+    seconds: float,
+    path: Path,
+    gap: Gap | None,
+    unit: str,
+    too_close: int,
 ) -> None:
-    """Writes a JUnit XML file; a failed case has a message."""
+    """Writes a JUnit XML file; a failed case has a message.
+
+    The smallest gap and the number of episodes that came too close are properties.
+    """
     suite = ElementTree.Element(
         "testsuite",
         name=title,
@@ -63,6 +81,15 @@ def _write_cases(
         failures=str(sum(message is not None for message in cases.values())),
         time=str(seconds),
     )
+    if gap is not None:
+        told = {
+            f"smallest_gap_{unit}": gap.gap,
+            f"required_gap_{unit}": gap.required,
+            "too_close": too_close,
+        }
+        listed = ElementTree.SubElement(suite, "properties")
+        for name, value in told.items():
+            ElementTree.SubElement(listed, "property", name=name, value=str(value))
     for name, message in cases.items():
         file, _, test = name.partition("::")
         case = ElementTree.SubElement(suite, "testcase", classname=file, name=test)

@@ -48,6 +48,8 @@ def show_robust(
         f"{report.successes} of {report.count} episodes reached the goal without a "
         f"contact{f' ({others})' if others else ''}; they took {report.seconds:.0f} s"
     )
+    for line in report.gap_lines(units):
+        say(f"  {line}")
     if report.time_outs:
         say(_warning(report))
     if report.interval is not None and report.rate is not None:

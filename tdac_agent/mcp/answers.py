@@ -20,6 +20,10 @@ class EpisodeAnswer(BaseModel):
     name: str = Field(description="Its name, for `picture`.")
     outcome: str = Field(description="`reached`, `collision`, `out of time`, …")
     steps: int
+    gap: float | None = Field(
+        description="Smallest gap to obstacles, px or m; 0 with a contact."
+    )
+    too_close: bool = Field(description="Whether it is smaller than the required gap.")
 
 
 @dataclass(frozen=True, slots=True)

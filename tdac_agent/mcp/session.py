@@ -312,8 +312,14 @@ class Session:
             passed=self._passed(submission),
             summary=result.summary,
             episodes=[
-                EpisodeAnswer(name=name, outcome=outcome, steps=steps)
-                for name, outcome, steps in result.episodes
+                EpisodeAnswer(
+                    name=each.name,
+                    outcome=each.outcome,
+                    steps=each.steps,
+                    gap=None if (gap := each.smallest_gap) is None else gap.gap,
+                    too_close=gap is not None and gap.too_close,
+                )
+                for each in result.episodes
             ],
             submissions_left=left.submissions,
             episodes_left=left.episodes,

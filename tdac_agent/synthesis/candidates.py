@@ -6,14 +6,32 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
+from typing import NamedTuple
 
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.verification.diagnosis.gap import Gap
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
+
+
+class ToldEpisode(NamedTuple):
+    """What may be told of an episode.
+
+    Attributes:
+        name: Its name, or the number of its world.
+        outcome: How it ended.
+        steps: Its steps.
+        smallest_gap: Its smallest gap; None if it was not driven.
+    """
+
+    name: str
+    outcome: str
+    steps: int
+    smallest_gap: Gap | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +48,7 @@ class Result:
         unfit: Why it cannot be delivered; empty if it can.
         failed: What failed.
         seed: Seed of its jittered starts, if its tests had one.
-        episodes: Name, outcome and steps of the episodes that may be told.
+        episodes: The episodes that may be told.
         confirmed: Result of its blind confirmation; None without one.
     """
 
@@ -42,7 +60,7 @@ class Result:
     unfit: str = ""
     failed: tuple[str, ...] = ()
     seed: int | None = None
-    episodes: tuple[tuple[str, str, int], ...] = ()
+    episodes: tuple[ToldEpisode, ...] = ()
     confirmed: bool | None = None
 
     @property

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from tdac_agent.prompting.feedback import feedback_of
-from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.candidates import (
+    Candidate,
+    Explored,
+    Result,
+    ToldEpisode,
+)
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
@@ -28,7 +33,7 @@ def suite_result(report: Report) -> Result:
         failed=failure.failed,
         seed=report.provenance.seed,
         episodes=tuple(
-            (each.name, each.outcome, each.steps)
+            ToldEpisode(each.name, each.outcome, each.steps, each.smallest_gap)
             for each in report.episodes
             if not each.held_out and each.outcome != NOT_RUN
         ),

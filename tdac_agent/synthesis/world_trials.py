@@ -12,7 +12,12 @@ from tdac_agent.runs.selection_record import SELECTION_FILE
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import number_of
 from tdac_agent.synthesis.archive import Archive, Member
-from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.candidates import (
+    Candidate,
+    Explored,
+    Result,
+    ToldEpisode,
+)
 from tdac_agent.synthesis.delivery import compared, selection_of
 from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.hidden import hidden_report
@@ -157,7 +162,9 @@ class WorldTrials:
             unfit="" if worlds else "the static and contract tests refused it",
             failed=() if failure is None else failure.failed,
             episodes=tuple(
-                (str(each.index), each.outcome, each.steps)
+                ToldEpisode(
+                    str(each.index), each.outcome, each.steps, each.smallest_gap
+                )
                 for report in reports
                 for each in report.episodes
             ),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tdac_agent.tasks.units import Units
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
+from tdac_envs.drive.gap_search import GapWatch
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.plan import Path as Way
 
@@ -111,6 +112,13 @@ class JudgedEnv(Protocol):
 
     def discs(self) -> NDArray[np.float64]:
         """Returns the movers as they are now, shape (n, 3): x, y, radius (px or m)."""
+
+    def watch_gap(self) -> GapWatch:
+        """Returns a watch of the smallest gap in the episode that has just begun."""
+
+    @property
+    def required_gap(self) -> float:
+        """The gap to obstacles that the robot should keep, px or m."""
 
 
 class Params(Protocol):

@@ -15,7 +15,14 @@ from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
 from tdac_agent.metrics.rates import rate_of_runs
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.units import Place
+from tdac_agent.tasks.units import Place, Units
+from tdac_agent.verification.diagnosis.gap import (
+    TOO_CLOSE,
+    Gap,
+    closest,
+    gap_figure,
+    gap_text,
+)
 from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores, scores_of
 from tdac_agent.verification.judge.sequential import (
@@ -167,6 +174,15 @@ class EpisodeReport(StrictRecord):
         "hidden worlds.",
     )
     episodes: tuple[EpisodeRow, ...] = Field((), description="Empty for hidden worlds.")
+    smallest_gap: Gap | None = Field(
+        None, description="Of all episodes; of hidden worlds without its place."
+    )
+    closest: int | None = Field(
+        None, description="Number of the episode with it; None for hidden worlds."
+    )
+    too_close: int = Field(
+        0, description="Episodes that reached the goal with less than the required gap."
+    )
     sequential: SequentialResult | None = None
     child_cpu_seconds: float
     seconds: float
@@ -220,6 +236,26 @@ class EpisodeReport(StrictRecord):
         """Failures by time-out, which a busy machine may cause."""
         return self.causes.get("time-out", 0)
 
+    def gap_lines(self, units: Units) -> list[str]:
+        """What the episodes say of their gaps; nothing if none is on record.
+
+        The place is told on a task alone: worlds of a set have other coordinates than
+        a controller observes.
+
+        Args:
+            units: Units of the texts.
+        """
+        gap, on_set = self.smallest_gap, self.provenance.split is not None
+        if gap is None:
+            return []
+        text = f"smallest gap: {gap_text(gap, units, placed=not on_set)}"
+        if self.closest is not None:
+            text += f", {'world' if on_set else 'seed'} {self.closest}"
+        if not self.too_close:
+            return [text]
+        what = f"{self.too_close} of the successes came {TOO_CLOSE} to obstacles"
+        return [text, f"{what}: less than {gap_figure(gap.required, units)}"]
+
     @property
     def worst(self) -> tuple[EpisodeRow, ...]:
         """The worst episodes, the worst first."""
@@ -261,6 +297,7 @@ def summarise(
     if not told:
         groups = {name: own for name, own in groups.items() if len(own) >= LEAST_GROUP}
     scored = test is None and bool(episodes)
+    near = closest((each.number, each.smallest_gap) for each in episodes)
     texts = [each.text or f"{named(each)}: {each.error}" for each in failed]
     return EpisodeReport(
         provenance=provenance,
@@ -275,6 +312,9 @@ def summarise(
         causes=dict(Counter(cause_of(episode) for episode in failed).most_common()),
         told=checks.failures or (tuple(texts[:MOST_TOLD]) if told else ()),
         episodes=tuple(episodes) if told else (),
+        smallest_gap=None if near is None else near[1],
+        closest=near[0] if near is not None and told else None,
+        too_close=sum(each.too_close for each in episodes),
         sequential=None if test is None else result_of(test, episodes),
         child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),
         seconds=round(seconds, 3),

@@ -17,6 +17,7 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.drive.disturbances import Disturbances, Random
 from tdac_envs.drive.rewards import RewardWeights
+from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.drive.stepping import UNDISTURBED
 from tdac_envs.drive.task import (
     VARIATIONS,
@@ -81,6 +82,11 @@ class DriveSetup:
     def varies(self) -> bool:
         """Whether the task may differ from episode to episode."""
         return self.variation != "nominal" or self.source is not None
+
+    @property
+    def required_gap(self) -> float:
+        """The gap to obstacles that the robot should keep, px or m."""
+        return required_gap(self.nominal.body_radius)
 
     def constants(self) -> NDArray[np.float64]:
         """The constants of a robot on the nominal task, as in `stepping`."""

@@ -33,6 +33,7 @@ from tdac_envs.drive.batching import (
 )
 from tdac_envs.drive.disturbances import BatchDisturbances
 from tdac_envs.drive.frames import frames_of
+from tdac_envs.drive.gap_search import GapWatch
 
 Observations = dict[str, NDArray[np.float32]]
 Actions = NDArray[np.float32]
@@ -265,6 +266,11 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
         """Adds observations that no kernel computes, and new noise for these robots."""
         raise NotImplementedError
+
+    def watch_gap(self, robot: int) -> GapWatch:
+        """A watch of a robot's smallest gap in the episode that has just begun."""
+        watch: GapWatch = self._first.watch_gap(self._addresses.words[robot])
+        return watch
 
     def _bind(self) -> None:
         """Collects the addresses of all arrays that the kernels read and write."""

@@ -24,6 +24,7 @@ from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.movables import Movables
 from tdac_envs.epuck.robot import EPuckArrays
 from tdac_envs.epuck.setup import EPuckSetup
+from tdac_envs.epuck.smallest_gap import note_gap
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
 
@@ -174,6 +175,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         "render_fps": 31,
     }
     readings = "ps"
+    _note_gap = staticmethod(note_gap)
 
     def __init__(
         self,

@@ -18,7 +18,7 @@ Observed = NDArray[np.float32]
 class EPuckArrays(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
-    `kernels._arrays_at` and the indices beside it follow the order of the fields.
+    `kernels.arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
         constants: Shape (29,), float64: effective axle (m), full wheel speed (rad/s),

@@ -29,6 +29,7 @@ from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.robot import Map2DArrays
 from tdac_envs.map2d.setup import Map2DSetup, override
+from tdac_envs.map2d.smallest_gap import note_gap, note_gap_among
 from tdac_envs.map2d.sonar import NOISE
 from tdac_envs.map2d.source import MapSource, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
@@ -399,6 +400,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.setup.sonar is not None:
             calls = [partial(self._then_listen, call) for call in calls]
         self._call_begin, self._call_drive = calls
+        self._note_gap = note_gap_among if among else note_gap
         robot = self.robot
         seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
         self._copies = [array.copy for array in seen]

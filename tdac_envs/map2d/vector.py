@@ -10,6 +10,7 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.gap_search import GapWatch
 from tdac_envs.drive.stepping import row_of
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
 from tdac_envs.grid.map_units import MapFrame, MapUnits
@@ -92,6 +93,16 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     def step_rows(self) -> Callable[..., None]:  # type: ignore[override]
         """The compiled loop over robots."""
         return step_rows_among if self._among else step_rows
+
+    def watch_gap(self, robot: int) -> GapWatch:
+        """A watch of a robot's smallest gap in the episode that has just begun.
+
+        Raises:
+            ValueError: There are movers, whose motion in a step a batch does not keep.
+        """
+        if self.setups[robot].has_movers:
+            raise ValueError("the gap to movers needs a single environment")
+        return super().watch_gap(robot)
 
     def movers(self, i: int) -> Movers:
         """The movers of robot i in the current step; only to be read."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
+from tdac_agent.verification.diagnosis.nearest import gap_of
 from tdac_agent.verification.diagnosis.report import Episode
 from tdac_agent.verification.judge.jobs import Findings
 from tdac_agent.verification.judge.judge import NOMINAL, Judge, Key, rollout_key
@@ -95,5 +96,6 @@ def _episode(rollout: Rollout, task: SuiteTask) -> Episode:
         call_ms_mean=round(rollout.call_ms[0], 3),
         call_ms_p99=round(rollout.call_ms[1], 3),
         error=rollout.error,
+        smallest_gap=gap_of(rollout, task.nominal),
         **figures,
     )
