@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -68,19 +68,20 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
     | `odometry` | (2,) | px, rad | motion in the last step, with `odometry=True` |
 
-    Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
-    heading: `ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost.
-    Rays start at the centre; no hit gives `range_max`.
+    Ray i points at `ray_angles[i]` from the heading (rad; also in `params.json`). An
+    even fan goes from the robot's left to its right: ray i at
+    `-field_of_view/2 + i * field_of_view/(n_rays - 1)`, and of a full circle, which
+    begins behind the robot, at `-180° + i * 360°/n_rays`. Rays start at the centre; no
+    hit gives `range_max`.
 
     ## In metres
     With `frame="metres"`, for maps with a resolution (ROS `map.yaml`), all places,
     lengths and speeds of arguments, options, observations, `info` and pictures are in
     metres, in the frame of the map: the outer corner of the lower-left pixel is at the
     `origin` of the map, and without a rotation of this origin, x points right and y
-    points up. Headings and turns, also that of `odometry`, are counter-clockwise. The
-    simulation is the same to the bit. `ranges[0]` still is the robot's leftmost ray:
-    ray i points at `field_of_view/2 - i * field_of_view/(n_rays - 1)`.
-    `pose()` and `discs()` stay in px.
+    points up. Headings, `ray_angles` and turns, also that of `odometry`, are
+    counter-clockwise. The simulation is the same to the bit, and the rays keep their
+    order. `pose()` and `discs()` stay in px.
 
     ## Movers
     With `movers`, discs move about: they follow routes, bounce off walls, or walk in a
@@ -161,7 +162,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         max_wheel_speed: Wheel speed at action 1, px/s. The default of images, 75.59,
             is the paper's 0.02 m/s at 3779.52 px/m.
         n_rays: Number of range rays.
-        field_of_view: Angle between the first and the last ray, degrees.
+        field_of_view: Angle between the first and the last ray, degrees; 360 for a
+            full circle of rays that are 360°/n_rays apart.
         range_max: Largest range, px; observed if a ray hits nothing.
         dt: Duration of a step, s.
         horizon: Steps before truncation. Default: max(2500, 6 * d0 / (max_wheel_speed *
@@ -198,6 +200,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             the defaults, half as fast as the robot and as large.
             `tdac_envs.movers.spec` has all keys.
         frame: `"pixels"` or `"metres"`; see In metres.
+        ray_angles: Directions of the rays from the heading, rad, in the order of
+            `ranges`, instead of `n_rays` and `field_of_view`. Default: an even fan.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -246,6 +250,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         polarity: Shade | None = None,
         movers: MoversOption = None,
         frame: FrameName = "pixels",
+        ray_angles: Sequence[float] | None = None,
         render_mode: str | None = None,
     ) -> None:
         units = units_of(map, frame)
@@ -260,6 +265,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             range_max=range_max,
             goal_tolerance=goal_tolerance,
             movers=read_specs(movers),
+            ray_angles=ray_angles,
         )
         prepared = prepare(
             map,
@@ -279,6 +285,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             n_rays=n_rays,
             field_of_view=field_of_view,
             range_max=given["range_max"],
+            ray_angles=given["ray_angles"],
         )
         assert params.start is not None
         assert params.goal is not None

@@ -278,9 +278,9 @@ def driving(move_body: Any) -> Any:
         """Runs one step of the environment; `state` already contains the wheel slip.
 
         `field`, shape (height, width), is the path length to the goal from each pixel,
-        px; `directions` are from `rays.fan`. `constants` and the arrays after it are
-        those of `Map2DArrays`. All of them are overwritten except `constants` and, in
-        `state`, the commands and the slip.
+        px; `directions` are from `rays.directions_of`. `constants` and the arrays after
+        it are those of `Map2DArrays`. All of them are overwritten except `constants`
+        and, in `state`, the commands and the slip.
         """
         before = outcome[REMAINING]
         apply_command(constants, state, queue, wheel_speeds, outcome)

@@ -24,7 +24,8 @@ def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
 
     Args:
         units: Units of the arguments.
-        **given: Lengths by name, `start`, `goal`, `heading` and `movers` (specs).
+        **given: Lengths by name, `start`, `goal`, `heading`, `ray_angles` and `movers`
+            (specs).
 
     Raises:
         TaskError: A value is not valid.
@@ -37,6 +38,10 @@ def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
     for name in LENGTHS:
         if given[name] is not None:
             own[name] = units.length_in_pixels(positive(name, given[name]))
+    if given["ray_angles"] is not None:
+        turns = given["ray_angles"]
+        angles = finite_numbers("ray_angles", turns, np.size(turns))
+        own["ray_angles"] = tuple(0.0 - angle for angle in angles)
     own["movers"] = movers_in_pixels(given["movers"], units)
     return own
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from tdac_envs.core.arguments import (
+    finite_numbers,
     non_negative,
     number_up_to,
     one_of,
@@ -21,7 +23,7 @@ from tdac_envs.drive.disturbances import Random
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.grid.map_units import MapFrame
 from tdac_envs.map2d.placing import MoversSetup
-from tdac_envs.map2d.rays import fan
+from tdac_envs.map2d.rays import directions_of
 from tdac_envs.map2d.robot import FRICTION
 from tdac_envs.map2d.sonar import Sonar
 from tdac_envs.map2d.task import Map2DTask
@@ -43,7 +45,7 @@ class Map2DSetup(DriveSetup):
         metric: Frame in whose metres the robot observes; None for pixels.
         sensor: `"rays"` or `"sonar"`.
         sonar: The sonars; None with rays.
-        directions: Directions of the rays, from `rays.fan`.
+        directions: Directions of the rays, from `rays.directions_of`.
         movers_setup: The movers, checked on the map.
     """
 
@@ -64,12 +66,11 @@ class Map2DSetup(DriveSetup):
         object.__setattr__(self, "range_noise", noise)
         object.__setattr__(self, "range_dropout", dropout)
         robot = self.nominal.robot
-        view = np.radians(robot.field_of_view_deg)
-        object.__setattr__(self, "directions", fan(float(view), robot.n_rays))
+        object.__setattr__(self, "directions", directions_of(robot.angles()))
         one_of("sensor", self.sensor, ("rays", "sonar"))
         sonar = None
         if self.sensor == "sonar":
-            sonar = Sonar(float(view), robot.n_rays, robot.range_max)
+            sonar = Sonar(robot.angles(), robot.range_max)
         object.__setattr__(self, "sonar", sonar)
         movers_setup = MoversSetup.of(self.movers, self.nominal)
         object.__setattr__(self, "movers_setup", movers_setup)
@@ -124,13 +125,20 @@ class Map2DSetup(DriveSetup):
         return terrain.leaps, terrain.padded_clear, task.field, self.directions
 
 
-def override(robot: RobotParams, **given: float | None) -> RobotParams:
+def override(
+    robot: RobotParams, ray_angles: Sequence[float] | None = None, **given: float | None
+) -> RobotParams:
     """The robot with the options that are not None.
+
+    Angles of rays determine their number.
 
     Raises:
         TaskError: An option is not valid.
     """
-    changes: dict[str, float] = {}
+    changes: dict[str, Any] = {}
+    if ray_angles is not None:
+        angles = finite_numbers("ray_angles", ray_angles, np.size(ray_angles))
+        changes = {"ray_angles": angles, "n_rays": len(angles)}
     for name, value in given.items():
         if value is None:
             continue
@@ -140,8 +148,10 @@ def override(robot: RobotParams, **given: float | None) -> RobotParams:
             key = "field_of_view_deg" if name == "field_of_view" else name
             changes[key] = positive(name, value)
     try:
-        return RobotParams.model_validate({**robot.model_dump(), **changes})
+        return robot.changed(**changes)
     except ValidationError as error:
         first = error.errors()[0]
+        if not first["loc"]:
+            raise TaskError(first["msg"].removeprefix("Value error, ")) from None
         name = str(first["loc"][0]).removesuffix("_deg")
         raise TaskError(f"{name} {first['input']!r}: {first['msg']}") from None

@@ -172,7 +172,7 @@ def _with_task(prepared: Prepared, given: _TaskOptions) -> Prepared:
     robot, radius = prepared.params.robot, given.robot_radius
     if radius is not None and radius != robot.radius:
         body = {"radius": radius, "axle_length": 2 * radius}
-        changes["robot"] = RobotParams(**{**robot.model_dump(), **body})
+        changes["robot"] = robot.changed(**body)
     params = prepared.params.model_copy(update=changes)
     missing = [name for name in ("start", "goal") if getattr(params, name) is None]
     if missing:

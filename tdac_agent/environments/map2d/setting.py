@@ -129,8 +129,10 @@ class Map2DSetting:
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's `Map2DEnv`."""
         nominal, robot = self.nominal, self.nominal.robot
+        angles = robot.ray_angles
         return {
             **as_option(self.movers),
+            **({} if angles is None else {"ray_angles": angles}),
             "map": nominal.terrain.grid.cells,
             "start": tuple(nominal.start),
             "goal": nominal.goal,
@@ -334,8 +336,7 @@ def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
     values = spec.model_dump(exclude={"radius", "image"}, exclude_none=True)
     fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
     changes = {fields.get(key, key): value for key, value in values.items()}
-    robot = RobotParams(**{**params.robot.model_dump(), **changes})
-    return params.model_copy(update={"robot": robot})
+    return params.model_copy(update={"robot": params.robot.changed(**changes)})
 
 
 def _feasible(

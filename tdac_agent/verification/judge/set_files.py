@@ -46,7 +46,7 @@ def write_as_level(folder: Path, task: Task) -> None:
         raise TaskError(f"the task {task.name!r} is not on a map")
     facts = {
         "schema_version": 1,
-        "robot": nominal.robot.model_dump(),
+        "robot": nominal.robot.written(),
         "dt": nominal.dt,
         "goal_tolerance": nominal.goal_tolerance,
         "observed": ["pose", "goal", "wheel_speeds", "ranges"],
@@ -68,7 +68,7 @@ def level_params(file: SetFile) -> dict[str, Any]:
         sizes = {"kind": robot.kind, **robot.sizes}
         disturbances |= robot.errors
     else:
-        sizes = robot.model_dump()
+        sizes = robot.written()
     return {
         "schema_version": 1,
         "robot": sizes,
