@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tdac_agent.tasks.units import Units
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.task import Pose, radii_text
 from tdac_envs.grid.plan import Path as Way
 
 
@@ -71,6 +71,13 @@ class Nominal(Protocol):
 
     def jittered(self, random: np.random.Generator) -> Pose:
         """Returns a random feasible start of the jitter variation."""
+
+
+def tolerance_text(setting: Setting) -> str:
+    """Formats the goal tolerance of a setting: `0.2 m (1.0 radii)`."""
+    own = setting.nominal
+    length = setting.length_text(own.goal_tolerance)
+    return f"{length} ({radii_text(own.goal_tolerance, own.body_radius)})"
 
 
 class JudgedEnv(Protocol):

@@ -17,7 +17,7 @@ from tdac_agent.tasks.environment import Environment
 from tdac_agent.tasks.first_run import compile_first
 from tdac_agent.tasks.parts import Pictures
 from tdac_agent.tasks.registry import environment, own_environments
-from tdac_agent.tasks.setting import JudgedEnv, Nominal, Params, Setting
+from tdac_agent.tasks.setting import JudgedEnv, Nominal, Params, Setting, tolerance_text
 from tdac_agent.tasks.task_file import (
     TASK_FILE,
     Profile,
@@ -200,8 +200,8 @@ def display_name(task: Task) -> str:
         name = f"{alias}, changed"
     elif name in bundled_tasks():
         name += ", not the bundled one"
-    tolerance = setting.length_text(task.nominal.goal_tolerance)
-    return f"{name} (map {setting.world_sha256()[:8]}, goal within {tolerance})"
+    near = tolerance_text(setting)
+    return f"{name} (map {setting.world_sha256()[:8]}, goal within {near})"
 
 
 @functools.cache

@@ -151,7 +151,7 @@ def check_frame(frame: FrameName, profile: Profile) -> None:
     if frame == "metres" and profile == "paper":
         raise TaskError(
             "profile: the functions of the profile `paper` use pixels; in metres "
-            "(`frame`), give the profile `policy`"
+            "(`frame`), give the profile `policy`, or the frame `pixels`"
         )
 
 

@@ -19,7 +19,7 @@ from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import place
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.task import Pose, with_tolerance_note
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.among import begin_among, drive_among
 from tdac_envs.map2d.kernels import begin, drive, drive_or_slide
@@ -82,6 +82,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     points up. Headings, `ray_angles` and turns, also that of `odometry`, are
     counter-clockwise. The simulation is the same to the bit, and the rays keep their
     order. `pose()` and `discs()` stay in px.
+
+    Maps with a resolution have defaults in metres, also with `frame="pixels"`: 0.5 m/s,
+    ranges up to 3.5 m, and a goal tolerance of a body radius. Their `robot_radius` has
+    no default.
 
     ## Movers
     With `movers`, discs move about: they follow routes, bounce off walls, or walk in a
@@ -157,19 +161,21 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         start: (x, y) or (x, y, heading), px and rad. Default: the map's own.
         goal: (x, y), px. Default: the map's own.
         heading: Nominal start heading, rad; overrides that of `start`.
-        robot_radius: Radius of the body, px.
+        robot_radius: Radius of the body, px. Default: the map's own, else 15; a map
+            with a resolution needs one.
         axle_length: Distance between the wheels, px. Default: twice the radius.
         max_wheel_speed: Wheel speed at action 1, px/s. The default of images, 75.59,
-            is the paper's 0.02 m/s at 3779.52 px/m.
+            is the paper's 0.02 m/s at 3779.52 px/m; with a resolution it is 0.5 m/s.
         n_rays: Number of range rays.
         field_of_view: Angle between the first and the last ray, degrees; 360 for a
             full circle of rays that are 360°/n_rays apart.
-        range_max: Largest range, px; observed if a ray hits nothing.
+        range_max: Largest range, px; observed if a ray hits nothing. The default of
+            images is 220; with a resolution it is 3.5 m.
         dt: Duration of a step, s.
         horizon: Steps before truncation. Default: max(2500, 6 * d0 / (max_wheel_speed *
             dt)), where d0 is the length of the shortest grid path, px.
         goal_tolerance: Distance at which the goal is reached, px. Default:
-            min(20, d0 / 4).
+            min(20, d0 / 4), on a map with a resolution min(robot_radius, d0 / 4).
         on_collision: `"terminate"` or `"block"`; see Episode End.
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`; see Starting State.
         sensor: `"rays"`, which are exact, or `"sonar"`: a range is the nearest echo in
@@ -205,7 +211,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: Initial version. `on_collision="block"` changed before the first release.
+    * v0: Initial version. Before the first release, `on_collision="block"` changed,
+      rays of a full circle became 360°/n apart, and maps with a resolution got
+      defaults in metres.
     """
 
     title = "TDAC-Map2D-v0"
@@ -322,7 +330,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             metric=units.frame,
             sensor=sensor,
         )
-        self.params = params
+        notes = with_tolerance_note(params.notes, nominal, units.length)
+        self.params = params.model_copy(update={"notes": notes})
         self._prepare(setup, render_mode)
 
     @classmethod

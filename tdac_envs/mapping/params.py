@@ -28,6 +28,13 @@ from tdac_envs.mapping.ray_angles import fan
 PIXELS_PER_METRE = 3779.52
 """Pixels per metre of the paper's 2-D setting (96 dpi)."""
 
+METRIC_RADIUS = 0.2
+"""Body radius for which a map with a resolution is read without a task, m."""
+METRIC_SPEED = 0.5
+"""Default wheel speed limit where metres are known, m/s."""
+METRIC_RANGE = 3.5
+"""Default largest range where metres are known, m."""
+
 Place = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 """A coordinate."""
 Length = Annotated[float, Field(gt=0, ge=SMALLEST, le=LARGEST)]
@@ -137,14 +144,26 @@ class RobotParams(StrictModel):
         return RobotParams.model_validate({**own, **changes})
 
     @classmethod
-    def disc(cls, radius: float) -> RobotParams:
+    def disc(cls, radius: float, resolution: float | None = None) -> RobotParams:
         """The default robot with another body radius and an axle of 2 x radius.
+
+        Args:
+            radius: Body radius, px.
+            resolution: Metres per pixel, if known: speed and range then are
+                `METRIC_SPEED` and `METRIC_RANGE`, and not those of the paper.
 
         Raises:
             TaskError: The radius is not positive, or too large.
         """
         radius = positive("robot_radius", radius)
-        return cls(radius=radius, axle_length=2 * radius)
+        if resolution is None:
+            return cls(radius=radius, axle_length=2 * radius)
+        return cls(
+            radius=radius,
+            axle_length=2 * radius,
+            max_wheel_speed=METRIC_SPEED / resolution,
+            range_max=METRIC_RANGE / resolution,
+        )
 
 
 class ScoreTerms(StrictModel):

@@ -17,6 +17,7 @@ from tdac_agent.tasks.units import METRES, Units
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
+from tdac_envs.drive.task import with_tolerance_note
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import TABLE
@@ -211,7 +212,8 @@ def _setting(
     )
     text = write_world(flat)
     digest = sha256_of(text)
-    params = params_of(nominal, file.name, digest, world.notes)
+    notes = with_tolerance_note(world.notes, nominal, METRES.length_text)
+    params = params_of(nominal, file.name, digest, notes)
     return EPuckSetting(params, nominal, text, file, left_out)
 
 

@@ -9,6 +9,7 @@ from tdac_agent.environments.map2d.setting import Map2DSetting, map_setting
 from tdac_agent.prompting.manual import interface_of, needed_part
 from tdac_agent.prompting.params_text import params_text
 from tdac_agent.tasks.task import SENSORS_FILE, Task
+from tdac_envs.drive.task import radii_text
 from tdac_envs.map2d.terrain import widest_connected_radius
 
 HOW_THE_MAP_WAS_MADE = {
@@ -56,6 +57,7 @@ def facts_of(task: Task) -> dict[str, Any]:
         "width": grid.width,
         "height": grid.height,
         "tolerance": nominal.goal_tolerance,
+        "tolerance_radii": radii_text(nominal.goal_tolerance, nominal.body_radius),
         "radius": nominal.body_radius,
         "sensors_text": needed_part(
             SENSORS_FILE.read_text(encoding="utf-8"),  # raw read: shipped

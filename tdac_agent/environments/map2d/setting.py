@@ -15,7 +15,7 @@ from tdac_agent.tasks.units import PIXELS, Units
 from tdac_envs.core.errors import MapError, RefusedError, TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.task import Pose, with_tolerance_note
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS as MAP_PIXELS
 from tdac_envs.grid.map_units import MapUnits
@@ -180,7 +180,10 @@ class Map2DSetting:
         shown = grid.cells if self.image is None else self.image
         path = self.nominal.shortest_path(self.nominal.start)
         image = as_image(shown)
-        return preview_of(image, grid, self.params, self.shown_in, path=path)
+        near = self.nominal.goal_tolerance
+        return preview_of(
+            image, grid, self.params, self.shown_in, path=path, tolerance=near
+        )
 
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
@@ -266,6 +269,8 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         pictures = {"refused": picture}
         raise RefusedError(message, params.source, pictures) from error
     check_movers(spec.movers, nominal)
+    notes = with_tolerance_note(params.notes, nominal, units.length)
+    params = params.model_copy(update={"notes": notes})
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
@@ -288,7 +293,7 @@ def robot_text(robot: RobotParams, units: MapUnits) -> str:
     """The robot's size and speed on a map, and how to change them."""
     return (
         f"robot: radius {units.length(robot.radius)}, full speed "
-        f"{units.length(robot.max_wheel_speed, 0)}/s (to change them: --robot-radius, "
+        f"{units.length(robot.max_wheel_speed)}/s (to change them: --radius, "
         "--max-speed)"
     )
 
