@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.drive.env import DrivenEnv, Observation
+from tdac_envs.drive.limits import MotionLimits
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.setup import EPuckSetup
@@ -87,7 +88,8 @@ class TaskSetEnv(DrivenEnv):
         return task
 
     def _observation(self) -> Observation:
-        return self.view.seen(super()._observation(), self.pose(), self._anchor)
+        whole = super()._observation()
+        return self.view.seen(whole, self.observed_pose(), self._anchor)
 
 
 class LadderEnv(TaskSetEnv, Map2DEnv):
@@ -185,6 +187,9 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
             **_shared(task_set, source, reward_weights),
             range_noise=file.disturbances.range_noise,
             range_dropout=file.disturbances.range_dropout,
+            range_min=file.disturbances.range_min,
+            reception=file.disturbances.reception,
+            limits=MotionLimits(file.disturbances.max_acceleration),
         )
         self._prepare(setup, render_mode)
         self._look(task_set, bool(privileged))

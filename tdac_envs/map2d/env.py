@@ -17,8 +17,9 @@ from tdac_envs.drawing.marks import GHOST_SECONDS
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
+from tdac_envs.drive.limits import MotionLimits
 from tdac_envs.drive.rewards import weights_of
-from tdac_envs.drive.stepping import place
+from tdac_envs.drive.stepping import STEPS, place
 from tdac_envs.drive.task import Pose, with_tolerance_note
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.among import begin_among, drive_among
@@ -27,6 +28,7 @@ from tdac_envs.map2d.metric_input import in_pixels, options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
+from tdac_envs.map2d.reception import Receiver, Reception
 from tdac_envs.map2d.robot import Map2DArrays
 from tdac_envs.map2d.setup import Map2DSetup, override
 from tdac_envs.map2d.sonar import NOISE
@@ -192,8 +194,26 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             after a reset; `docs/disturbances.md` defines them.
         odometry_scale: Standard deviation of the hidden scale errors of `odometry`.
         odometry_noise: Relative standard deviation of each measurement of `odometry`.
+        wheel_radius_error: Bound of each wheel's hidden relative error of its radius,
+            uniform, drawn at each reset.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
+        max_acceleration: Largest acceleration of a wheel, px/s²; 0 for no limit.
+        max_speed: Largest speed of the body, px/s. A faster command is scaled down,
+            both wheels by the same factor, so that the robot drives the same curve.
+        max_turn_rate: Largest turn of the body, rad/s; commands are scaled likewise.
+        pose_noise: Standard deviation of the error of the observed x and y, px.
+            `info`, reward and the end of an episode always use the true pose.
+        heading_noise: Standard deviation of the error of the observed heading, rad.
+        pose_correlation: Time constant of both errors, s; 0 for new ones in each step.
+        pose_jumps: Mean number of jumps of the observed pose in a minute: the errors
+            are drawn anew, three times as large.
+        pose_delay: Number of steps by which `pose` is late.
+        scan_delay: Number of steps by which `ranges` are late.
+        message_drop: Probability that the pose and the scan of a step are lost: the
+            last ones are observed again.
+        range_min: Smallest range, px; what a ray reads below it says `below_min`:
+            `"range_max"`, `"range_min"` or `"zero"`.
         reward_weights: Reward weights by name, where they differ from the defaults.
             Keep the defaults when comparing rewards.
         snap: Whether to move start and goal to the nearest place where the body fits.
@@ -251,8 +271,21 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         odometry: bool = False,
         odometry_scale: float = 0.0,
         odometry_noise: float = 0.0,
+        wheel_radius_error: float = 0.0,
         motor_lag: float = 0.0,
         delay: int = 0,
+        max_acceleration: float = 0.0,
+        max_speed: float | None = None,
+        max_turn_rate: float | None = None,
+        pose_noise: float = 0.0,
+        heading_noise: float = 0.0,
+        pose_correlation: float = 0.0,
+        pose_jumps: float = 0.0,
+        pose_delay: int = 0,
+        scan_delay: int = 0,
+        message_drop: float = 0.0,
+        range_min: float = 0.0,
+        below_min: str = "range_max",
         reward_weights: Mapping[str, float] | None = None,
         snap: bool = False,
         polarity: Shade | None = None,
@@ -274,6 +307,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             goal_tolerance=goal_tolerance,
             movers=read_specs(movers),
             ray_angles=ray_angles,
+            max_acceleration=max_acceleration,
+            max_speed=max_speed,
+            pose_noise=pose_noise,
+            range_min=range_min,
         )
         prepared = prepare(
             map,
@@ -321,6 +358,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 odometry,
                 odometry_scale,
                 odometry_noise,
+                wheel_radius_error,
             ),
             weights=weights_of(reward_weights),
             source=None,
@@ -329,6 +367,20 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             movers=given["movers"],
             metric=units.frame,
             sensor=sensor,
+            range_min=given["range_min"],
+            below_min=below_min,
+            reception=Reception(
+                given["pose_noise"],
+                heading_noise,
+                pose_correlation,
+                pose_jumps,
+                pose_delay,
+                scan_delay,
+                message_drop,
+            ),
+            limits=MotionLimits(
+                given["max_acceleration"], given["max_speed"], max_turn_rate
+            ),
         )
         notes = with_tolerance_note(params.notes, nominal, units.length)
         self.params = params.model_copy(update={"notes": notes})
@@ -349,6 +401,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.disturbances.odometry:
             space = with_odometry(space, self._limits)
             self._is_inexact = True
+        self._receiver = setup.receiver()
+        self._is_inexact |= self._receiver is not None
         self._units = MapUnits(setup.metric)
         self._view = None if setup.metric is None else MetricView(setup.metric)
         if self._view is not None:
@@ -387,6 +441,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.render_mode == "human":
             self.render()
         return self._observation(), self.info_of(robot.outcome.tolist())
+
+    def observed_pose(self) -> NDArray[np.float64]:
+        """The pose as it is observed, shape (3,): x, y (px), heading (rad)."""
+        return self.pose() if self._receiver is None else self._receiver.pose.copy()
 
     def discs(self) -> NDArray[np.float64]:
         """The movers as they are now, shape (n, 3): x, y, radius, px."""
@@ -439,7 +497,16 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 seen["ranges"][:] = noisy(seen["ranges"], self.setup, self._random)
             if self.disturbances.odometry:
                 seen["odometry"] = self._odometry()
+            if self._receiver is not None:
+                self._receive(self._receiver, seen)
         return seen if self._view is None else self._view.seen(seen)
+
+    def _receive(self, receiver: Receiver, seen: Observation) -> None:
+        """Replaces pose and ranges by those that have reached the robot."""
+        begins = bool(self.robot.state[STEPS] == 0.0)
+        receiver.receive(self.pose(), seen["ranges"], begins, self._random)
+        seen["pose"][:] = receiver.pose
+        seen["ranges"] = receiver.ranges.copy()
 
     def _begin_trail(self) -> None:
         super()._begin_trail()

@@ -38,6 +38,8 @@ from tdac_envs.drive.stepping import (
     TOLERANCE,
     TOUCHED,
     TURN,
+    WHEEL_LEFT,
+    WHEEL_RIGHT,
     Array,
     X,
     Y,
@@ -211,8 +213,8 @@ def ground_speeds(
     limit = constants[MAX_SPEED]
     left, right = turned_wheels(constants, wheel_speeds)
     return (
-        limit * clip_unit(left * state[SLIP_LEFT]),
-        limit * clip_unit(right * state[SLIP_RIGHT]),
+        limit * clip_unit(left * (state[SLIP_LEFT] * constants[WHEEL_LEFT])),
+        limit * clip_unit(right * (state[SLIP_RIGHT] * constants[WHEEL_RIGHT])),
     )
 
 

@@ -7,7 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.core.arguments import finite, finite_numbers, finite_point, positive
+from tdac_envs.core.arguments import (
+    finite,
+    finite_numbers,
+    finite_point,
+    non_negative,
+    positive,
+)
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.grid.metric import Point
 from tdac_envs.movers.spec import AnySpec
@@ -17,6 +23,8 @@ LENGTHS = (
     "goal_tolerance",
 )
 """Arguments of `Map2DEnv` that are lengths, or lengths per second."""
+LENGTHS_OR_NONE = "max_speed", "pose_noise", "range_min", "max_acceleration"
+"""Those that may be 0 (or None), lengths per second squared among them."""
 
 
 def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
@@ -42,6 +50,9 @@ def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
         turns = given["ray_angles"]
         angles = finite_numbers("ray_angles", turns, np.size(turns))
         own["ray_angles"] = tuple(0.0 - angle for angle in angles)
+    for name in LENGTHS_OR_NONE:
+        if given.get(name):
+            own[name] = units.length_in_pixels(non_negative(name, given[name]))
     own["movers"] = movers_in_pixels(given["movers"], units)
     return own
 

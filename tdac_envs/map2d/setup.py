@@ -20,10 +20,12 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.disturbances import Random
+from tdac_envs.drive.limits import NO_LIMITS, MotionLimits
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.grid.map_units import MapFrame
 from tdac_envs.map2d.placing import MoversSetup
 from tdac_envs.map2d.rays import directions_of
+from tdac_envs.map2d.reception import EXACT, Receiver, Reception
 from tdac_envs.map2d.robot import FRICTION
 from tdac_envs.map2d.sonar import Sonar
 from tdac_envs.map2d.task import Map2DTask
@@ -32,6 +34,8 @@ from tdac_envs.movers.spec import AnySpec
 
 MOST_STARTS = 100
 """Starts that are drawn until no mover touches the robot."""
+BELOW_MIN = "range_max", "range_min", "zero"
+"""What a ray may read if an obstacle is nearer than `range_min`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +48,10 @@ class Map2DSetup(DriveSetup):
         movers: Movers of all episodes, if the source of the tasks has none.
         metric: Frame in whose metres the robot observes; None for pixels.
         sensor: `"rays"` or `"sonar"`.
+        range_min: Ranges below it are invalid, px; 0 for none.
+        below_min: What they read: one of `BELOW_MIN`.
+        reception: How pose and scan reach the robot.
+        limits: Limits of its motion.
         sonar: The sonars; None with rays.
         directions: Directions of the rays, from `rays.directions_of`.
         movers_setup: The movers, checked on the map.
@@ -55,6 +63,10 @@ class Map2DSetup(DriveSetup):
     movers: tuple[AnySpec, ...] = ()
     metric: MapFrame | None = None
     sensor: str = "rays"
+    range_min: float = 0.0
+    below_min: str = "range_max"
+    reception: Reception = EXACT
+    limits: MotionLimits = NO_LIMITS
     sonar: Sonar | None = field(init=False)
     directions: NDArray[np.float64] = field(init=False)
     movers_setup: MoversSetup = field(init=False)
@@ -65,7 +77,15 @@ class Map2DSetup(DriveSetup):
         dropout = number_up_to("range_dropout", self.range_dropout, 1.0)
         object.__setattr__(self, "range_noise", noise)
         object.__setattr__(self, "range_dropout", dropout)
+        least = non_negative("range_min", self.range_min)
+        object.__setattr__(self, "range_min", least)
+        one_of("below_min", self.below_min, BELOW_MIN)
         robot = self.nominal.robot
+        if least >= robot.range_max:
+            most = robot.range_max
+            raise TaskError(
+                f"expected range_min below {most:g} (range_max), got {least:g}"
+            )
         object.__setattr__(self, "directions", directions_of(robot.angles()))
         one_of("sensor", self.sensor, ("rays", "sonar"))
         sonar = None
@@ -80,8 +100,21 @@ class Map2DSetup(DriveSetup):
 
     @property
     def has_inexact_ranges(self) -> bool:
-        """Whether ranges have noise or dropouts."""
-        return bool(self.range_noise or self.range_dropout)
+        """Whether ranges have noise, dropouts or a least value."""
+        return bool(self.range_noise or self.range_dropout or self.range_min)
+
+    @property
+    def blind(self) -> float:
+        """What a ray reads if the obstacle is nearer than `range_min`, px."""
+        readings = self.nominal.robot.range_max, self.range_min, 0.0
+        return readings[BELOW_MIN.index(self.below_min)]
+
+    def receiver(self) -> Receiver | None:
+        """New memory of what a robot received; None if it observes all as it is."""
+        if self.reception.is_exact:
+            return None
+        grid = self.nominal.terrain.grid
+        return Receiver(self.reception, self.nominal.dt, grid.width, grid.height)
 
     @property
     def has_movers(self) -> bool:
@@ -117,7 +150,10 @@ class Map2DSetup(DriveSetup):
         """`Map2DRobot.constants` of the nominal task."""
         robot = self.nominal.robot
         own = robot.max_wheel_speed, robot.range_max, FRICTION
-        return np.array(self.shared_constants(*own), np.float64)
+        limits = self.limits.fractions(
+            robot.max_wheel_speed, robot.axle_length, self.nominal.dt
+        )
+        return np.array(self.shared_constants(*own, limits), np.float64)
 
     def world(self, task: Map2DTask) -> tuple[NDArray[Any], ...]:
         """The arrays that `begin` and `drive` take in addition to the robot's."""

@@ -12,7 +12,8 @@ import numpy as np
 from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.robots import EPuckRobotParams
-from tdac_envs.ladder.set_file import CpuSpec, DisturbanceSpec, SetFile
+from tdac_envs.ladder.set_disturbances import DisturbanceSpec
+from tdac_envs.ladder.set_file import CpuSpec, SetFile
 from tdac_envs.ladder.task_sets import AnyTask
 from tdac_envs.map2d.task import Map2DTask
 
@@ -52,7 +53,7 @@ def write_as_level(folder: Path, task: Task) -> None:
         "observed": ["pose", "goal", "wheel_speeds", "ranges"],
         "frame": "map",
         "map": True,
-        "disturbances": DisturbanceSpec().model_dump(),
+        "disturbances": DisturbanceSpec().written(),
         "cpu": CpuSpec().model_dump(),
     }
     folder.mkdir(parents=True, exist_ok=True)
@@ -62,7 +63,7 @@ def write_as_level(folder: Path, task: Task) -> None:
 
 def level_params(file: SetFile) -> dict[str, Any]:
     """What `params.json` tells a controller: the robot and its budget, no world."""
-    robot, disturbances = file.robot, file.disturbances.model_dump()
+    robot, disturbances = file.robot, file.disturbances.written()
     sizes: dict[str, Any]
     if isinstance(robot, EPuckRobotParams):
         sizes = {"kind": robot.kind, **robot.sizes}
