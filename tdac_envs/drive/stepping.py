@@ -28,8 +28,8 @@ AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
 PROGRESS, GOAL, COLLISION, TIME, GOAL_X, GOAL_Y, TOLERANCE, HORIZON = range(9, 17)
 FRICTION, GAIN_LEFT, GAIN_RIGHT, DISTANCE_SCALE, TURN_SCALE = range(17, 22)
 WHEEL_LEFT, WHEEL_RIGHT = range(22, 24)
-MOST_CHANGE, MOST_SUM, MOST_DIFFERENCE = range(24, 27)
-N_CONSTANTS = 27
+MOST_CHANGE, MOST_SUM, MOST_DIFFERENCE, MOST_TURN_CHANGE = range(24, 28)
+N_CONSTANTS = 28
 # Entries of `state`.
 X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS, FORWARD, TURN = range(10)
 RAMP_LEFT, RAMP_RIGHT = range(10, 12)
@@ -40,7 +40,7 @@ GOAL_DISTANCE, REMAINING, CLEARANCE, CONTACT = range(7, 11)
 N_OUTCOME = 11
 UNDISTURBED = 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
 """Gains, scales and relative wheel radii in `constants` of a robot without errors."""
-UNLIMITED = 2.0, 2.0, 2.0
+UNLIMITED = 2.0, 2.0, 2.0, 4.0
 """Limits in `constants` of a robot without any: no fraction changes by more than 2."""
 
 
@@ -143,7 +143,8 @@ def apply_command(
     """Computes the wheel speeds, as fractions, from the commanded ones.
 
     Clipped to [-1, 1], scaled to the limits of the body's speed and turn, delayed,
-    ramped to the limit of the acceleration, and smoothed by the lag.
+    ramped to the limits of the accelerations, and smoothed by the lag. A limit of the
+    turn's acceleration takes as much from one wheel as it gives to the other.
     """
     left, right = clip_unit(state[LEFT]), clip_unit(state[RIGHT])
     if left != state[LEFT] or right != state[RIGHT]:
@@ -158,6 +159,10 @@ def apply_command(
     most = constants[MOST_CHANGE]
     left = min(max(left, state[RAMP_LEFT] - most), state[RAMP_LEFT] + most)
     right = min(max(right, state[RAMP_RIGHT] - most), state[RAMP_RIGHT] + most)
+    turn = left - right - (state[RAMP_LEFT] - state[RAMP_RIGHT])
+    if abs(turn) > constants[MOST_TURN_CHANGE]:
+        beyond = 0.5 * (turn - math.copysign(constants[MOST_TURN_CHANGE], turn))
+        left, right = left - beyond, right + beyond
     state[RAMP_LEFT], state[RAMP_RIGHT] = left, right
     lag = constants[LAG]
     wheel_speeds[0] = left + lag * (wheel_speeds[0] - left)

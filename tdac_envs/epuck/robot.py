@@ -21,7 +21,7 @@ class EPuckArrays(NamedTuple):
     `kernels._arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (32,), float64: axle length (m), full wheel speed (rad/s), dt
+        constants: Shape (33,), float64: axle length (m), full wheel speed (rad/s), dt
             (s), body radius, sensor range (m), fraction of a wheel's speed that remains
             after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (m); reward weights: progress,

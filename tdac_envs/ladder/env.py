@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.drive.env import DrivenEnv, Observation
-from tdac_envs.drive.limits import MotionLimits
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.setup import EPuckSetup
@@ -189,7 +188,7 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
             range_dropout=file.disturbances.range_dropout,
             range_min=file.disturbances.range_min,
             reception=file.disturbances.reception,
-            limits=MotionLimits(file.disturbances.max_acceleration),
+            max_acceleration=file.disturbances.max_acceleration,
         )
         self._prepare(setup, render_mode)
         self._look(task_set, bool(privileged))

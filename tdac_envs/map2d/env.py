@@ -17,7 +17,6 @@ from tdac_envs.drawing.marks import GHOST_SECONDS
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
-from tdac_envs.drive.limits import MotionLimits
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import STEPS, place
 from tdac_envs.drive.task import Pose, with_tolerance_note
@@ -28,11 +27,12 @@ from tdac_envs.map2d.metric_input import in_pixels, options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
-from tdac_envs.map2d.reception import Receiver, Reception
+from tdac_envs.map2d.reception import RECEIVED, Receiver, Reception
 from tdac_envs.map2d.robot import Map2DArrays
-from tdac_envs.map2d.setup import Map2DSetup, override
+from tdac_envs.map2d.robot_options import RobotSource, with_robot
+from tdac_envs.map2d.setup import OVERRIDDEN, Map2DSetup, override
 from tdac_envs.map2d.sonar import NOISE
-from tdac_envs.map2d.source import MapSource, prepare, units_of
+from tdac_envs.map2d.source import MapSource, metric_units, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
 from tdac_envs.movers.spec import MoversOption, read_specs
@@ -173,7 +173,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             full circle of rays that are 360°/n_rays apart.
         range_max: Largest range, px; observed if a ray hits nothing. The default of
             images is 220; with a resolution it is 3.5 m.
-        dt: Duration of a step, s.
+        dt: Duration of a step, s. Default: 0.05, or that of the robot.
         horizon: Steps before truncation. Default: max(2500, 6 * d0 / (max_wheel_speed *
             dt)), where d0 is the length of the shortest grid path, px.
         goal_tolerance: Distance at which the goal is reached, px. Default:
@@ -198,10 +198,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             uniform, drawn at each reset.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
-        max_acceleration: Largest acceleration of a wheel, px/s²; 0 for no limit.
+        max_acceleration: Largest acceleration of a wheel, px/s².
         max_speed: Largest speed of the body, px/s. A faster command is scaled down,
             both wheels by the same factor, so that the robot drives the same curve.
         max_turn_rate: Largest turn of the body, rad/s; commands are scaled likewise.
+        max_turn_acceleration: Largest acceleration of its turn, rad/s².
         pose_noise: Standard deviation of the error of the observed x and y, px.
             `info`, reward and the end of an episode always use the true pose.
         heading_noise: Standard deviation of the error of the observed heading, rad.
@@ -212,8 +213,16 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         scan_delay: Number of steps by which `ranges` are late.
         message_drop: Probability that the pose and the scan of a step are lost: the
             last ones are observed again.
-        range_min: Smallest range, px; what a ray reads below it says `below_min`:
-            `"range_max"`, `"range_min"` or `"zero"`.
+        range_min, below_min: Smallest range, px, and what a ray reads below it:
+            `"range_max"` (the default), `"range_min"` or `"zero"`.
+        scanner_offset: Where the rays start, from the centre: ahead and, in pixels, to
+            the right; in metres, to the left.
+        robot: Bundled name (`tdac_envs.bundled_robots()`) or path of a robot file: its
+            body, limits, scanner and control rate, where no other argument says
+            otherwise. `ranges` are in the order of its scanner. A robot in metres needs
+            a map with a resolution.
+        disturbed: Whether the noise, latency and other errors of this robot are on,
+            too, where no other argument says otherwise. Its limits always hold.
         reward_weights: Reward weights by name, where they differ from the defaults.
             Keep the defaults when comparing rewards.
         snap: Whether to move start and goal to the nearest place where the body fits.
@@ -257,7 +266,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         n_rays: int | None = None,
         field_of_view: float | None = None,
         range_max: float | None = None,
-        dt: float = 0.05,
+        dt: float | None = None,
         horizon: int | None = None,
         goal_tolerance: float | None = None,
         on_collision: str = "terminate",
@@ -265,27 +274,31 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         sensor: str = "rays",
         range_noise: float | None = None,
         range_dropout: float = 0.0,
-        wheel_slip: float = 0.0,
+        wheel_slip: float | None = None,
         wheel_gains: float = 0.0,
         axle_error: float = 0.0,
         odometry: bool = False,
         odometry_scale: float = 0.0,
         odometry_noise: float = 0.0,
-        wheel_radius_error: float = 0.0,
+        wheel_radius_error: float | None = None,
         motor_lag: float = 0.0,
         delay: int = 0,
-        max_acceleration: float = 0.0,
+        max_acceleration: float | None = None,
+        max_turn_acceleration: float | None = None,
         max_speed: float | None = None,
         max_turn_rate: float | None = None,
-        pose_noise: float = 0.0,
-        heading_noise: float = 0.0,
-        pose_correlation: float = 0.0,
-        pose_jumps: float = 0.0,
-        pose_delay: int = 0,
-        scan_delay: int = 0,
+        pose_noise: float | None = None,
+        heading_noise: float | None = None,
+        pose_correlation: float | None = None,
+        pose_jumps: float | None = None,
+        pose_delay: int | None = None,
+        scan_delay: int | None = None,
         message_drop: float = 0.0,
-        range_min: float = 0.0,
-        below_min: str = "range_max",
+        range_min: float | None = None,
+        below_min: str | None = None,
+        scanner_offset: tuple[float, float] | None = None,
+        robot: RobotSource = None,
+        disturbed: bool = False,
         reward_weights: Mapping[str, float] | None = None,
         snap: bool = False,
         polarity: Shade | None = None,
@@ -295,23 +308,40 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         render_mode: str | None = None,
     ) -> None:
         units = units_of(map, frame)
-        given = in_pixels(
-            units,
-            start=start,
-            goal=goal,
-            heading=heading,
-            robot_radius=robot_radius,
-            axle_length=axle_length,
-            max_wheel_speed=max_wheel_speed,
-            range_max=range_max,
-            goal_tolerance=goal_tolerance,
-            movers=read_specs(movers),
-            ray_angles=ray_angles,
-            max_acceleration=max_acceleration,
-            max_speed=max_speed,
-            pose_noise=pose_noise,
-            range_min=range_min,
-        )
+        typed = {
+            "start": start,
+            "goal": goal,
+            "heading": heading,
+            "robot_radius": robot_radius,
+            "axle_length": axle_length,
+            "max_wheel_speed": max_wheel_speed,
+            "n_rays": n_rays,
+            "field_of_view": field_of_view,
+            "range_max": range_max,
+            "goal_tolerance": goal_tolerance,
+            "movers": read_specs(movers),
+            "ray_angles": ray_angles,
+            "range_min": range_min,
+            "below_min": below_min,
+            "scanner_offset": scanner_offset,
+            "max_acceleration": max_acceleration,
+            "max_turn_acceleration": max_turn_acceleration,
+            "max_speed": max_speed,
+            "max_turn_rate": max_turn_rate,
+            "dt": dt,
+            "range_noise": range_noise,
+            "wheel_slip": wheel_slip,
+            "wheel_radius_error": wheel_radius_error,
+            "pose_noise": pose_noise,
+            "heading_noise": heading_noise,
+            "pose_correlation": pose_correlation,
+            "pose_jumps": pose_jumps,
+            "pose_delay": pose_delay,
+            "scan_delay": scan_delay,
+        }
+        metric = None if robot is None else metric_units(map)
+        own = with_robot(robot, disturbed, metric, units.frame is not None, typed)
+        given = in_pixels(units, **own)
         prepared = prepare(
             map,
             given["start"],
@@ -323,23 +353,15 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             units=units,
         )
         params = prepared.params
-        robot = override(
-            params.robot,
-            axle_length=given["axle_length"],
-            max_wheel_speed=given["max_wheel_speed"],
-            n_rays=n_rays,
-            field_of_view=field_of_view,
-            range_max=given["range_max"],
-            ray_angles=given["ray_angles"],
-        )
+        body = override(params.robot, **{name: given[name] for name in OVERRIDDEN})
         assert params.start is not None
         assert params.goal is not None
         nominal = make_task(
             Terrain.of(prepared.grid),
             Pose(*params.start, params.heading),
             params.goal,
-            robot,
-            dt=dt,
+            body,
+            dt=0.05 if given["dt"] is None else given["dt"],
             goal_tolerance=given["goal_tolerance"],
             horizon=horizon,
             units=units,
@@ -352,34 +374,24 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             motor_lag=motor_lag,
             delay=delay,
             disturbances=Disturbances(
-                wheel_slip,
+                given["wheel_slip"] or 0.0,
                 wheel_gains,
                 axle_error,
                 odometry,
                 odometry_scale,
                 odometry_noise,
-                wheel_radius_error,
+                given["wheel_radius_error"] or 0.0,
             ),
             weights=weights_of(reward_weights),
             source=None,
-            range_noise=_noise_of(sensor, range_noise),
+            range_noise=_noise_of(sensor, given["range_noise"]),
             range_dropout=range_dropout,
             movers=given["movers"],
             metric=units.frame,
             sensor=sensor,
-            range_min=given["range_min"],
-            below_min=below_min,
             reception=Reception(
-                given["pose_noise"],
-                heading_noise,
-                pose_correlation,
-                pose_jumps,
-                pose_delay,
-                scan_delay,
-                message_drop,
-            ),
-            limits=MotionLimits(
-                given["max_acceleration"], given["max_speed"], max_turn_rate
+                **{name: given[name] or 0 for name in RECEIVED},
+                message_drop=message_drop,
             ),
         )
         notes = with_tolerance_note(params.notes, nominal, units.length)

@@ -23,8 +23,8 @@ LENGTHS = (
     "goal_tolerance",
 )
 """Arguments of `Map2DEnv` that are lengths, or lengths per second."""
-LENGTHS_OR_NONE = "max_speed", "pose_noise", "range_min", "max_acceleration"
-"""Those that may be 0 (or None), lengths per second squared among them."""
+LENGTHS_OR_ZERO = "max_speed", "pose_noise", "range_min", "max_acceleration"
+"""Those that may be 0, lengths per second squared among them."""
 
 
 def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
@@ -50,7 +50,11 @@ def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
         turns = given["ray_angles"]
         angles = finite_numbers("ray_angles", turns, np.size(turns))
         own["ray_angles"] = tuple(0.0 - angle for angle in angles)
-    for name in LENGTHS_OR_NONE:
+    if given.get("scanner_offset") is not None:
+        ahead, left = finite_point("scanner_offset", given["scanner_offset"])
+        scale = 1.0 / units.per_pixel
+        own["scanner_offset"] = (ahead * scale, 0.0 - left * scale)
+    for name in LENGTHS_OR_ZERO:
         if given.get(name):
             own[name] = units.length_in_pixels(non_negative(name, given[name]))
     own["movers"] = movers_in_pixels(given["movers"], units)

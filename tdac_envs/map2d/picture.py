@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -83,7 +84,10 @@ class MapScene:
         canvas, robot = self._canvas.copy(), self._robot
         x, y, heading = (float(value) for value in pose)
         seen, turns = np.asarray(ranges, np.float64), self._turns
-        draw_rays(canvas, (x, y, heading), seen, turns, robot.range_max)
+        ahead, aside = robot.scanner_offset or (0.0, 0.0)
+        cos, sin = math.cos(heading), math.sin(heading)
+        at = x + ahead * cos - aside * sin, y + ahead * sin + aside * cos
+        draw_rays(canvas, (*at, heading), seen, turns, robot.range_max)
         draw_movers(canvas, movers)
         canvas.line(trail, TRAIL, 2)
         if self._radius < SMALLEST_PICTURE:

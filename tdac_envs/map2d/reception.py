@@ -22,6 +22,11 @@ from tdac_envs.drive.stepping import wrap_angle
 
 Array = NDArray[np.float64]
 
+RECEIVED = (
+    *("pose_noise", "heading_noise", "pose_correlation", "pose_jumps"),
+    *("pose_delay", "scan_delay"),
+)
+"""The fields of `Reception` that a robot file gives, in their order."""
 JUMP = 3.0
 """Size of the errors after a jump, relative to the usual ones."""
 MOST_STEPS_LATE = 1000

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from tdac_envs.core.arguments import (
     finite_numbers,
+    finite_point,
     non_negative,
     number_up_to,
     one_of,
@@ -20,7 +21,7 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.disturbances import Random
-from tdac_envs.drive.limits import NO_LIMITS, MotionLimits
+from tdac_envs.drive.limits import MotionLimits
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.grid.map_units import MapFrame
 from tdac_envs.map2d.placing import MoversSetup
@@ -34,8 +35,6 @@ from tdac_envs.movers.spec import AnySpec
 
 MOST_STARTS = 100
 """Starts that are drawn until no mover touches the robot."""
-BELOW_MIN = "range_max", "range_min", "zero"
-"""What a ray may read if an obstacle is nearer than `range_min`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,10 +47,9 @@ class Map2DSetup(DriveSetup):
         movers: Movers of all episodes, if the source of the tasks has none.
         metric: Frame in whose metres the robot observes; None for pixels.
         sensor: `"rays"` or `"sonar"`.
-        range_min: Ranges below it are invalid, px; 0 for none.
-        below_min: What they read: one of `BELOW_MIN`.
+        range_min: Ranges below it are invalid, px; 0 for that of the robot.
+        max_acceleration: Of a wheel, px/s²; 0 for that of the robot.
         reception: How pose and scan reach the robot.
-        limits: Limits of its motion.
         sonar: The sonars; None with rays.
         directions: Directions of the rays, from `rays.directions_of`.
         movers_setup: The movers, checked on the map.
@@ -64,9 +62,8 @@ class Map2DSetup(DriveSetup):
     metric: MapFrame | None = None
     sensor: str = "rays"
     range_min: float = 0.0
-    below_min: str = "range_max"
+    max_acceleration: float = 0.0
     reception: Reception = EXACT
-    limits: MotionLimits = NO_LIMITS
     sonar: Sonar | None = field(init=False)
     directions: NDArray[np.float64] = field(init=False)
     movers_setup: MoversSetup = field(init=False)
@@ -77,10 +74,9 @@ class Map2DSetup(DriveSetup):
         dropout = number_up_to("range_dropout", self.range_dropout, 1.0)
         object.__setattr__(self, "range_noise", noise)
         object.__setattr__(self, "range_dropout", dropout)
-        least = non_negative("range_min", self.range_min)
-        object.__setattr__(self, "range_min", least)
-        one_of("below_min", self.below_min, BELOW_MIN)
         robot = self.nominal.robot
+        least = non_negative("range_min", self.range_min) or robot.range_min or 0.0
+        object.__setattr__(self, "range_min", least)
         if least >= robot.range_max:
             most = robot.range_max
             raise TaskError(
@@ -90,6 +86,8 @@ class Map2DSetup(DriveSetup):
         one_of("sensor", self.sensor, ("rays", "sonar"))
         sonar = None
         if self.sensor == "sonar":
+            if robot.scanner_offset:
+                raise TaskError("scanner_offset: sonars are at the robot's centre")
             sonar = Sonar(robot.angles(), robot.range_max)
         object.__setattr__(self, "sonar", sonar)
         movers_setup = MoversSetup.of(self.movers, self.nominal)
@@ -106,8 +104,17 @@ class Map2DSetup(DriveSetup):
     @property
     def blind(self) -> float:
         """What a ray reads if the obstacle is nearer than `range_min`, px."""
-        readings = self.nominal.robot.range_max, self.range_min, 0.0
-        return readings[BELOW_MIN.index(self.below_min)]
+        readings = {"range_min": self.range_min, "zero": 0.0}
+        robot = self.nominal.robot
+        return readings.get(robot.below_min or "", robot.range_max)
+
+    @property
+    def limits(self) -> MotionLimits:
+        """Limits of the robot's motion."""
+        robot = self.nominal.robot
+        most = self.max_acceleration or robot.max_acceleration or 0.0
+        turn = robot.max_turn_rate, robot.max_turn_acceleration
+        return MotionLimits(most, robot.max_speed, *turn)
 
     def receiver(self) -> Receiver | None:
         """New memory of what a robot received; None if it observes all as it is."""
@@ -153,7 +160,8 @@ class Map2DSetup(DriveSetup):
         limits = self.limits.fractions(
             robot.max_wheel_speed, robot.axle_length, self.nominal.dt
         )
-        return np.array(self.shared_constants(*own, limits), np.float64)
+        shared = self.shared_constants(*own, limits)
+        return np.array([*shared, *(robot.scanner_offset or (0.0, 0.0))], np.float64)
 
     def world(self, task: Map2DTask) -> tuple[NDArray[Any], ...]:
         """The arrays that `begin` and `drive` take in addition to the robot's."""
@@ -161,8 +169,21 @@ class Map2DSetup(DriveSetup):
         return terrain.leaps, terrain.padded_clear, task.field, self.directions
 
 
+OVERRIDDEN = (
+    *("axle_length", "max_wheel_speed", "n_rays", "field_of_view", "range_max"),
+    *("ray_angles", "range_min", "below_min", "scanner_offset"),
+    *("max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration"),
+)
+"""Arguments of `override`."""
+_MAY_BE_ZERO = "range_min", "max_acceleration"
+
+
 def override(
-    robot: RobotParams, ray_angles: Sequence[float] | None = None, **given: float | None
+    robot: RobotParams,
+    ray_angles: Sequence[float] | None = None,
+    scanner_offset: Sequence[float] | None = None,
+    below_min: str | None = None,
+    **given: float | None,
 ) -> RobotParams:
     """The robot with the options that are not None.
 
@@ -175,10 +196,17 @@ def override(
     if ray_angles is not None:
         angles = finite_numbers("ray_angles", ray_angles, np.size(ray_angles))
         changes = {"ray_angles": angles, "n_rays": len(angles)}
+    if scanner_offset is not None:
+        changes["scanner_offset"] = finite_point("scanner_offset", scanner_offset)
+    if below_min is not None:
+        one_of("below_min", below_min, ("range_max", "range_min", "zero"))
+        changes["below_min"] = below_min
     for name, value in given.items():
         if value is None:
             continue
-        if name == "n_rays":
+        if name in _MAY_BE_ZERO:
+            changes[name] = non_negative(name, value) or None
+        elif name == "n_rays":
             changes[name] = whole_number(name, value, 1)
         else:
             key = "field_of_view_deg" if name == "field_of_view" else name

@@ -246,6 +246,20 @@ def has_resolution(source: str, resolution: float | None = None) -> bool:
     return resolution is not None or Path(source).suffix in _YAML
 
 
+def metric_units(source: MapSource, resolution: float | None = None) -> MapUnits | None:
+    """Metres in the frame of a map; None if it has no resolution.
+
+    Raises:
+        MapError: There is no such map.
+    """
+    try:
+        return units_of(source, "metres", resolution)
+    except (TaskError, MapError):
+        if isinstance(source, str | Path) and str(source) not in bundled_maps():
+            check_exists(Path(source))
+        return None
+
+
 def _from_image(image: Path, given: _TaskOptions) -> Prepared:
     # Not cached for a ROS map.yaml: the digest does not cover the image that it names.
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image

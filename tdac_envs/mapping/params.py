@@ -99,6 +99,19 @@ class RobotParams(StrictModel):
         description="Directions of the rays from the heading, rad, in the order of the "
         "ranges; by default an even fan over the field of view.",
     )
+    range_min: Length | None = Field(None, description="Smallest range, px.")
+    below_min: Literal["range_max", "range_min", "zero"] | None = Field(
+        None, description="What a ray reads below range_min; by default range_max."
+    )
+    scanner_offset: tuple[Place, Place] | None = Field(
+        None,
+        description="Where the rays start, from the centre, px: ahead and to the right "
+        "(in metres to the left).",
+    )
+    max_speed: Length | None = Field(None, description="Limit of the body, px/s.")
+    max_turn_rate: Length | None = Field(None, description="Its turn, rad/s.")
+    max_acceleration: Length | None = Field(None, description="Of a wheel, px/s².")
+    max_turn_acceleration: Length | None = Field(None, description="rad/s²")
 
     @model_validator(mode="after")
     def _has_an_angle_for_each_ray(self) -> Self:
@@ -260,7 +273,10 @@ class MapParams(StrictModel):
             raise MapError(f"{path}: {error}") from error
 
 
-_ROBOT_LENGTHS = ("radius", "axle_length", "max_wheel_speed", "range_max")
+_ROBOT_LENGTHS = (
+    *("radius", "axle_length", "max_wheel_speed", "range_max"),
+    *("range_min", "max_speed", "max_acceleration"),
+)
 
 
 def _converted(
@@ -273,7 +289,11 @@ def _converted(
         return units.pixels(tuple(point)) if inwards else units.written_place(*point)
 
     robot = dict(own["robot"])
-    robot.update({name: length(robot[name]) for name in _ROBOT_LENGTHS})
+    robot.update({key: length(robot[key]) for key in _ROBOT_LENGTHS if key in robot})
+    if "scanner_offset" in robot:
+        ahead, aside = robot["scanner_offset"]
+        # To the right in pixels, to the left in metres.
+        robot["scanner_offset"] = [length(ahead), 0.0 - length(aside)]
     if "ray_angles" in robot:
         # y points up in the frame of a map; 0.0 - 0.0 is not -0.0.
         robot["ray_angles"] = [0.0 - angle for angle in robot["ray_angles"]]
