@@ -76,6 +76,13 @@ class TaskFlags:
         "in a world 0.02 m]",
         panel=TASKS,
     )
+    robot: str | None = option(
+        None,
+        "Robot (`tdac robots`) or robot file: its body, limits, scanner and control "
+        "rate; its noise and latency disturb `--robust`.",
+        metavar="NAME|FILE",
+        panel=TASKS,
+    )
     robot_radius: float | None = option(
         None,
         "Body radius, px, or m on a map with a resolution, which needs it.  "

@@ -210,7 +210,14 @@ class Setting(Protocol):
 
     @property
     def has_dropouts(self) -> bool:
-        """Whether the environment has the option `range_dropout`."""
+        """Whether the robot is on a map: it has `range_dropout` and `pose_noise`."""
+
+    @property
+    def disturbances(self) -> dict[str, Any]:
+        """What the robot's file says of its disturbances, in units of the task."""
+
+    def length_of(self, length: float) -> float:
+        """Converts a length in units of the task to those of the environment."""
 
     def facts(self) -> dict[str, Any]:
         """Returns all that determines an episode, the map or world by its hash."""

@@ -109,7 +109,7 @@ def verify_episodes(
             problem, split, episodes, first, salt_file, accept_at, margin
         )
     else:
-        problem.disturbed_options(disturbance or Disturbance())
+        problem.disturbed_options(disturbance or problem.own_disturbance())
         count = EPISODES if episodes is None else episodes
         whole_number("episodes", count, 1, MOST_EPISODES)
         if first is not None:

@@ -119,6 +119,15 @@ class EPuckSetting:
         """False: infra-red sensors have no largest range."""
         return False
 
+    @property
+    def disturbances(self) -> dict[str, Any]:
+        """Empty: worlds name no robot file."""
+        return {}
+
+    def length_of(self, length: float) -> float:
+        """Returns the length: both are in metres."""
+        return length
+
     def facts(self) -> dict[str, Any]:
         """Returns the environment's arguments, with the world's hash and `left_out`."""
         own = {"world": self.world_sha256(), "left_out": self.left_out}

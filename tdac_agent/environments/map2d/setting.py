@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,8 @@ from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.metric_input import movers_in, movers_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.picture import ROBOT_IMAGE
-from tdac_envs.map2d.source import prepare, units_of
+from tdac_envs.map2d.robot_options import RAYS, options_of
+from tdac_envs.map2d.source import metric_units, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.fault import fault_of
@@ -33,6 +34,7 @@ from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
 from tdac_envs.mapping.preprocessing import as_image
 from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
 from tdac_envs.movers.spec import AnySpec
+from tdac_envs.robots.bundled import bundled_robots, load_robot
 
 DT = 0.05
 ROBOT_IMAGE_BYTES = 16_000_000
@@ -50,6 +52,7 @@ class Map2DSetting:
         robot_image: Picture of the robot.
         movers: Moving obstacles, px.
         view: What a controller observes, if it is told metres.
+        disturbances: What its file says of the robot's, in units of the task.
         shown_in: Units of what the user reads; the environment's units are pixels.
     """
 
@@ -60,6 +63,7 @@ class Map2DSetting:
     movers: tuple[AnySpec, ...] = ()
     shown_in: MapUnits = MAP_PIXELS
     view: MetricView | None = None
+    disturbances: dict[str, Any] = field(default_factory=dict)
 
     @property
     def original(self) -> Original | None:
@@ -129,10 +133,9 @@ class Map2DSetting:
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's `Map2DEnv`."""
         nominal, robot = self.nominal, self.nominal.robot
-        angles = robot.ray_angles
         return {
             **as_option(self.movers),
-            **({} if angles is None else {"ray_angles": angles}),
+            **_further(robot),
             "map": nominal.terrain.grid.cells,
             "start": tuple(nominal.start),
             "goal": nominal.goal,
@@ -159,6 +162,10 @@ class Map2DSetting:
     def has_dropouts(self) -> bool:
         """True: rays may read the largest range."""
         return True
+
+    def length_of(self, length: float) -> float:
+        """See `Setting`."""
+        return self.task_units.length_in_pixels(length)
 
     def facts(self) -> dict[str, Any]:
         """Returns the environment's arguments, with the map's hash."""
@@ -194,6 +201,7 @@ class Map2DSetting:
             **({} if self.view is None else {"frame": self.params.frame}),
             "map": ".",
             "robot": {
+                **_written(robot, units),
                 "radius": length(robot.radius),
                 "axle": length(robot.axle_length),
                 "max_wheel_speed": length(robot.max_wheel_speed),
@@ -244,6 +252,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     typed = None if spec.start is None else (spec.start[0], spec.start[1])
     units = units_of(source, spec.frame, spec.resolution).with_typed(typed, spec.goal)
     spec = _in_pixels(spec, units)
+    spec, disturbances = _with_file(spec, source, base, units)
     prepared = prepare(
         source,
         spec.start,
@@ -285,6 +294,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         spec.movers,
         units,
         None if units.frame is None else MetricView(units.frame),
+        disturbances,
     )
     return name, setting
 
@@ -311,16 +321,80 @@ def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
         changes["goal"] = units.pixels(spec.goal)
     if spec.tolerance is not None:
         changes["tolerance"] = units.length_in_pixels(spec.tolerance)
-    names = ("radius", "axle", "max_wheel_speed", "range_max")
+    names = ("radius", "axle", "max_wheel_speed", "range_max", *_FURTHER_LENGTHS)
     lengths = {name: getattr(spec.robot, name) for name in names}
-    robot = {
+    robot: dict[str, Any] = {
         name: units.length_in_pixels(length)
         for name, length in lengths.items()
         if length is not None
     }
+    if spec.robot.ray_angles is not None:
+        robot["ray_angles"] = tuple(0.0 - angle for angle in spec.robot.ray_angles)
+    if spec.robot.scanner_offset is not None:
+        ahead, left = map(units.length_in_pixels, spec.robot.scanner_offset)
+        robot["scanner_offset"] = (ahead, 0.0 - left)
     changes["robot"] = spec.robot.model_copy(update=robot)
     changes["movers"] = movers_in_pixels(spec.movers, units)
     return spec.model_copy(update=changes)
+
+
+FURTHER = (
+    *("ray_angles", "range_min", "below_min", "scanner_offset", "max_speed"),
+    *("max_turn_rate", "max_acceleration", "max_turn_acceleration"),
+)
+"""Properties of a robot that not every robot has."""
+_FURTHER_LENGTHS = "range_min", "max_speed", "max_acceleration"
+_NAMES = {"robot_radius": "radius", "axle_length": "axle"}
+
+
+def _further(robot: RobotParams) -> dict[str, Any]:
+    """Those of `FURTHER` that a robot has."""
+    own = {name: getattr(robot, name) for name in FURTHER}
+    return {name: value for name, value in own.items() if value is not None}
+
+
+def _written(robot: RobotParams, units: MapUnits) -> dict[str, Any]:
+    """The same for a task file in these units."""
+    own = _further(robot)
+    for name in _FURTHER_LENGTHS:
+        if name in own:
+            own[name] = units.written_length(own[name])
+    up = units.frame is not None
+    if "ray_angles" in own:
+        own["ray_angles"] = [0.0 - a if up else a for a in own["ray_angles"]]
+    if "scanner_offset" in own:
+        ahead, aside = map(units.written_length, own["scanner_offset"])
+        own["scanner_offset"] = [ahead, 0.0 - aside if up else aside]
+    return own
+
+
+def _with_file(
+    spec: TaskFile, source: str, base: Path, units: MapUnits
+) -> tuple[TaskFile, dict[str, Any]]:
+    """The task file, in px, with the robot of its robot file; its disturbances.
+
+    What the task file says of the robot overrides its robot file.
+    """
+    name = spec.robot.file
+    if name is None:
+        return spec, {}
+    file = load_robot(name if name in bundled_robots() else base / name)
+    metric = metric_units(source, spec.resolution)
+    # The task is in px by now; a robot in px is refused for one in metres.
+    in_metres = units.frame is not None and file.units == "pixels"
+    own = options_of(file, metric, in_metres, disturbed=False)
+    dt = own.pop("dt")
+    own = {_NAMES.get(key, key): value for key, value in own.items()}
+    typed = spec.robot.model_dump(exclude_none=True)
+    if typed.keys() & set(RAYS):
+        own = {key: value for key, value in own.items() if key not in RAYS}
+    robot = RobotSpec.model_validate({**own, **typed})
+    errors = file.disturbances()
+    if file.units == "metres" and units.frame is None and "pose_noise" in errors:
+        assert metric is not None
+        errors["pose_noise"] = metric.length_in_pixels(errors["pose_noise"])
+    changes = {"robot": robot, "dt": dt if spec.dt is None else spec.dt}
+    return spec.model_copy(update=changes), errors
 
 
 def _check_robot_image(file: Path) -> None:
@@ -338,9 +412,11 @@ def _check_robot_image(file: Path) -> None:
 
 
 def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
-    values = spec.model_dump(exclude={"radius", "image"}, exclude_none=True)
+    values = spec.model_dump(exclude={"radius", "image", "file"}, exclude_none=True)
     fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
     changes = {fields.get(key, key): value for key, value in values.items()}
+    if "ray_angles" in changes:
+        changes["n_rays"] = len(changes["ray_angles"])
     return params.model_copy(update={"robot": params.robot.changed(**changes)})
 
 
