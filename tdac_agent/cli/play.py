@@ -54,7 +54,6 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
         require_flag("--seed N", typed_fields(noise))
     elif options.episode is not None:
         raise TaskError("give --episode or --seed, not both")
-    disturbance = noise.disturbance()
     name = _checked(options.episode)
     flags = with_own_set(options.controller, flags)
     check_scope(flags.set_name is not None, flags, options, noise)
@@ -69,8 +68,7 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
     if options.seed is None:
         rollout = drive(task, source, name, options.tier)
     else:
-        task.disturbed_options(disturbance)
-        setup = options.seed, disturbance, options.tier
+        setup = options.seed, noise.disturbance(task), options.tier
         rollout = drive_disturbed(task, source, *setup).rollout
     frames_of = partial(task.pictures().frames, rollout)
     return show(rollout, frames_of, task.name, options)

@@ -37,6 +37,7 @@ from tdac_agent.runs.run_record import AGENT, RUN_FILE, Run, load_run
 from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.synthesis.synthesize import synthesize
+from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
@@ -236,12 +237,14 @@ def _heading(problem: Problem, learner: str | Provider, optimizer: Any) -> str:
     if task is None:
         digest = f"[bold]{escape(problem.name)}[/] {problem.sha256[:8]}"
         return f"task set {digest}, worlds of dev; {model}"
-    nominal, setting = task.nominal, task.setting
+    nominal, setting, called = task.nominal, task.setting, display_name(task)
+    # The name of a task that is not bundled says it.
+    near = "" if "goal within" in called else f"goal within {tolerance_text(setting)}, "
     return (
-        f"task [bold]{escape(display_name(task))}[/]: shortest path "
+        f"task [bold]{escape(called)}[/]: shortest path "
         f"{setting.length_text(shortest_path_length(nominal))}, "
         f"body radius {setting.length_text(nominal.body_radius)}, "
-        f"at most {nominal.horizon} steps; {model}" + "".join(_remarks(task))
+        f"{near}at most {nominal.horizon} steps; {model}" + "".join(_remarks(task))
     )
 
 

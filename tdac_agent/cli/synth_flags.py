@@ -43,7 +43,7 @@ class RunFlags:
 
 @app.command(
     epilog="Examples: `tdac synth`; `tdac synth plan.png --start 90 302 "
-    "--goal 178 386 --robot-radius 12`; "
+    "--goal 178 386 --radius 12`; "
     "`tdac synth --learner anthropic:claude-sonnet-5-5`; "
     "`tdac synth --set known`; `tdac synth --resume runs/maze-1`"
 )

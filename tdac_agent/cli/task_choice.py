@@ -31,7 +31,7 @@ from tdac_agent.tasks.task_file import (
 )
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
-from tdac_envs.map2d.source import check_exists
+from tdac_envs.map2d.source import check_exists, has_resolution
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 
 if TYPE_CHECKING:
@@ -223,6 +223,7 @@ def chosen_task(flags: TaskFlags, default: str = "maze") -> Task:
         return shown(load_task(file_of(keys), base=Path()), flags)
     refuse_foreign(flags, environment_with_key("map"))
     source = flags.map_image or default
+    flags = in_own_units(flags, source)
     own = source not in bundled_maps()
     if own:
         check_exists(Path(source))
@@ -236,6 +237,21 @@ def chosen_task(flags: TaskFlags, default: str = "maze") -> Task:
     keys = keys_of(flags, start=None if own else bundled_map(source).start)
     frame = "metres" if flags.in_metres else "pixels"
     return load_task(file_of({"map": source, "frame": frame, **keys}), base=Path())
+
+
+def in_own_units(flags: TaskFlags, source: str) -> TaskFlags:
+    """The flags, in metres if their map has a resolution and they choose no units.
+
+    Args:
+        flags: The flags.
+        source: The map.
+    """
+    chosen_ones = flags.metres or flags.frame is not None
+    if chosen_ones or source in bundled_maps():
+        return flags
+    if not has_resolution(source, flags.resolution):
+        return flags
+    return replace(flags, frame="metres")
 
 
 def _refuse_naming(why: str, flags: TaskFlags, names: Collection[str]) -> None:
@@ -288,12 +304,11 @@ def check_heading(heading: float | None) -> None:
 
 def _rulers(map_file: Path, flags: TaskFlags) -> str:
     """Where to read places on a map."""
-    if flags.in_metres:
-        return "read them off the rulers that `tdac map IMAGE --metres` draws"
-    text = "read them off the rulers that `tdac map IMAGE` draws"
-    if map_file.suffix in (".yaml", ".yml"):
-        text += "; for places in metres, give --metres to both commands"
-    return text
+    scale = "" if flags.resolution is None else f" --resolution {flags.resolution:g}"
+    units = ""
+    if flags.in_metres != has_resolution(str(map_file), flags.resolution):
+        units = " --metres" if flags.in_metres else " --frame pixels"
+    return f"read them off the rulers that `tdac map IMAGE{scale}{units}` draws"
 
 
 def check_tier(name: str) -> None:

@@ -65,7 +65,6 @@ def _check_robust(options: VerifyOptions, noise: NoiseFlags) -> None:
         require_flag("-n N", typed_fields(noise))
     elif options.accept_at is not None:
         SequentialTest(options.accept_at, options.episodes, options.margin)
-    noise.disturbance()
 
 
 def _refuse_noise(noise: NoiseFlags) -> None:
@@ -88,7 +87,7 @@ def _verify_on_task(
         file, task = controller_and_task(options.controller, flags)
     task = allowed(task, options.suite, trust=options.trust)
     if options.episodes is not None:
-        task.disturbed_options(noise.disturbance())
+        noise.disturbance(task)
     _freeze()
     with WarmJudge(child_pool) as judge:
         report = _report(file, task, options, judge)
@@ -185,7 +184,7 @@ def _measure(
                 options,
                 judge,
                 bar,
-                disturbance=noise.disturbance(),
+                disturbance=noise.disturbance(task),
                 accept_at=options.accept_at,
                 margin=options.margin,
             )

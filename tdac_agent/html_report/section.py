@@ -29,6 +29,7 @@ from tdac_agent.runs.run_record import (
     PICTURE_FILE,
     PROMPT_FILE,
 )
+from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
@@ -82,6 +83,7 @@ def section_of(
         "iterations": [(k, list(group)) for k, group in iterations],
         "failures": list(_failures(history)),
         "scene": scene,
+        "task_near": _near(history),
         "episodes": episodes,
         "watchable": {(e["candidate"], e["name"]): n for n, e in enumerate(episodes)},
         "most_lines": max(least, min(most, share)),
@@ -94,6 +96,11 @@ def section_of(
         "improvement": read_improvement(run.folder) if run.improve else None,
         "units": None if report is None else UNITS[report.provenance.unit],
     }
+
+
+def _near(history: RunHistory) -> str:
+    """Formats the goal tolerance of the run's task; empty without a task."""
+    return "" if history.task is None else tolerance_text(history.task.setting)
 
 
 def _breakdown(history: RunHistory) -> str | None:

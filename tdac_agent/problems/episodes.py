@@ -182,7 +182,7 @@ class OfTask:
         return TaskWorld(
             on_level=policy.on_level,
             task=lay_out(self.task, folder / "work"),
-            disturbance=part.disturbance or Disturbance(),
+            disturbance=part.disturbance or self.task.own_disturbance(),
             variation=part.variation,
         )
 
@@ -194,7 +194,7 @@ class OfTask:
         return {
             **facts,
             "controller_sha256": sha256,
-            "disturbance": part.disturbance or Disturbance(),
+            "disturbance": part.disturbance or self.task.own_disturbance(),
             "variation": part.variation,
             "first": part.first,
         }

@@ -16,7 +16,6 @@ from tdac_agent.prompting.prompt import (
 )
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.task import (
     Task,
@@ -95,7 +94,7 @@ class TaskProblem:
     def check(self, improve: int = 0) -> None:
         """See `Problem`."""
         if improve:
-            self.task.disturbed_options(Disturbance())
+            self.task.disturbed_options(self.task.own_disturbance())
 
     def permitted(self, suite: Path | None) -> TaskProblem:
         """See `Problem`."""

@@ -318,7 +318,7 @@ class SuiteTrials:
         seeds = seeds_for(terms.recorder.run, purpose, count)
         found = drive_candidate(
             *(terms, candidate, self.task, seeds, out, about),
-            disturbance=Disturbance(),
+            disturbance=self.task.own_disturbance(),
         )
         self.used += count
         terms.recorder.event("drive.end", **about, reached=found.successes)

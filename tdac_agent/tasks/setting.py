@@ -13,7 +13,7 @@ from tdac_agent.tasks.units import Units
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.gap_search import GapWatch
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.task import Pose, radii_text
 from tdac_envs.grid.plan import Path as Way
 
 
@@ -72,6 +72,13 @@ class Nominal(Protocol):
 
     def jittered(self, random: np.random.Generator) -> Pose:
         """Returns a random feasible start of the jitter variation."""
+
+
+def tolerance_text(setting: Setting) -> str:
+    """Formats the goal tolerance of a setting: `0.2 m (1.0 radii)`."""
+    own = setting.nominal
+    length = setting.length_text(own.goal_tolerance)
+    return f"{length} ({radii_text(own.goal_tolerance, own.body_radius)})"
 
 
 class JudgedEnv(Protocol):
@@ -211,7 +218,14 @@ class Setting(Protocol):
 
     @property
     def has_dropouts(self) -> bool:
-        """Whether the environment has the option `range_dropout`."""
+        """Whether the robot is on a map: it has `range_dropout` and `pose_noise`."""
+
+    @property
+    def disturbances(self) -> dict[str, Any]:
+        """What the robot's file says of its disturbances, in units of the task."""
+
+    def length_of(self, length: float) -> float:
+        """Converts a length in units of the task to those of the environment."""
 
     def facts(self) -> dict[str, Any]:
         """Returns all that determines an episode, the map or world by its hash."""

@@ -133,7 +133,7 @@ def verify_episodes(
     else:
         if suite is not None:
             raise TaskError("suite: on a task, verify runs it; leave it out here")
-        problem.disturbed_options(disturbance or Disturbance())
+        problem.disturbed_options(disturbance or problem.own_disturbance())
         count = EPISODES if episodes is None else episodes
         whole_number("episodes", count, 1, MOST_EPISODES)
         if first is not None:

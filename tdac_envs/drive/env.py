@@ -132,6 +132,10 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         pose: NDArray[np.float64] = self.robot.state[: HEADING + 1].copy()
         return pose
 
+    def observed_pose(self) -> NDArray[np.float64]:
+        """The pose as it is observed, in the frame of `pose`, shape (3,)."""
+        return self.pose()
+
     def discs(self) -> NDArray[np.float64]:
         """Moving obstacles as they are now, shape (n, 3): x, y, radius (px or m)."""
         return np.zeros((0, 3))

@@ -65,6 +65,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         infos_of: The infos of a step; see `tdac_envs.drive.batching.infos_of`.
         last_poses: True poses of all robots before the last `SAME_STEP` autoreset,
             shape (num_envs, 3).
+        last_observed_poses: The same as they were observed.
     """
 
     make: Callable[..., Any]
@@ -104,7 +105,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         )
         for constants, setup in zip(self.robots.constants, self.setups, strict=True):
             constants[:] = setup.constants()
-        self.last_poses = self.pose()
+        self.last_poses = self.last_observed_poses = self.pose()
         self.render_mode = render_mode
         self._frames = frames_of(render_mode, envs, self.robots, num_envs)
         self._slices = Slices(self.threads)
@@ -230,6 +231,10 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         """The true poses, shape (num_envs, 3): x, y (px or m), heading (rad)."""
         poses: Array = self.robots.state[:, : stepping.HEADING + 1].copy()
         return poses
+
+    def observed_poses(self) -> Array:
+        """The poses as they are observed, shape (num_envs, 3)."""
+        return self.pose()
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -361,7 +366,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         for i in over.tolist():
             final[i] = {key: value[i].copy() for key, value in observations.items()}
         last = self._infos(ended)
-        self.last_poses = self.pose()
+        self.last_poses, self.last_observed_poses = self.pose(), self.observed_poses()
         self._begin(ended, {})
         for key, seen in self._seen().items():
             observations[key][over] = seen[over]

@@ -203,7 +203,7 @@ class WrappedVectorEnv(VectorWrapper):
             steps = self.batch.robots.state[:, STEPS]
             pose: Any = self._reckoned.follow(observations[self._source], steps)
             observations = {**observations, "pose": pose}
-        return self._wrapped(observations, self.batch.pose())
+        return self._wrapped(observations, self.batch.observed_poses())
 
     def _wrapped(self, observations: Observations, poses: Array) -> Seen:
         seen: Any = observations
@@ -222,7 +222,7 @@ class WrappedVectorEnv(VectorWrapper):
         if self._reckoned is not None:
             final_pose: Any = self._reckoned.ahead(last[self._source])
             last["pose"] = final_pose
-        seen = self._wrapped(last, self.batch.last_poses)
+        seen = self._wrapped(last, self.batch.last_observed_poses)
         for i in over:
             single = not isinstance(seen, dict)
             final[i] = seen[i] if single else {key: v[i] for key, v in seen.items()}

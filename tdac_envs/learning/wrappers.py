@@ -320,7 +320,7 @@ class Guidance(
         plain: Any = self.unwrapped
         if self._route is None or plain.task is not self._task:
             self._task, self._route = plain.task, route_to_goal(plain.task, self.reach)
-        poses = plain.pose()[None]
+        poses = plain.observed_pose()[None]
         return {**observation, "guidance": self.frame.guidance(self._route, poses)[0]}
 
     def __getstate__(self) -> dict[str, Any]:

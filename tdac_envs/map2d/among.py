@@ -68,6 +68,7 @@ from tdac_envs.map2d.kernels import (
     drive_step,
     ground_speeds,
     observe,
+    scanner_at,
 )
 from tdac_envs.map2d.rays import LeapGrid
 from tdac_envs.movers.state import (
@@ -256,9 +257,10 @@ def _drive_among(
     observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip
+    at_x, at_y = scanner_at(constants, state[X], state[Y], state[HEADING])
     end_ranges_at_discs(
-        directions, traits, now, state[X], state[Y], state[HEADING],
-        constants[RANGE_MAX], ranges,
+        directions, traits, now, at_x, at_y, state[HEADING], constants[RANGE_MAX],
+        ranges,
     )  # fmt: skip
     finish_step(constants, state, outcome, before)
 
@@ -286,9 +288,10 @@ def _begin_among(
         ranges, outcome,
     )  # fmt: skip
     past[:, 0], past[:, 1] = state[X], state[Y]
+    at_x, at_y = scanner_at(constants, state[X], state[Y], state[HEADING])
     end_ranges_at_discs(
-        directions, traits, now, state[X], state[Y], state[HEADING],
-        constants[RANGE_MAX], ranges,
+        directions, traits, now, at_x, at_y, state[HEADING], constants[RANGE_MAX],
+        ranges,
     )  # fmt: skip
 
 

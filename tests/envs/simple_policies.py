@@ -43,8 +43,7 @@ def wall_follower(hand: int, robot) -> Callable:
     to its hand in which the body keeps clear of all points that its rays have hit
     so far.
     """
-    fan = math.radians(robot.field_of_view_deg) / 2
-    angles = np.linspace(-fan, fan, robot.n_rays)
+    angles = robot.angles()
     sweep = -hand * np.radians(np.arange(0, 360, 10))
     body = robot.radius + 2.5
     seen = np.zeros((1024, 1024), bool)

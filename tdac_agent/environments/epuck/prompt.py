@@ -8,6 +8,7 @@ from typing import Any
 from tdac_agent.environments.epuck.setting import world_setting
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.suite.contract import time_step
+from tdac_envs.drive.task import radii_text
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.paths import widest_body
 from tdac_envs.worlds.bodies import BODY_BOTTOM, BODY_TOP
@@ -45,6 +46,7 @@ def facts_of(task: Task) -> dict[str, Any]:
         "sensor_range": f"{robot.sensor_range:g}",
         "tolerance_m": f"{nominal.goal_tolerance:g}",
         "tolerance_mm": f"{1e3 * nominal.goal_tolerance:g}",
+        "tolerance_radii": radii_text(nominal.goal_tolerance, nominal.body_radius),
         "radius_mm": f"{1e3 * nominal.body_radius:g}",
         "body_bottom": f"{1e3 * BODY_BOTTOM:g}",
         "body_top": f"{1e3 * BODY_TOP:g}",

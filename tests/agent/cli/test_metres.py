@@ -112,7 +112,7 @@ def test_an_evaluation_in_metres(tdac, plan, folder):
     code, text, err = tdac(*words, "--map", plan, *ENDS)
     assert (code, err) == (0, "")
     assert "gap m" in text
-    assert "goal within 2 m" in " ".join(text.split())
+    assert "goal within 0.6 m (1.0 radii)" in " ".join(text.split())
     code, text, _ = tdac(*words, "--task", folder)
     assert "gap m" in text
     code, text, _ = tdac(*words, "--task", folder, "--json")
@@ -152,6 +152,7 @@ def test_a_place_is_quoted_as_typed(tdac, plan):
 def test_one_shortest_path(tdac, done, plan):
     """The same length in `map` and `synth`, and that of `tdac evaluate`."""
     ends = ("--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6")
+    ends = (*ends, "--frame", "pixels")
     _, text, _ = tdac("map", plan, *ends)
     [printed] = re.findall(r"shortest path (\d+) px", text)
     file = plan.parent / "task.yaml"
@@ -166,7 +167,7 @@ def test_one_shortest_path(tdac, done, plan):
 
 
 def test_the_robot_of_a_map_in_metres(tdac, plan):
-    """Its default speed in pixels is fast in metres, so it is printed."""
+    """Its default speed is one of a real robot, and it is printed."""
     _, text, _ = tdac("map", plan, "--metres", *ENDS)
-    assert "robot: radius 0.6 m, full speed 7.6 m/s" in text
+    assert "robot: radius 0.6 m, full speed 0.5 m/s" in text
     assert "--max-speed" in text
