@@ -148,7 +148,7 @@ class SynthProgress:
         if record["event"] != "drive.end":
             self.doing(f"{at}  {kind}: {reached}")
         elif blind:
-            word = "verified" if record["passed"] else "not verified"
+            word = record["word"]
             self.say(f"  {at}", f"{word}: blind drives: {reached}", COLOURS[word])
         elif record["what"] == "comparison":
             self.say(f"  {at}", f"other disturbed episodes: {reached}", "dim")

@@ -19,7 +19,7 @@ from tdac_agent.verification.episode_report import (
     percent,
 )
 from tdac_agent.verification.judge.episode_row import EpisodeRow
-from tdac_agent.verification.verdict import COLOURS, verified_text
+from tdac_agent.verification.verdict import COLOURS, verified_text, word_of
 
 LEAST, MOST, ERRORS = 5, 10, 3
 REACHED = "reached"
@@ -81,7 +81,7 @@ def show_confirmation(
         print_command(console, "replay the first of them:", replay)
     if report.time_outs:
         console.print(_warning(report), highlight=False)
-    word = "verified" if report.passed else "not verified"
+    word = word_of(report)
     text = f"{escape(verified_text(report))}; {report.seconds:.0f} s"
     console.print(f"[bold {COLOURS[word]}]{word}[/]: {text}", highlight=False)
     console.print(f"  blind drives: {report.provenance.disturbance}", highlight=False)

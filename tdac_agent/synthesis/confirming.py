@@ -19,7 +19,7 @@ from tdac_agent.verification.confirmation import (
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.store import REPORT_FILE
-from tdac_agent.verification.verdict import confirmed_text
+from tdac_agent.verification.verdict import confirmed_text, word_of
 
 
 def drive_blind(
@@ -51,8 +51,13 @@ def drive_blind(
         )
         recorder.vouch(file)
     facts = {"reached": found.successes, "driven": found.count}
-    recorder.event("drive.end", **about, **facts, passed=found.passed)
+    recorder.event("drive.end", **about, **facts, word=word_of(found))
     return found
+
+
+def is_confirmed(report: EpisodeReport) -> bool:
+    """Whether a confirmation verifies its controller."""
+    return word_of(report) == "verified"
 
 
 def confirmed_result(
@@ -66,7 +71,7 @@ def confirmed_result(
         confirmation: The confirmation.
     """
     said = confirmed_text(confirmation)
-    failure, passed = tested.failure, confirmation.passed
+    failure, passed = tested.failure, is_confirmed(confirmation)
     if not passed:
         failure = confirmation_feedback(report, confirmation)
     assert failure is not None

@@ -21,6 +21,7 @@ from tdac_agent.verification.diagnosis.report import Diagnosis, Failure, Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.store import TRAJECTORIES
+from tdac_agent.verification.verdict import confirmed_text
 from tdac_envs.ladder.scores import time_score
 
 PURPOSES = ("improve", "comparison")
@@ -84,11 +85,11 @@ def confirmation_feedback(report: Report, driven: EpisodeReport) -> Feedback:
         report: The report of the suite, which the candidate passed.
         driven: The confirmation. Another one will have other starts.
     """
-    failed = driven.count - driven.successes
-    line = f"all tests passed, but {failed} of {driven.count} blind drives failed"
-    failures = tuple(_as_failure(each) for each in driven.failures)
+    line = f"all tests passed, but {confirmed_text(driven)}"
+    bad = [each for each in driven.episodes if each.too_close or not each.success]
+    failures = tuple(_as_failure(each) for each in bad)
     text = "All tests passed. Then it drove blind, from other starts and with {}. {}"
-    found = disturbed_feedback(driven) or ""
+    found = disturbed_feedback(driven) or f"{confirmed_text(driven)}."
     text = (
         "All tests passed. Then it drove blind, from other starts, with "
         f"{driven.provenance.disturbance}. {found}"

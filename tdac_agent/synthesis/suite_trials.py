@@ -19,6 +19,7 @@ from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.confirming import (
     confirmed_result,
     drive_blind,
+    is_confirmed,
     keep_confirmation,
 )
 from tdac_agent.synthesis.delivery import (
@@ -168,7 +169,7 @@ class SuiteTrials:
     def picture(self, candidate: Candidate) -> FailurePicture | None:
         """See `Trials`."""
         confirmation = candidate.confirmation
-        if confirmation is not None and not confirmation.passed:
+        if confirmation is not None and not is_confirmed(confirmation):
             folder = candidate.folder / CONFIRMATION
             return failed_picture(self.task, confirmation, folder)
         trajectories = load_trajectories(candidate.folder / "trajectories")
@@ -284,7 +285,8 @@ class SuiteTrials:
         if not self.confirms or chosen.candidate is first:
             return chosen
         found = self.confirm(chosen.candidate)
-        if found.passed or first.confirmation is None or not first.confirmation.passed:
+        known = first.confirmation
+        if is_confirmed(found) or known is None or not is_confirmed(known):
             return chosen
         stopped = f"the best variation was not confirmed: {confirmed_text(found)}"
         return replace(chosen, candidate=first, stopped=stopped)
@@ -303,7 +305,7 @@ class SuiteTrials:
                     j=candidate.j,
                     episodes=found.count,
                     failures=found.count - found.successes,
-                    passed=found.passed,
+                    passed=is_confirmed(found),
                 )
             )
             if candidate is self._secured:

@@ -14,7 +14,7 @@ from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.synthesis.world_trials import WorldTrials
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.verdict import confirmed_text
+from tdac_agent.verification.verdict import confirmed_text, word_of
 
 
 class Trials(Protocol):
@@ -137,7 +137,9 @@ def conclude(trials: Trials, chosen: Chosen) -> None:
         recorder.run.tau = delivered.k
     if trials.confirms:
         found = trials.confirm(delivered)
-        status = "verified" if found.passed else "not verified"
-        if not (found.passed or recorder.run.on_set):
-            reason = confirmed_text(found)
+        if recorder.run.on_set:
+            status = "verified" if found.passed else "not verified"
+        else:
+            status = word_of(found)
+            reason = reason if status == "verified" else confirmed_text(found)
     recorder.finish(status, k=delivered.k, j=delivered.j, reason=reason)

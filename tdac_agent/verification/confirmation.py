@@ -70,7 +70,7 @@ def confirm(
         PolicySpec("controller"),
         sha256_of(source),
         episodes_of(task),
-        Part(confirming_seeds(source, task, number), disturbance=DISTURBANCE),
+        Part(confirming_seeds(source, task, number), disturbance=disturbance_of(task)),
         source,
         test,
         tier=tier,
@@ -78,6 +78,12 @@ def confirm(
         trajectories=True,
     )
     return drive(request, out, judge, watch)
+
+
+def disturbance_of(task: Task) -> Disturbance:
+    """What disturbs blind drives: what robot and task say, or else noise and slip."""
+    own = task.own_disturbance()
+    return DISTURBANCE if own == Disturbance() else own
 
 
 def read_confirmation(folder: Path) -> EpisodeReport | None:
@@ -101,7 +107,7 @@ def kept_confirmation(
         "controller_sha256": sha256_of(source),
         "sha256": task.sha256(),
         "first": confirming_seeds(source, task, number).start,
-        "disturbance": DISTURBANCE,
+        "disturbance": disturbance_of(task),
         "versions": versions(),
     }
     same = all(getattr(known, name) == value for name, value in wanted.items())

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from tdac_agent.runs.run_record import Run
+from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.diagnosis.gap import gap_figure, too_close_text
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.confirming import ConfirmingTest
 
+Word = Literal["verified", "passed", "not verified"]
 COLOURS = {
     "verified": "green",
     "passed": "cyan",
@@ -15,12 +20,32 @@ COLOURS = {
 """Colour of each word; green is for `verified` alone."""
 
 
-def confirmed_text(report: EpisodeReport) -> str:
-    """What a confirmation showed, such as `arrives ≥ 95 % (0 of 93 failed)`."""
+def word_of(report: EpisodeReport) -> Word:
+    """The verdict of a confirmation.
+
+    What arrives, but in too many drives with less than the required gap, has passed.
+    """
+    if not report.passed:
+        return "not verified"
+    return (
+        "verified" if report.too_close <= _test_of(report).most_failures else "passed"
+    )
+
+
+def _test_of(report: EpisodeReport) -> ConfirmingTest:
     assert report.sequential is not None
     test = report.sequential.test
     assert isinstance(test, ConfirmingTest)
-    failed = report.count - report.successes
+    return test
+
+
+def confirmed_text(report: EpisodeReport) -> str:
+    """What a confirmation showed, such as `arrives ≥ 95 % (0 of 93 failed)`."""
+    test, failed = _test_of(report), report.count - report.successes
+    if word_of(report) == "passed":
+        assert report.smallest_gap is not None
+        near = too_close_text(report.smallest_gap, UNITS[report.provenance.unit])
+        return f"{report.too_close} of {report.count} blind drives came {near}"
     if report.passed:
         return f"arrives ≥ {100 * test.least:g} % ({failed} of {report.count} failed)"
     return (
@@ -31,17 +56,28 @@ def confirmed_text(report: EpisodeReport) -> str:
 
 def verified_text(report: EpisodeReport) -> str:
     """The verdict of a confirmation in one line, with what it does not cover."""
-    text = f"{confirmed_text(report)}, sandbox {report.provenance.sandbox}"
-    return f"{text}; not covered: {not_covered(report)}" if report.passed else text
+    text, gap = confirmed_text(report), report.smallest_gap
+    if word_of(report) != "verified":
+        return text
+    if gap is not None:
+        text += f", smallest gap {gap_figure(gap.gap, UNITS[report.provenance.unit])}"
+    text += f", sandbox {report.provenance.sandbox}"
+    return f"{text}; not covered: {not_covered(report)}"
 
 
 def not_covered(report: EpisodeReport) -> str:
     """What the drives of a confirmation cannot show."""
     drove_with, missing = report.provenance.disturbance, ["other worlds"]
     if drove_with is not None:
-        parts = {"delays": drove_with.delay, "unequal wheels": drove_with.wheel_gains}
+        wheels = drove_with.wheel_gains or drove_with.wheel_radius_error
+        delay = drove_with.delay or drove_with.pose_delay or drove_with.scan_delay
+        parts = {
+            "delays": delay,
+            "unequal wheels": wheels,
+            "a wrong pose": drove_with.pose_noise,
+        }
         missing += [name for name, size in parts.items() if not size]
-    return ", ".join([*missing, "a wrong pose", "other physics"])
+    return ", ".join([*missing, "other physics"])
 
 
 def delivered_text(run: Run) -> str:

@@ -33,8 +33,8 @@ class Gap(StrictRecord):
 
     @property
     def too_close(self) -> bool:
-        """Whether the gap is smaller than the required one."""
-        return self.gap < self.required
+        """Whether it is smaller than the required one, and not that of the start."""
+        return self.gap < self.required and self.step != 0
 
 
 def gap_figure(length: float, units: Units) -> str:

@@ -8,12 +8,12 @@ from changed_run import change_run
 from hostile_model import CRASHES, CRASHES_LATER, EVIL, SUITE, Model
 from script import AHEAD
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.html_report import make_page
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.diagnosis.report import Report
 
 

@@ -207,7 +207,7 @@ def test_names_in_inspect_begin_with_the_package():
     from tdac_agent.inspect_tasks import registry
 
     solvers = registry.repair, registry.tdac_builtin
-    for made in (registry.verified, registry.driven, *solvers):
+    for made in (registry.passed, registry.driven, *solvers):
         assert registry_info(made).name == f"tdac_agent/{made.__name__}"
 
 

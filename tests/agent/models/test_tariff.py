@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from script import STILL
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.errors import ProviderError
@@ -17,7 +18,6 @@ from tdac_agent.models.prices import SHIPPED, Price
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.tariff import UNPRICED_TOKENS, Tariff, bounds_of, tariffs_of
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_envs.core.extras import install_command
 
 PRICE = Price(input=2, output=10, cache_read=0.1, cache_write=2.5)

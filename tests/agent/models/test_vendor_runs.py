@@ -12,12 +12,12 @@ from changed_run import journal
 from fault_server import ANTHROPIC, MODEL, OPENAI, PATHS, answers, begins, fails
 from script import STILL
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 

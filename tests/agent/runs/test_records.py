@@ -14,6 +14,7 @@ from changed_run import journal
 from damage import altered_json, torn
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from unconfirmed import synthesize
 
 from tdac_agent.errors import RunError
 from tdac_agent.library.listing import resume_command
@@ -23,7 +24,6 @@ from tdac_agent.runs.recorder import difference
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import Attempt, Run, load_run
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.synthesis.synthesize import synthesize
 
 
 def test_each_call_is_on_record_before_and_after(
@@ -192,7 +192,7 @@ def test_a_damaged_run(tmp_path_factory, data):
         reason = str(error)
     else:
         assert run.folder == folder
-        assert not run.verified
+        assert not run.passed
         return
     assert reason.startswith(f"{folder} is not a run folder: ")
     assert "\n" not in reason

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 from script import NO_RULES, STILL, Script, code
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
@@ -21,7 +22,6 @@ from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.locks import LOCK_FILE, hold
-from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 
@@ -106,7 +106,7 @@ def test_an_answer_that_is_damaged_is_asked_for_again(
 @pytest.fixture(scope="module")
 def once_verified(policy_task, tmp_path_factory, warm):
     out = tmp_path_factory.mktemp("verified") / "run"
-    assert synthesize(policy_task, "builtin", out=out, judge=warm).verified
+    assert synthesize(policy_task, "builtin", out=out, judge=warm).passed
     return out
 
 

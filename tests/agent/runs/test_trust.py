@@ -11,6 +11,7 @@ import pytest
 import yaml
 from few_worlds import KNOWN, write_set
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.models.budget import Enough
@@ -34,7 +35,6 @@ from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.studio.run_status import from_elsewhere
 from tdac_agent.synthesis.setup import hold_folder
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import display_name
 from tdac_agent.tasks.task_file import TaskFile
@@ -54,7 +54,7 @@ def made(tmp_path_factory, warm):
     (folder / "tests" / "test_own.py").write_text(TEST)
     task = replace(task, suite=folder / "tests")
     run = synthesize(task, out=folder / "run", iterations=1, judge=warm)
-    assert run.verified
+    assert run.passed
     return run.folder
 
 
@@ -384,7 +384,7 @@ def test_what_was_allowed_stays_somebody_elses(tmp_path, run, secret, warm):
     (run / "run.json").write_text(json.dumps(record))
     secret()
     again = synthesize(load_task(run, trust=True), out=run, iterations=1, judge=warm)
-    assert again.verified
+    assert again.passed
     assert not is_own(load_run(run), run / "suite")
 
 

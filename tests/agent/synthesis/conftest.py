@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import pytest
 from script import Script
+from unconfirmed import synthesize
 
-from tdac_agent import synthesize
 from tdac_agent.models.retry import RetryPolicy
 
 ON_SET = {"episodes": 12, "feedback_episodes": 2, "seed": 3}

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 from script import AHEAD, NO_RULES, STILL, code
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
@@ -19,7 +20,6 @@ from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.side_by_side import side_by_side
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import whole
 
 RAISES = "def policy(obs):\n    raise ValueError\n"
@@ -74,7 +74,7 @@ def test_the_best_of_three_is_repaired(ask, task, good_source):
     }
     model = Table(answers, together=3)
     run = ask(model)
-    assert run.verified
+    assert run.passed
     assert sorted(model.asked[:3]) == [("generate", k, 0) for k in (1, 2, 3)]
     (edit,) = model.asked[3:]
     first = [len(a.failed_tests) for a in run.attempts[:3]]
@@ -125,7 +125,7 @@ def test_one_of_three_passes_at_once(ask, good_source):
     answers = {("generate", k, 0): code(STILL) for k in (1, 3)}
     answers[("generate", 2, 0)] = code(good_source)
     run = ask(Table(answers, together=3))
-    assert run.verified
+    assert run.passed
     assert run.tau == 2
     assert [(a.k, a.passed) for a in run.attempts] == [
         *[(1, False), (2, True), (3, False)]
@@ -144,7 +144,7 @@ def test_a_fault_loses_no_answer_of_the_others(ask, good_source):
     again = Table({("generate", 2, 0): code(good_source)}, together=1)
     again.name = model.name
     run = ask(again)
-    assert run.verified
+    assert run.passed
     assert again.asked == [("generate", 2, 0)]
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from script import NO_RULES, STILL, Script, code
+from unconfirmed import synthesize
 
 from tdac_agent.html_report import make_page
 from tdac_agent.models.provider import Reply
@@ -19,7 +20,6 @@ from tdac_agent.prompting.given_rules import (
 from tdac_agent.prompting.prompt import PromptError
 from tdac_agent.prompting.rules import MAX_RULE_TOKENS, RuleBook
 from tdac_agent.runs.run_record import load_rules, load_run
-from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 LEARNT = [
@@ -62,7 +62,7 @@ def test_what_was_learnt_on_one_task_is_given_to_the_next(
     model = Script(code(STILL), code(good_source))
     given = {"out": tmp_path / "next", "judge": warm, "retry": AT_ONCE}
     run = synthesize(task, model, rules=read_given(file), **given)
-    assert run.verified
+    assert run.passed
     for request in model.requests:
         assert "- Return plain floats. [R1]" in request.prompt
     assert set(run.given_rules) == {
@@ -97,7 +97,7 @@ def test_a_run_with_given_rules_is_resumed(task, tmp_path, warm, good_source):
     before = load_run(tmp_path / "run")
     rules = given_book(before.given_rules)
     run = synthesize(task, Script(code(good_source)), rules=rules, **given)
-    assert run.verified
+    assert run.passed
     assert run.given_rules == ("[environment] Keep right.",)
 
 

@@ -281,10 +281,10 @@ def test_an_interrupted_search_leaves_a_verified_run(
 
     def check():
         run = load_run(out)
-        assert (run.verified, run.finished, run.censored) == (True, False, False)
+        assert (run.passed, run.finished, run.censored) == (True, False, False)
         assert (run.tau, [each.k for each in run.attempts]) == (1, [1, 7])
         assert run.controller.read_text() == good_source
-        assert row_of(out)["status"] == "verified"
+        assert row_of(out)["status"] == "passed"
         words = f"{out} is verified; to go on improving it: tdac synth --resume {out}"
         assert words in tdac("runs", tmp_path)[1]
         page = make_page(out)

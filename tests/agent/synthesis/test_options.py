@@ -8,6 +8,7 @@ import pytest
 import typer
 import yaml
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent.campaign import config as campaign_file
 from tdac_agent.campaign.config import CampaignError, read_config
@@ -22,7 +23,6 @@ from tdac_agent.runs.ownership import is_own_folder, load_task
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.synthesis import synthesize as synthesis
 from tdac_agent.synthesis.options import SynthOptions
-from tdac_agent.synthesis.synthesize import synthesize
 
 
 def test_each_option_is_a_flag_with_a_help_text():

@@ -9,10 +9,10 @@ import pytest
 from changed_run import journal
 from script import AHEAD, STILL
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
 from tdac_agent.runs.run_record import Attempt, Run, load_rules, load_run
-from tdac_agent.synthesis.synthesize import synthesize
 
 PROGRAM = Path(__file__).parents[1] / "scripted_model.py"
 SLOW = "Drive no faster than 0.5 near walls."

@@ -8,8 +8,8 @@ import stat
 import pytest
 from few_worlds import KNOWN, half_of, write_set
 from script import AHEAD, NO_RULES, STILL, Paid, code
+from unconfirmed import synthesize
 
-from tdac_agent import synthesize
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.html_report.set_part import MOST_DRAWN

@@ -9,12 +9,12 @@ import pytest
 from few_worlds import write_set
 from PIL import Image
 from script import AHEAD, NO_RULES, STILL, Script, code
+from unconfirmed import synthesize
 
 from tdac_agent.html_report import make_page
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.synthesis.set_reports import world_picture
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.drawing.canvas import MOVER

@@ -11,8 +11,9 @@ import script
 from changed_run import journal
 from script import AHEAD, NO_RULES, STILL, Paid, Script
 from small import write_small_task
+from unconfirmed import synthesize
 
-from tdac_agent import load_task, synthesize
+from tdac_agent import load_task
 from tdac_agent.errors import Fault, ProviderError, RunError
 from tdac_agent.models.provider import PermanentFault, ProviderFault, Reply
 from tdac_agent.runs.run_record import load_run
@@ -131,7 +132,7 @@ def test_it_passes_after_rules_and_an_edit(task, good_source, out, warm):
     learner = Script(code(STILL), code(STILL + "\nX = 2\n"))
     optimizer = Script(code(STILL + "\nX = 1\n"), RULES, code(good_source))
     run = synthesize(task, learner, optimizer, out=out, judge=warm)
-    assert run.verified
+    assert run.passed
     assert run.tau == 2
     assert learner.asked() == [("generate", 1, 0), ("generate", 2, 0)]
     assert optimizer.asked() == [("edit", 1, 1), ("summarise", 1, 1), ("edit", 2, 1)]
@@ -163,7 +164,7 @@ def check_folder(folder, source):
     for name in ("edit.prompt.md", "edit.reply.md", "controller.py", "report.json"):
         assert (last / name).is_file(), name
     assert "+X = 1" in (folder / "iterations/k01/j1/controller.diff").read_text()
-    assert load_run(folder).verified
+    assert load_run(folder).passed
     events = [record["event"] for record in journal(folder)]
     assert (events[0], events[-1]) == ("run.start", "run.end")
     rules = next(r for r in journal(folder) if r["event"] == "rules")["rules"]
@@ -272,7 +273,7 @@ def test_a_given_controller_may_be_poor(write, on_task, source):
 def test_builtin_needs_no_model(write, on_task):
     """The builtin learner verifies the small task by itself."""
     _, run = write(on_task, model="builtin")
-    assert run.verified
+    assert run.passed
     assert run.learner == run.optimizer == "builtin"
     assert run.tokens_in == 0
 
@@ -299,7 +300,7 @@ def test_a_run_folder_is_self_contained(tmp_path, good_source, out, warm):
     test = "def test_own(rollout):\n    assert rollout('nominal').reached, 'no'\n"
     (folder / "mine" / "test_mine.py").write_text(test)
     task = load_task(folder, trust=True)
-    assert synthesize(task, Script(code(good_source)), out=out, judge=warm).verified
+    assert synthesize(task, Script(code(good_source)), out=out, judge=warm).passed
     moved = tmp_path / "elsewhere" / "moved"
     moved.parent.mkdir()
     out.rename(moved)

@@ -13,6 +13,7 @@ from changed_run import journal
 from PIL import Image
 from script import AHEAD, NO_RULES, Script, code
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.html_report import make_page
@@ -26,7 +27,6 @@ from tdac_agent.runs.journal_state import call_key
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.cost_forecast import cost_of
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import rest_of
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
@@ -40,7 +40,7 @@ def seen(task, good_source, tmp_path_factory, warm):
     # The second answer has no Python, so that the question is repeated.
     model = Script(code(AHEAD), NO_RULES, code(good_source))
     run = synthesize(task, model, out=out, seed=4, vision=True, judge=warm)
-    assert run.verified
+    assert run.passed
     return out, model
 
 
@@ -104,7 +104,7 @@ def test_a_replay_finds_the_same_questions(seen, task, tmp_path, warm):
     out, _ = seen
     given = {"learner": f"replay:{out}", "judge": warm}
     run = synthesize(task, out=tmp_path / "again", vision=True, **given)
-    assert run.verified
+    assert run.passed
     one, other = (each / PLACE / "edit.picture.png" for each in (out, run.folder))
     assert one.read_bytes() == other.read_bytes()
     with pytest.raises(Fault, match="the question differs from the record"):
@@ -129,7 +129,7 @@ def test_a_resumed_run_has_the_same_picture(task, good_source, tmp_path, warm):
     assert file.read_bytes() == before
     file.unlink()
     last = Script(NO_RULES, code(good_source))
-    assert synthesize(task, last, **given).verified
+    assert synthesize(task, last, **given).passed
     assert last.asked() == [("summarise", 1, 1), ("generate", 2, 0)]
     assert file.read_bytes() == before
 

@@ -6,12 +6,12 @@ import pytest
 from changed_run import journal
 from script import Paid, code
 from small import SHORT, write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.suite.privileged import (
@@ -327,7 +327,7 @@ def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
     providers = {"learner": "builtin", who: paid}
     seen = []
     run = synthesize(task, **providers, out=out, judge=warm, on_event=seen.append)
-    assert run.verified
+    assert run.passed
     doing = [record["doing"] for record in seen if record["event"] == "prove.step"]
     assert doing == ["reference", "do-nothing"]
     assert len(paid.requests) == (who == "learner")
@@ -341,5 +341,5 @@ def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
 def test_what_costs_nothing_needs_no_proof(tmp_path, warm):
     """A run of the builtin learner loses no time."""
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
-    assert synthesize(task, out=tmp_path / "run", judge=warm).verified
+    assert synthesize(task, out=tmp_path / "run", judge=warm).passed
     assert not any(r["event"].startswith("prove") for r in journal(tmp_path / "run"))

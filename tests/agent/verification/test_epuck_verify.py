@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from script import AHEAD, STILL
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.cli.play import drive_disturbed
@@ -16,7 +17,6 @@ from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.environments.epuck.pictures import reaches
 from tdac_agent.evaluation.policy import load_controller
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.diagnosis.report import Report
@@ -140,7 +140,7 @@ def test_a_policy_drives_the_environment(crates, controller):
 def test_a_run_is_self_contained(crates, tmp_path, warm):
     """A synthesis leaves the world, its original, the picture and a task that loads."""
     run = synthesize(crates, out=tmp_path / "run", iterations=2, judge=warm)
-    assert run.verified
+    assert run.passed
     folder = tmp_path / "run"
     names = {path.name for path in folder.iterdir()}
     assert {"world.wbt", "original.wbt", "trajectory.png", "params.json"} <= names
