@@ -56,7 +56,7 @@ def show_run(run: Run, console: Console) -> None:
             _print_indented(console, search.told)
         if run.reason and search is not None:
             _print_indented(console, f"the search ended early: {run.reason}")
-        if run.status == "passed":
+        if run.status == "passed" and not run.confirmations:
             words = ["tdac", "verify", str(folder)]
             print_plain(console, f"  not verified yet: {shlex.join(words)}")
         _print_indented(console, usage)

@@ -204,12 +204,18 @@ def _show(run: Run, console: Console, *, before: Run | None) -> int:
     """Prints a run, as JSON if the console is stderr; returns the exit code."""
     if console.stderr:
         print_json(run)
-        return _EXIT.get(run.status, 1)
+        return exit_code(run)
     if before is not None and before.finished and before.status == run.status:
         note = f"the run in {run.folder} has already finished; nothing was done"
         print_plain(console, note)
     (show_selection if run.on_set else show_run)(run, console)
-    return _EXIT.get(run.status, 1)
+    return exit_code(run)
+
+
+def exit_code(run: Run) -> int:
+    """0 if the run ended as was asked for; 1 for what passed and was not confirmed."""
+    confirmed = run.status != "passed" or not run.confirmations
+    return _EXIT.get(run.status, 1) if confirmed else 1
 
 
 def _so_far(folder: Path) -> str:

@@ -106,7 +106,6 @@ def _verify_on_task(
             robust = _measure(file, task, options, noise, judge)
         elif report.passed and options.confirm and not options.paper:
             confirmation = _confirm(file, task, options, judge)
-    driven = robust or confirmation
     if options.junit is not None:
         from tdac_agent.cli.junit import write_junit
 
@@ -126,7 +125,11 @@ def _verify_on_task(
         show_confirmation(confirmation, console, play[1:], units)
     elif options.episodes is not None:
         console.print("robustness not measured: the controller failed its tests")
-    return 0 if report.passed and (driven is None or driven.passed) else 1
+    if confirmation is not None:
+        from tdac_agent.verification.verdict import word_of
+
+        return 0 if word_of(confirmation) == "verified" else 1
+    return 0 if report.passed and (robust is None or robust.passed) else 1
 
 
 def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) -> Report:

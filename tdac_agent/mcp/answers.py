@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pydantic import BaseModel, Field
 
 from tdac_agent.verification.episode_report import EpisodeReport, decision_text
-from tdac_agent.verification.verdict import verified_text
+from tdac_agent.verification.verdict import verified_text, word_of
 
 
 class Refused(Exception):
@@ -102,7 +102,7 @@ def blind_verdict(number: int, report: EpisodeReport) -> ChooseAnswer:
     """The verdict on a task: blind drives of what passed the suite."""
     return ChooseAnswer(
         submission=number,
-        verified=report.passed,
+        verified=word_of(report) == "verified",
         summary=verified_text(report),
         worlds=None,
         reached=None,

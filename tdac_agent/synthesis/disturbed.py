@@ -101,7 +101,8 @@ def confirmation_feedback(report: Report, driven: EpisodeReport) -> Feedback:
 def _as_failure(episode: EpisodeRow) -> Failure:
     """A failed drive, as a failed test of the suite."""
     text = episode.text or episode.error or episode.outcome
-    diagnosis = Diagnosis(cause=episode.cause or "error", text=text)
+    cause = episode.cause or ("collision" if episode.too_close else "error")
+    diagnosis = Diagnosis(cause=cause, text=text)
     return Failure(
         test=f"{CONFIRMATION}::drive",
         group="end to end",

@@ -213,7 +213,10 @@ def _is_over(before: Run, now: Run, wanted: SynthOptions) -> bool:
         RunError: It is another run, or one that this installation did not begin.
     """
     check_same(before, now, wanted.identity)
-    later = {"selected": now.then_verify, "passed": now.confirm}
+    later = {
+        "selected": now.then_verify,
+        "passed": now.confirm and not before.confirmations,
+    }
     over = before.finished and not later.get(before.status, False)
     if over:
         check_own(before)
