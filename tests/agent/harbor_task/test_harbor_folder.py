@@ -126,7 +126,7 @@ def test_the_oracle_is_rewarded_and_others_are_not(small, tmp_path, capfd):
     controller = root / "app/controller.py"
     subprocess.run([root / "solution/solve.sh"], check=True)
     rewards, said = judged(root, capfd)
-    assert rewards == {"reward": 1.0, "verified": 1.0}
+    assert rewards == {"reward": 1.0, "passed": 1.0}
     assert said.startswith("all ")
     controller.write_text(STILL)
     rewards, said = judged(root, capfd)

@@ -245,7 +245,7 @@ def test_only_several_runs_have_rates(copied):
 def test_a_run_that_ends_while_its_record_is_read_was_not_killed(copied):
     """What was at work before that has ended as its next record says."""
     run = load_run(copied)
-    assert status_now(run, before=True) == "verified"
+    assert status_now(run, before=True) == "passed"
     left = run.model_copy(update={"status": "running", "tau": None})
     assert status_now(left, before=True) == "running"
     assert status_now(left, before=False) == "killed"

@@ -99,7 +99,7 @@ def test_a_reference_is_verified_and_others_are_not(tmp_path):
     assert none.value == 0.0
     assert none.reason == "invalid_response_format"
     assert "it has no fenced block" in none.explanation
-    assert metrics(log)["verified", "accuracy"] == pytest.approx(1 / 3)
+    assert metrics(log)["passed", "accuracy"] == pytest.approx(1 / 3)
 
 
 @pytest.mark.slow
@@ -262,7 +262,7 @@ def test_the_command_line_finds_the_tasks_of_a_clone_and_of_a_wheel(tmp_path):
         assert "tdac_maze" in said
         log = log_in(work / "logs")
         assert log.eval.task == "tdac_agent/tdac_maze"
-        assert metrics(log)["verified", "accuracy"] == 1.0
+        assert metrics(log)["passed", "accuracy"] == 1.0
         where = call(
             ["-c", "import tdac_agent; print(tdac_agent.__file__)"], work, python
         )

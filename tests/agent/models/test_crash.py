@@ -136,7 +136,7 @@ def whole(model, task_folder, tmp_path):
         model.iterations = iterations
         folder = tmp_path / "whole" / "run"
         folder.parent.mkdir()
-        assert start(model, task_folder, [folder]) == ["verified"]
+        assert start(model, task_folder, [folder]) == ["passed"]
         assert load_run(folder).tau == iterations
         check_calls(model, folder, 0, kills=0)
         model.asked.clear()
@@ -161,7 +161,7 @@ def test_a_run_that_is_killed(model, task_folder, whole, tmp_path, kills):
         assert start(model, task_folder, [folder], kill_at, share) is None
     assert load_run(folder).status == "running"
     assert is_own_folder(load_run(folder))
-    assert start(model, task_folder, [folder]) == ["verified"]
+    assert start(model, task_folder, [folder]) == ["passed"]
     assert is_own_folder(load_run(folder))
     assert state(folder) == expected
     check_calls(model, folder, 0, kills=len(kills))
@@ -185,7 +185,7 @@ def test_killed_at_every_line(model, task_folder, whole, tmp_path):
         model.billed = 0.0
         share = cut.choice([0.0, 1.0, cut.random()])
         assert start(model, task_folder, [folder], kill_at, share) is None
-        assert start(model, task_folder, [folder]) == ["verified"]
+        assert start(model, task_folder, [folder]) == ["passed"]
         assert state(folder) == expected, f"killed at line {kill_at}"
         check_calls(model, folder, 0, kills=1)
 
@@ -204,7 +204,7 @@ def test_eight_runs_that_share_a_budget(model, task_folder, whole, tmp_path):
             break
         kills += 1
     assert kills >= 4
-    assert start(model, task_folder, folders) == ["verified"] * 8
+    assert start(model, task_folder, folders) == ["passed"] * 8
     for index, folder in enumerate(folders):
         run, rules, happened, _ = state(folder)
         assert {**run, "index": 0} == expected[0]
@@ -222,11 +222,11 @@ def test_eight_runs_that_exhaust_a_budget(model, task_folder, tmp_path):
     few = 3.0
     assert start(model, task_folder, folders, 60, 0.5, max_cost=few) is None
     ended = start(model, task_folder, folders, max_cost=few)
-    assert set(ended) <= {"verified", "budget"}
+    assert set(ended) <= {"passed", "budget"}
     assert "budget" in ended
     for folder, status in zip(folders, ended, strict=True):
         assert load_run(folder).censored == (status == "budget")
-    assert start(model, task_folder, folders) == ["verified"] * 8
+    assert start(model, task_folder, folders) == ["passed"] * 8
     for index, folder in enumerate(folders):
         assert not load_run(folder).censored
         check_calls(model, folder, index, kills=1)

@@ -155,7 +155,7 @@ def test_time_and_tokens_are_those_of_the_journal(run):
 def test_the_timeline_tells_what_happened(run):
     """Each candidate in order, with what failed."""
     told = texts(plot_timeline(run))
-    assert told.index("2 failed") < told.index("no code") < told.index("verified")
+    assert told.index("2 failed") < told.index("no code") < told.index("passed")
     assert "not used: no code" in told
 
 

@@ -55,7 +55,7 @@ def test_what_is_on_record_is_not_done_again(policy_task, good_source, halted, w
     model = Script(code(good_source, tokens_in=3))
     run = synthesize(policy_task, model, out=halted, on_event=seen.append, judge=warm)
     assert model.asked() == [("edit", 1, 1)]
-    assert (run.status, run.tau, run.tokens_in) == ("verified", 1, 10)
+    assert (run.status, run.tau, run.tokens_in) == ("passed", 1, 10)
     assert [(a.k, a.j, a.passed) for a in run.attempts] == [(1, 0, False), (1, 1, True)]
     now = (halted / "iterations/k01/j0/report.json").stat()
     assert (now.st_ino, now.st_mtime_ns) == (report.st_ino, report.st_mtime_ns)
@@ -284,12 +284,12 @@ def test_runs_are_listed(tdac, done, halted, once_verified):
     told = done("runs", place)
     assert "foreign" not in told
     assert f"to continue: tdac synth --resume {halted}" in told
-    assert "verified" in told
+    assert "passed" in told
     told = tdac("runs", place, "--json")[1]
     rows = {Path(row["run"]).name: row for row in json.loads(told)}
     assert {name: row["status"] for name, row in rows.items()} == {
         "run": "fault",
-        "good": "verified",
+        "good": "passed",
         "torn": "unreadable",
     }
     assert rows["good"]["go_on"] == ""
