@@ -11,11 +11,19 @@ import typer
 from tdac_agent.cli.shared_options import (
     AXLE_ERROR,
     DELAY,
+    HEADING_NOISE,
+    MESSAGE_DROP,
     MOTOR_LAG,
+    POSE_CORRELATION,
+    POSE_DELAY,
+    POSE_JUMPS,
+    POSE_NOISE,
     RANGE_DROPOUT,
     RANGE_NOISE,
+    SCAN_DELAY,
     VARIATION,
     WHEEL_GAINS,
+    WHEEL_RADII,
     WHEEL_SLIP,
     WRAPPER,
     Variation,
@@ -106,6 +114,16 @@ class TrainOptions:
     wheel_gains: float = option(0.0, WHEEL_GAINS, panel=DISTURBED, scope="task")
     axle_error: float = option(0.0, AXLE_ERROR, panel=DISTURBED, scope="task")
     range_dropout: float = option(0.0, RANGE_DROPOUT, panel=DISTURBED, scope="task")
+    wheel_radius_error: float = option(0.0, WHEEL_RADII, panel=DISTURBED, scope="task")
+    pose_noise: float = option(0.0, POSE_NOISE, panel=DISTURBED, scope="task")
+    heading_noise: float = option(0.0, HEADING_NOISE, panel=DISTURBED, scope="task")
+    pose_correlation: float = option(
+        0.0, POSE_CORRELATION, panel=DISTURBED, scope="task"
+    )
+    pose_jumps: float = option(0.0, POSE_JUMPS, panel=DISTURBED, scope="task")
+    pose_delay: int = option(0, POSE_DELAY, panel=DISTURBED, scope="task")
+    scan_delay: int = option(0, SCAN_DELAY, panel=DISTURBED, scope="task")
+    message_drop: float = option(0.0, MESSAGE_DROP, panel=DISTURBED, scope="task")
 
 
 @app.command(

@@ -36,7 +36,8 @@ def _places(file: SetFile, side: float) -> dict[str, tuple[str, str, str, str]]:
             "(3,)",
             f"{place}; heading in (-pi, pi]",
             f"{unit}, {unit}, rad",
-            f"x, y, heading of the robot in the {frame}; exact",
+            f"x, y, heading of the robot in the {frame}"
+            + ("" if file.disturbances.reception.has_errors else "; exact"),
         ),
         "goal": (
             "(2,)",
@@ -146,7 +147,51 @@ def disturbance_lines(file: SetFile) -> Iterator[str]:
     ]
     if isinstance(file.robot, EPuckRobotParams):
         sizes_and_lines += _epuck_errors(file.robot)
+    else:
+        sizes_and_lines += _map_errors(file)
     return (line for size, line in sizes_and_lines if size)
+
+
+def _map_errors(file: SetFile) -> list[tuple[float, str]]:
+    own, dt = file.disturbances, file.dt
+    pose = f"SD {own.pose_noise:g} px in x and in y"
+    if own.heading_noise:
+        pose += f" and {own.heading_noise:g} rad of the heading"
+    return [
+        (
+            own.wheel_radius_error,
+            "Hidden wheel radii: each wheel drives 1 + e times as far, e uniform "
+            f"within ±{own.wheel_radius_error:g}, drawn for each wheel, constant in an "
+            "episode.",
+        ),
+        (
+            own.max_acceleration,
+            "Acceleration: a wheel's speed changes by at most "
+            f"{own.max_acceleration:g} px/s², which is "
+            f"{own.max_acceleration * dt:g} px/s in a step.",
+        ),
+        (
+            own.range_min,
+            f"Ranges below {own.range_min:g} px read range_max.",
+        ),
+        (
+            own.pose_noise or own.heading_noise,
+            f"Errors of the pose: normal with {pose}, correlated over "
+            f"{own.pose_correlation:g} s (exp(-t / {own.pose_correlation:g} s)).",
+        ),
+        (
+            own.pose_jumps,
+            f"Jumps of the pose: {own.pose_jumps:g} in a minute on average; its errors "
+            "are drawn anew, three times as large, and decay.",
+        ),
+        (own.pose_delay, f"The pose is {own.pose_delay} steps old."),
+        (own.scan_delay, f"The ranges are {own.scan_delay} steps old."),
+        (
+            own.message_drop,
+            "Lost messages: with probability "
+            f"{own.message_drop:g}, the pose and ranges of a step are those seen last.",
+        ),
+    ]
 
 
 def _epuck_errors(robot: EPuckRobotParams) -> list[tuple[float, str]]:

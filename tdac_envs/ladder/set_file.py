@@ -29,6 +29,7 @@ from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.plate_worlds import PlatesSpec
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_disturbances import ONLY_ON_MAPS, DisturbanceSpec
+from tdac_envs.ladder.set_robot import with_named_robot
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
 
@@ -136,6 +137,9 @@ class SetFile(StrictModel):
     robot: Annotated[RobotParams | EPuckRobotParams, BeforeValidator(_robot_of)] = (
         LEVEL_ROBOT
     )
+    resolution: Length | None = Field(
+        None, description="Metres per px of the worlds, for a robot in metres."
+    )
     dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
     goal_tolerance: Length = Field(4.0, le=100, description="px or m")
     observed: Annotated[tuple[Observed, ...], AfterValidator(_distinct)] = Field(
@@ -163,7 +167,15 @@ class SetFile(StrictModel):
     @model_validator(mode="before")
     @classmethod
     def _worlds_or_files(cls, values: Any) -> Any:
-        """Moves `worlds`, if it has the keys of `FilesSpec`, to `files`."""
+        """Moves `worlds`, if it has the keys of `FilesSpec`, to `files`.
+
+        The name of a robot stands for the values of its file.
+        """
+        if isinstance(values, dict) and isinstance(values.get("robot"), str):
+            try:
+                values = with_named_robot(values)
+            except TaskError as error:
+                raise ValueError(f"robot: {error}") from None
         if isinstance(values, dict) and isinstance(values.get("worlds"), dict):
             return {**values, "worlds": (), "files": values["worlds"]}
         return values
@@ -300,11 +312,16 @@ class SetFile(StrictModel):
                 the place of the files.
         """
         out = {"description", "files"}
+<<<<<<< HEAD
         # Such sets keep the hash that they had before.
         if not self.movers:
             out.add("movers")
         if self.most_contacts == MOST_CONTACTS:
             out.add("most_contacts")
+=======
+        # Sets without them keep the hash that they had before.
+        out |= {name for name in ("movers", "resolution") if not getattr(self, name)}
+>>>>>>> 3410d9b8 (Task sets name robots; prompts tell limits, scanner and errors; flags of the new disturbances)
         values = self.model_dump(mode="json", by_alias=True, exclude=out)
         values["disturbances"] = self.disturbances.written()
         if self.files is not None:

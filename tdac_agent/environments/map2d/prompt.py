@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tdac_agent.environments.map2d.moving import sentence_on
+from tdac_agent.environments.map2d.robot_lines import robot_lines
 from tdac_agent.environments.map2d.setting import Map2DSetting, map_setting
 from tdac_agent.prompting.manual import interface_of, needed_part
 from tdac_agent.prompting.params_text import params_text
@@ -64,6 +65,7 @@ def facts_of(task: Task) -> dict[str, Any]:
             CONVERSIONS if setting.view is None else (),
         ),
         "length": setting.task_units.length,
+        "robot_lines": robot_lines(task, setting),
         "frame": setting.params.frame,
         **({} if setting.view is None else _in_metres(setting)),
     }

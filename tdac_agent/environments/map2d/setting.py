@@ -34,7 +34,7 @@ from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
 from tdac_envs.mapping.preprocessing import as_image
 from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
 from tdac_envs.movers.spec import AnySpec
-from tdac_envs.robots.bundled import bundled_robots, load_robot
+from tdac_envs.robots.bundled import load_robot
 
 DT = 0.05
 ROBOT_IMAGE_BYTES = 16_000_000
@@ -378,7 +378,7 @@ def _with_file(
     name = spec.robot.file
     if name is None:
         return spec, {}
-    file = load_robot(name if name in bundled_robots() else base / name)
+    file = load_robot(base / name if name.lower().endswith((".yaml", ".yml")) else name)
     metric = metric_units(source, spec.resolution)
     # The task is in px by now; a robot in px is refused for one in metres.
     in_metres = units.frame is not None and file.units == "pixels"

@@ -1,0 +1,113 @@
+"""Promises of robots and localisers of task sets."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import yaml
+from batches import actions, assert_alike
+
+from tdac_envs import load_robot
+from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.set_file import find_set_file
+
+BURGER = "turtlebot3-burger"
+LOCALISER = {
+    "pose_noise": 1.0,
+    "heading_noise": 0.05,
+    "pose_correlation": 0.5,
+    "pose_jumps": 20.0,
+    "pose_delay": 1,
+    "scan_delay": 2,
+    "message_drop": 0.2,
+    "range_min": 3.0,
+    "max_acceleration": 40.0,
+    "wheel_radius_error": 0.05,
+}
+
+
+@pytest.fixture
+def set_yaml(tmp_path):
+    """Writes a `set.yaml` with these values and returns its path."""
+
+    def write(**values):
+        path = tmp_path / "mine.yaml"
+        path.write_text(yaml.safe_dump({"worlds": [{"name": "aisles"}], **values}))
+        return path
+
+    return write
+
+
+@pytest.mark.slow_after(2)
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("frame", ["start", "map"])
+def test_a_batch_does_what_single_environments_do(set_yaml, frame, mode):
+    """To the last bit, with all errors, in both frames of reference."""
+    path = set_yaml(
+        frame=frame,
+        disturbances=LOCALISER,
+        horizon={"factor": 1, "least": 25, "most": 25},
+    )
+    own, kwargs = {"level": str(path), "train_pool": 3}, {"autoreset_mode": mode}
+    name = "TDAC-Ladder-v0"
+    many = gym.make_vec(name, 2, "sync", vector_kwargs=kwargs, **own)
+    batch = gym.make_vec(name, 2, "vector_entry_point", **kwargs, **own)
+    list(assert_alike(many, batch, 1, 0.5 * actions(2, 60)))
+
+
+def test_the_pose_has_errors_and_the_goal_has_none(set_yaml):
+    """The frame of reference is that of the true start."""
+    path = set_yaml(disturbances={"pose_noise": 2.0})
+    env = gym.make("TDAC-Ladder-v0", level=str(path), split="dev").unwrapped
+    plain = gym.make("TDAC-Ladder-v0", level=str(set_yaml()), split="dev").unwrapped
+    first = [env.reset(seed=k)[0] for k in range(30)]
+    exact = [plain.reset(seed=k)[0] for k in range(30)]
+    places = np.array([seen["pose"][:2] for seen in first])
+    assert places.std() == pytest.approx(2.0, rel=0.4)
+    assert all(each["pose"][0] == 0.0 for each in exact)
+    assert all(seen in env.observation_space for seen in first)
+
+
+def test_a_named_robot_is_in_the_units_of_the_worlds(set_yaml):
+    """With its rate and errors as defaults, which the set may override."""
+    path = set_yaml(
+        robot=BURGER, resolution=0.02, goal_tolerance=5, disturbances={"pose_delay": 0}
+    )
+    file, robot = find_set_file(path), load_robot(BURGER)
+    assert file.robot.radius == pytest.approx(robot.radius / 0.02)
+    assert file.robot.n_rays == 360
+    assert file.dt == 0.1
+    own = file.disturbances
+    assert own.pose_noise == pytest.approx(1.5)
+    assert (own.pose_delay, own.scan_delay) == (0, 1)
+
+
+def test_a_robot_in_metres_needs_a_resolution(set_yaml):
+    with pytest.raises(TaskError, match=r"robot: .*give `resolution`"):
+        find_set_file(set_yaml(robot=BURGER))
+
+
+def test_errors_of_a_pose_need_the_pose(set_yaml):
+    keys = {"observed": ["goal", "ranges"], "disturbances": {"pose_noise": 1.0}}
+    with pytest.raises(TaskError, match="errors of the pose need `pose`"):
+        find_set_file(set_yaml(**keys))
+
+
+def test_an_e_puck_of_a_set_has_no_localiser(set_yaml):
+    keys = {
+        "robot": {"kind": "epuck"},
+        "worlds": [{"name": "plates"}],
+        "observed": ["goal", "ps", "pose"],
+        "goal_tolerance": 0.03,
+        "disturbances": {"pose_noise": 0.1},
+    }
+    with pytest.raises(TaskError, match=r"disturbances.pose_noise: for robots on maps"):
+        find_set_file(set_yaml(**keys))
+
+
+def test_unused_keys_do_not_change_a_hash(set_yaml):
+    """New disturbances of size 0 are not part of it; others are."""
+    plain = find_set_file(set_yaml()).sha256()
+    zeros = dict.fromkeys(LOCALISER, 0)
+    assert find_set_file(set_yaml(disturbances=zeros)).sha256() == plain
+    some = find_set_file(set_yaml(disturbances={"scan_delay": 1})).sha256()
+    assert some != plain
