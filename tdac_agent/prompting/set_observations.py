@@ -157,6 +157,9 @@ def _map_errors(file: SetFile) -> list[tuple[float, str]]:
     pose = f"SD {own.pose_noise:g} px in x and in y"
     if own.heading_noise:
         pose += f" and {own.heading_noise:g} rad of the heading"
+    lasting = "new in each step"
+    if (time := own.pose_correlation) > 0.0:
+        lasting = f"correlated over {time:g} s (by exp(-t / {time:g} s))"
     return [
         (
             own.wheel_radius_error,
@@ -176,8 +179,7 @@ def _map_errors(file: SetFile) -> list[tuple[float, str]]:
         ),
         (
             own.pose_noise or own.heading_noise,
-            f"Errors of the pose: normal with {pose}, correlated over "
-            f"{own.pose_correlation:g} s (exp(-t / {own.pose_correlation:g} s)).",
+            f"Errors of the pose: normal with {pose}, {lasting}.",
         ),
         (
             own.pose_jumps,

@@ -121,18 +121,25 @@ class Ultrasonic:
         self._ways = [(math.cos(turn), math.sin(turn)) for turn in turns.tolist()]
         self._pixel = 1.0 if frame is None else frame[0]
         self._reach = self.range_max / self._pixel
+        ahead, aside = _scanner_offset(n_rays, field_of_view_deg)
+        aside = aside if frame is None else -aside  # to the left in metres
+        self._offset = ahead / self._pixel, aside / self._pixel
         # A rim of obstacles stands for the outside; bytes are quick to index.
         self._cells = np.pad(occ, 1, constant_values=True).tobytes()
 
     def ranges(self, x: float, y: float, heading: float) -> NDArray[np.float32]:
-        """Distances from the robot's centre to the first obstacle along each ray.
+        """Distances to the first obstacle along each ray, for the robot at a pose.
+
+        They are from the robot's centre, or from its `scanner_offset` in params.json.
 
         Returns:
             Shape (n_rays,), float32, px or m; `range_max` without a hit, and 0 where
-            (x, y) itself is occupied.
+            the rays would start in an obstacle.
         """
         x, y, heading = to_pixels(float(x), float(y), float(heading))
         c, s = math.cos(heading), math.sin(heading)
+        ahead, aside = self._offset
+        x, y = x + ahead * c - aside * s, y + ahead * s + aside * c
         hits = [self._cast(x, y, c * a - s * b, s * a + c * b) for a, b in self._ways]
         return np.array(hits, np.float32) * np.float32(self._pixel)
 
@@ -324,13 +331,27 @@ def _is_down(params: Mapping[str, Any]) -> bool:
 
 def _ray_angles(n_rays: int, field_of_view_deg: float) -> NDArray[np.float64]:
     """Those of params.json for its robot, else an even fan; see `Ultrasonic`."""
-    params = load_params() if (HERE / "params.json").exists() else {}
-    robot = params.get("robot", {})
-    known = robot.get("n_rays"), robot.get("field_of_view_deg")
-    if known == (n_rays, field_of_view_deg):
+    robot = _robot_with(n_rays, field_of_view_deg)
+    if robot:
         return np.array(robot["ray_angles"])
+    params = load_params() if (HERE / "params.json").exists() else {}
     angles = _even_fan(n_rays, field_of_view_deg)
     return angles if _is_down(params) else -angles
+
+
+def _scanner_offset(n_rays: int, field_of_view_deg: float) -> tuple[float, float]:
+    """Where the rays of the robot of params.json start, from its centre."""
+    robot = _robot_with(n_rays, field_of_view_deg)
+    ahead, aside = robot.get("scanner_offset", (0.0, 0.0))
+    return float(ahead), float(aside)
+
+
+def _robot_with(n_rays: int, field_of_view_deg: float) -> dict[str, Any]:
+    """The robot of params.json if it has such rays, else an empty dict."""
+    params = load_params() if (HERE / "params.json").exists() else {}
+    robot: dict[str, Any] = params.get("robot", {})
+    known = robot.get("n_rays"), robot.get("field_of_view_deg")
+    return robot if known == (n_rays, field_of_view_deg) else {}
 
 
 def _even_fan(n_rays: int, field_of_view_deg: float) -> NDArray[np.float64]:

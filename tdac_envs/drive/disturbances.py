@@ -4,7 +4,8 @@ All numbers are drawn from the environment's own generator, in this order and on
 their option is not 0. At a reset, after the start and goal: wheel gains (left, right),
 axle error, wheel radii (left, right), odometry scales (distance, turn). In each step:
 slip (left, right), noise of the distance sensors, dropouts of the rays, odometry noise
-(distance, turn). The first observation of an episode has sensor noise, and dropouts.
+(distance, turn), jump and errors of the pose (x, y, heading), loss of the messages. The
+first observation of an episode has sensor noise, dropouts, and errors of the pose.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class Disturbances:
         odometry_scale: Standard deviation of its two scale errors in an episode.
         odometry_noise: Relative standard deviation of each measurement.
         wheel_radius_error: Bound of each wheel's hidden relative error of its radius,
-            uniform; of robots that observe the angles of their wheels.
+            uniform; wheel angles and commands do not show it.
 
     Raises:
         TaskError: A value is out of range, or has no effect without `odometry`.

@@ -65,7 +65,19 @@ def test_disturbances_are_told_with_distribution_and_size(tmp_path):
         "odometry_noise": 0.17,
         "motor_lag": 0.18,
         "delay": 3,
+        "wheel_radius_error": 0.19,
+        "max_acceleration": 21.0,
+        "range_min": 2.2,
+        "pose_noise": 2.3,
+        "heading_noise": 0.24,
+        "pose_correlation": 2.5,
+        "pose_jumps": 2.6,
+        "pose_delay": 4,
+        "scan_delay": 5,
+        "message_drop": 0.27,
     }
+    # Without a noise, they have no effect.
+    needed = dict.fromkeys(("pose_correlation", "pose_jumps"), {"pose_noise": 2.3})
     told = {
         "wheel_gains": r"uniform in \[0.89, 1.11\]",
         "wheel_slip": "mean 1 and SD 0.24;",
@@ -76,20 +88,30 @@ def test_disturbances_are_told_with_distribution_and_size(tmp_path):
         "odometry_noise": r"mean 1 and SD 0.17\.",
         "motor_lag": "time constant of 0.18 s",
         "delay": "3 steps late",
+        "wheel_radius_error": "within ±0.19",
+        "max_acceleration": "21 px/s², which is 0.525 px/s in a step",
+        "range_min": "below 2.2 px read range_max",
+        "pose_noise": "SD 2.3 px in x",
+        "heading_noise": "0.24 rad of the heading",
+        "pose_correlation": "correlated over 2.5 s",
+        "pose_jumps": "2.6 in a minute",
+        "pose_delay": "pose is 4 steps old",
+        "scan_delay": "ranges are 5 steps old",
+        "message_drop": "with probability 0.27,",
     }
     path = tmp_path / "own.yaml"
     for name, size in sizes.items():
         level = {
             "worlds": [{"name": "aisles"}],
             "dt": 0.025,  # the slip of a step of 0.1 s is half of that of such a step
-            "observed": ["goal", "odometry", "ranges"],
-            "disturbances": {name: size},
+            "observed": ["goal", "odometry", "pose", "ranges"],
+            "disturbances": {**needed.get(name, {}), name: size},
         }
         path.write_text(yaml.safe_dump(level))
         text = set_prompt(load_set(path), (), FULL).partition("## Disturbances")[2]
         text = text.partition("## What the file")[0]
         found = [each for each, words in told.items() if re.search(words, text)]
-        assert found == [name]
+        assert found == [*needed.get(name, ()), name]
     assert tdac_envs.load_set("known").file.disturbances.model_dump().keys() == (
         sizes.keys()
     )

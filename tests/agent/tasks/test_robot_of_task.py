@@ -166,3 +166,28 @@ def test_a_flag_names_the_robot(tdac, floor):
     code, _, err = tdac("synth", "--robot", BURGER, "--dry-run")
     assert code == 2
     assert "the map has no resolution" in err
+
+
+def test_the_sensors_of_a_controller_are_those_of_the_robot(floor, tmp_path):
+    """`Ultrasonic` predicts what it observes: from its scanner, in its order."""
+    import importlib.util
+
+    task = task_of(floor, goal=[10, 6])
+    folder = lay_out(task, tmp_path / "out")
+    spec = importlib.util.spec_from_file_location(
+        "sensors_of_burger", folder / "sensors.py"
+    )
+    sensors = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sensors)
+    env = task.setting.observed()
+    seen = env.reset(seed=0, options={"start": (1.5, 1.7, 0.4)})[0]
+    robot = sensors.load_params()["robot"]
+    rays = sensors.Ultrasonic(
+        sensors.load_occupancy(),
+        robot["n_rays"],
+        robot["field_of_view_deg"],
+        robot["range_max"],
+    )
+    predicted = rays.ranges(*seen["pose"].tolist())
+    assert predicted.min() > robot["range_min"]
+    np.testing.assert_allclose(predicted, seen["ranges"], atol=1e-3)
