@@ -77,7 +77,7 @@ def test_disturbances_are_told_with_distribution_and_size(tmp_path):
         "message_drop": 0.27,
     }
     # Without a noise, they have no effect.
-    needed = dict.fromkeys(("pose_correlation", "pose_jumps"), {"pose_noise": 2.3})
+    needed = {key: {"pose_noise": 2.3} for key in ("pose_correlation", "pose_jumps")}
     told = {
         "wheel_gains": r"uniform in \[0.89, 1.11\]",
         "wheel_slip": "mean 1 and SD 0.24;",
