@@ -312,16 +312,10 @@ class SetFile(StrictModel):
                 the place of the files.
         """
         out = {"description", "files"}
-<<<<<<< HEAD
-        # Such sets keep the hash that they had before.
-        if not self.movers:
-            out.add("movers")
-        if self.most_contacts == MOST_CONTACTS:
-            out.add("most_contacts")
-=======
         # Sets without them keep the hash that they had before.
         out |= {name for name in ("movers", "resolution") if not getattr(self, name)}
->>>>>>> 3410d9b8 (Task sets name robots; prompts tell limits, scanner and errors; flags of the new disturbances)
+        if self.most_contacts == MOST_CONTACTS:
+            out.add("most_contacts")
         values = self.model_dump(mode="json", by_alias=True, exclude=out)
         values["disturbances"] = self.disturbances.written()
         if self.files is not None:
