@@ -23,6 +23,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.disturbances import Random
 from tdac_envs.drive.limits import MotionLimits
 from tdac_envs.drive.setup import DriveSetup
+from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.grid.map_units import MapFrame
 from tdac_envs.map2d.placing import MoversSetup
 from tdac_envs.map2d.rays import directions_of
@@ -95,6 +96,12 @@ class Map2DSetup(DriveSetup):
         if self.movers and self.variation == "nominal" and self.source is None:
             # A fault is found here, and not at the first reset.
             self.movers_setup.start(self.nominal, np.random.default_rng(0))
+
+    @property
+    def required_gap(self) -> float:
+        """The gap to obstacles that the robot should keep, px."""
+        radius, stated = self.nominal.body_radius, self.reception.pose_noise
+        return required_gap(radius, stated)
 
     @property
     def has_inexact_ranges(self) -> bool:

@@ -120,8 +120,8 @@ def test_what_came_of_each_candidate(outline, hostile):
 def test_verified_or_not(page, outline):
     """The verdict of each run, and the sum of them, come first."""
     shown = " ".join("".join(outline.shown).split())
-    assert "1 of 2 runs verified" in shown[:300]
-    assert page.count('class="badge verified">verified<') == 2
+    assert "0 of 2 runs verified 1 passed all tests" in shown[:300]
+    assert page.count('class="badge passed">passed<') == 2
     assert page.count('class="badge not-verified">not verified<') == 2
     assert "Clopper-Pearson: independent trials" in shown
 
@@ -287,7 +287,7 @@ def test_the_command(copied, tdac, refused):
     """Writes the file beside the run or where it is told, and says so in a line."""
     code, out, err = tdac("report", copied)
     assert (code, err) == (0, "")
-    assert out.startswith(f"{copied / 'report.html'}: 1 run, 1 verified; ")
+    assert out.startswith(f"{copied / 'report.html'}: 1 run, 0 verified; ")
     assert (copied / "report.html").read_bytes().startswith(b"<!doctype html>")
     assert tdac("report", copied, "--out", "other.html")[0] == 0
     err = refused("report", copied, "--out", copied / "none" / "a.html")

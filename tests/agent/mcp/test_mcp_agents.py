@@ -38,15 +38,15 @@ def test_from_nothing_to_verified_on_a_bundled_task(tmp_path, good_on_maze, done
         assert "policy(obs)" in text
         assert "21 submissions" in text
         bad = await agent.submit(STILL)
-        assert (bad["submission"], bad["verified"]) == (1, False)
+        assert (bad["submission"], bad["passed"]) == (1, False)
         assert agent.steps, "no progress was told"
         told = await agent.told("failures", submission=1)
         assert "missing constants" in told
         second = await agent.submit(better)
-        assert not second["verified"]
+        assert not second["passed"]
         assert "main" in await agent.told("failures", submission=2)
         good = await agent.submit(f"```python\n{good_on_maze}```\n")
-        assert (good["submission"], good["verified"]) == (3, True)
+        assert (good["submission"], good["passed"]) == (3, True)
         assert good["submissions_left"] == 18
         for number, episode in ((1, "nominal"), (3, "jitter 1")):
             assert (await agent.picture(number, episode)).startswith(PNG)
@@ -88,7 +88,7 @@ def test_from_nothing_to_verified_on_a_small_set(serve, easy, solver, out):
         better = await agent.submit(half_of(solver))
         good = await agent.submit(solver)
         assert "8 of 8 worlds" in good["summary"]
-        assert not good["verified"]
+        assert not good["passed"]
         assert good["episodes_left"] == 128 - 3 * 8
         worlds = [e["name"] for each in (bad, better, good) for e in each["episodes"]]
         assert len(set(worlds)) == 24

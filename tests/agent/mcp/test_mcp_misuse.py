@@ -37,12 +37,12 @@ def test_requests_that_cannot_be_answered(serve, small_task, good_source):
         assert "expected one of nominal, jitter 1" in told
         bad = await agent.submit(STILL)
         assert "jitter 4" not in json.dumps(bad)
-        assert "only a verified" in await error("choose", submission=2)
+        assert "only a submission that passed" in await error("choose", submission=2)
         listed = await agent.call("submissions")
         return listed.structured_content
 
     listed = serve(small_task, conversation)
-    assert [each["verified"] for each in listed["submissions"]] == [True, False]
+    assert [each["passed"] for each in listed["submissions"]] == [True, False]
     assert listed["submissions_left"] == 19
     assert listed["ended"] is None
 
@@ -153,7 +153,7 @@ def test_two_at_once(running, tmp_path, small_task, good_source):
     anyio.run(both)
     assert {answer["submission"] for _, answer in found} == {1, 2, 3}
     for source, answer in found:
-        assert answer["verified"] == (source == good_source)
+        assert answer["passed"] == (source == good_source)
         file = tmp_path / "run" / "iterations" / f"k0{answer['submission']}" / "j0"
         assert (file / "controller.py").read_text() == source
     assert record(tmp_path / "run")["agent"] == "over HTTP"

@@ -35,7 +35,7 @@ async def attack(agent, case, source):
         return [await agent.error("submit", source=source)]
     answer = await agent.submit(source)
     number = answer["submission"]
-    assert not answer["verified"], case
+    assert not answer["passed"], case
     told = [json.dumps(answer, ensure_ascii=False)]
     told.append(await agent.told("failures", submission=number))
     told.append(await agent.told("submissions"))

@@ -424,8 +424,8 @@ def test_a_task_is_called_by_what_it_is(tmp_path):
     assert display_name(load_task("maze")) == "maze"
     empty = load_task(write_small_task(tmp_path / "a", name="maze"))
     digest = empty.setting.world_sha256()[:8]
-    tolerance = f"{empty.nominal.goal_tolerance:.0f}"
-    about = f"(map {digest}, goal within {tolerance} px)"
+    tolerance = f"{empty.nominal.goal_tolerance:.0f} px (3.3 radii)"
+    about = f"(map {digest}, goal within {tolerance})"
     assert display_name(empty) == f"maze, not the bundled one {about}"
     folder = tmp_path / "b"
     folder.mkdir()
@@ -449,10 +449,10 @@ def test_the_verdict_names_the_folder(done, good):
     """With the hash of its map and how near the goal has to be come."""
     content = yaml.safe_load((good / "task.yaml").read_text())
     (good / "task.yaml").write_text(yaml.safe_dump({**content, "name": "maze"}))
-    out = done("verify", good / "controller.py", "--profile", "policy")
-    words = " ".join(out.split())
+    words = ("verify", good / "controller.py", "--profile", "policy")
+    words = " ".join(done(*words, "--no-confirm").split())
     assert "(task maze, not the bundled one (map " in words
-    assert f"px) of {good}, profile policy" in words
+    assert f"px (3.3 radii)) of {good}, profile policy" in words
 
 
 def test_a_limit_to_go_on_with_is_marked(run):
