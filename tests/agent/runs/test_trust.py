@@ -433,7 +433,7 @@ def test_a_task_is_called_by_what_it_is(tmp_path):
     (folder / "maze.yaml").write_text(yaml.safe_dump(content))
     near = display_name(load_task(folder / "maze.yaml"))
     assert near.startswith("maze, changed (map ")
-    assert near.endswith("goal within 900 px)")
+    assert near.endswith("goal within 900 px (60.0 radii))")
 
 
 def test_a_bundled_world_has_the_name_of_its_task():
