@@ -22,8 +22,7 @@ from tdac_agent.sandbox.waiting import RunQueue
 from tdac_agent.storage.plain import shown
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_envs.drive.env import Observation
-from tdac_envs.drive.task import Pose
-from tdac_envs.ladder.observed import AT_START
+from tdac_envs.drive.task import AT_START, Pose
 
 # An episode is stopped if the mean policy call takes longer than this many steps.
 SLOW_FACTOR = 2.0

@@ -7,7 +7,7 @@ import time
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from tdac_agent.problems.episodes import Episodes, Part
+from tdac_agent.problems.part import Episodes, Part
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.storage.files import write_atomic
@@ -19,8 +19,8 @@ from tdac_agent.verification.episode_report import (
     clock_dependence,
     summarise,
 )
-from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.episode_job import EpisodeJob
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks
 from tdac_agent.verification.judge.warm import WarmJudge

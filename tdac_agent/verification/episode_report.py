@@ -6,7 +6,7 @@ import contextlib
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import AliasChoices, ConfigDict, Field, model_validator
@@ -28,7 +28,9 @@ from tdac_agent.verification.suite.contract import (
     parse_source,
     reads_clock,
 )
-from tdac_envs.ladder.set_file import CpuSpec
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.set_file import CpuSpec
 
 LEAST_GROUP = 5
 """Least number of hidden worlds of a generator whose scores reveal no single world."""

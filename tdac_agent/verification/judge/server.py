@@ -50,6 +50,8 @@ DONE = b"done"
 LOADED_LATE = (
     "tdac_agent.verification.judge.findings",
     "tdac_agent.verification.judge.episode_job",
+    "tdac_agent.verification.judge.drivers",
+    "tdac_agent.verification.judge.set_worlds",
 )
 
 

@@ -41,7 +41,7 @@ from tdac_agent.verification.diagnosis.measures import (
     shortest_path_length,
     spectral_arc_length,
 )
-from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.store import ROWS_FILE, UNFINISHED
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import MOVER

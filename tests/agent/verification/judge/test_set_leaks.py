@@ -10,9 +10,10 @@ import json
 
 import pytest
 
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.verification.judge.child_pool import ChildPool
-from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_envs import load_set
 from tdac_envs.ladder.set_file import set_names
 
