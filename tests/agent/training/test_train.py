@@ -35,9 +35,6 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.learning.wrappers import wrap
 from tdac_envs.learning.wrapping import FOR_RL
 
-pytest.importorskip("stable_baselines3")
-torch = pytest.importorskip("torch")
-
 WRAPPERS = ("goal-relative", "guidance", "flatten")
 ENVS = ("TDAC-Map2D-v0", "TDAC-EPuck-v0")
 SMALL = {
@@ -50,6 +47,8 @@ SMALL = {
 @pytest.fixture(autouse=True)
 def threads():
     """Training sets the number of threads of the whole process."""
+    pytest.importorskip("stable_baselines3")
+    torch = pytest.importorskip("torch")
     before = torch.get_num_threads()
     yield
     torch.set_num_threads(before)

@@ -19,9 +19,6 @@ from tdac_agent.training.train import train
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
-pytest.importorskip("stable_baselines3")
-torch = pytest.importorskip("torch")
-
 SMALL = {"n_envs": 8, "n_steps": 16, "batch_size": 64, "n_epochs": 2}
 LOST = {
     "observed": ["odometry", "goal", "wheel_speeds", "ranges"],
@@ -32,6 +29,8 @@ LOST = {
 @pytest.fixture(autouse=True)
 def threads():
     """Training sets the number of threads of the whole process."""
+    pytest.importorskip("stable_baselines3")
+    torch = pytest.importorskip("torch")
     before = torch.get_num_threads()
     yield
     torch.set_num_threads(before)
