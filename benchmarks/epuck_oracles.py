@@ -25,7 +25,7 @@ from tdac_agent.sandbox import Child
 from tdac_agent.tasks.task import Task
 
 SEED = 20_250_112
-WHEEL, AXLE = 0.02, 0.052
+WHEEL, AXLE = 0.02, 0.057
 
 
 def contract_violations(child: Child, task: Task, text: str) -> Iterator[str]:

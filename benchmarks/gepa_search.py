@@ -17,7 +17,7 @@ is a start with a seed, with worlds of its own: the pairs are independent, and t
 intervals are those of a paired bootstrap over them.
 
 The controllers are the planner `dwa` of `tdac bench` on the level `unknown`, with
-settings drawn from the ranges of `rivals.yaml` until one is weak: a mean time score
+settings drawn from the ranges of `planners.yaml` until one is weak: a mean time score
 between two limits on eight worlds of `dev`. (The built-in controllers are no ground for
 this: other constants hardly change their scores, or break them.) They are driven
 without the sandbox (`benchmarks/in_process.py`): there are thousands of episodes.
@@ -60,6 +60,7 @@ from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.dialogue import ModelAnswer
 from tdac_agent.synthesis.improve import ImprovingSearch
+from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.selection import select
 from tdac_agent.synthesis.terms import Terms as TrialTerms
 from tdac_agent.synthesis.workload import Shares, shares
@@ -82,6 +83,7 @@ WEAK = 0.1, 0.45
 """Limits of the mean time score of a start; most settings have more."""
 SCREENED = 8
 """Worlds that tell whether a start is weak."""
+OPTIONS = SynthOptions(tier="none", feedback_episodes=SCREENED)
 SEARCHES = "ours", "gepa"
 PAIRS = "pairs.csv"
 Drive = Callable[[str, str, int], EpisodeRow]
@@ -157,7 +159,7 @@ class _Trials(WorldTrials):
     """Drives in this process."""
 
     def __init__(self, pair: Terms, recorder: Recorder) -> None:
-        parts = TrialTerms(recorder, None, "none", pair.shares, SCREENED)
+        parts = TrialTerms(recorder, None, pair.shares, OPTIONS)
         super().__init__(pair.tasks, parts)
         self._pair = pair
 

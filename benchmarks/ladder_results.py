@@ -34,7 +34,8 @@ from tdac_agent.bench.bench import WORLD_TABLE, bench
 from tdac_agent.bench.figures import draw_figures, frame_of
 from tdac_agent.bench.record import Bench, BenchRow, Interval
 from tdac_agent.bench.shown import merged, reveal
-from tdac_agent.planners.planner import levels_of, planner_names
+from tdac_agent.planners.names import planner_names
+from tdac_agent.planners.planner import levels_of
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.warm import WarmJudge

@@ -64,6 +64,7 @@ def _kept(tasks: TaskSet, index: int) -> dict[str, Any]:
         "n_rays": robot.n_rays,
         "field_of_view": robot.field_of_view_deg,
         "range_max": robot.range_max,
+        "ray_angles": robot.ray_angles,
         "dt": own.dt,
         "horizon": task.horizon,
         "goal_tolerance": own.goal_tolerance,

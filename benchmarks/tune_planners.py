@@ -4,7 +4,7 @@
 
 24 settings drive on 8 worlds of `train`, the best third of them on 24, the best two on
 64. The first setting is that of the file, the others are drawn from the ranges in
-`rivals.yaml`: evenly in the logarithm where the lower bound is positive, else evenly.
+`planners.yaml`: evenly in the logarithm where the lower bound is positive, else evenly.
 The best mean time score wins; of equals, the earlier setting. Without PLANNER LEVEL,
 all are tuned. `OUT/tuned.json` is what `tdac_agent/planners/files` has, and
 `OUT/tuning.json` has all figures. After an interruption, the same command goes on.
@@ -25,10 +25,10 @@ from typing import Any
 
 import numpy as np
 
+from tdac_agent.planners.names import planner_names
 from tdac_agent.planners.planner import (
     TUNED,
     levels_of,
-    planner_names,
     ranges_of,
     source_of,
     with_values,

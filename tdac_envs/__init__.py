@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tdac_envs.mapping.bundled import bundled_map, bundled_maps
     from tdac_envs.mapping.params import MapParams, RobotParams
     from tdac_envs.mapping.preprocessing import preprocess
+    from tdac_envs.robots.bundled import bundled_robots, load_robot
     from tdac_envs.worlds.bundled import bundled_worlds
     from tdac_envs.worlds.wbt.reader import load_world, read_world
     from tdac_envs.worlds.wbt.writer import write_world
@@ -36,7 +37,9 @@ __all__ = [
     "WorldError",
     "bundled_map",
     "bundled_maps",
+    "bundled_robots",
     "bundled_worlds",
+    "load_robot",
     "load_set",
     "load_world",
     "preprocess",
@@ -52,6 +55,8 @@ _MODULE_OF = {
     "World": "tdac_envs.worlds.world",
     "bundled_map": "tdac_envs.mapping.bundled",
     "bundled_maps": "tdac_envs.mapping.bundled",
+    "bundled_robots": "tdac_envs.robots.bundled",
+    "load_robot": "tdac_envs.robots.bundled",
     "bundled_worlds": "tdac_envs.worlds.bundled",
     "load_set": "tdac_envs.ladder.task_sets",
     "load_world": "tdac_envs.worlds.wbt.reader",

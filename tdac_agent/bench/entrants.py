@@ -19,7 +19,7 @@ from tdac_agent.evaluation.policies import (
     not_found,
     prepared,
 )
-from tdac_agent.planners.planner import planner_names
+from tdac_agent.planners.names import planner_names
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.problems.part import Part
 from tdac_agent.tasks.task import Task

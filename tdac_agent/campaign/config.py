@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, JsonValue, model_validator
 
 from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
@@ -89,6 +89,11 @@ class CampaignConfig(StrictModel):
     )
     base_url: str | None = Field(None, description="As for --base-url.")
     max_output: int = Field(MAX_OUTPUT_TOKENS, ge=1, description="As for --max-output.")
+    options: dict[str, JsonValue] = Field(
+        {},
+        description="Further options of `tdac synth`, by the names of their flags with "
+        "_ for -, such as `candidates`, `improve` and `vision`.",
+    )
     max_cost: float | None = Field(None, ge=0, description="Limit for all runs, USD.")
     max_tokens: int | None = Field(None, ge=0, description="Token limit for all runs.")
     keep: Keep = Field(
@@ -104,6 +109,14 @@ class CampaignConfig(StrictModel):
             again = {value for value in values if values.count(value) > 1}
             if again:
                 raise ValueError(f"{name}: {again.pop()!r} is listed twice")
+        own = [
+            name
+            for name in self.options
+            if name in (*type(self).model_fields, "refine")
+        ]
+        if own:
+            raise ValueError(f"options: {own[0]} is set by another key of this file")
+        SynthOptions().restored(self.options)
         if any(name.partition(":")[0] == "manual" for name in self.models):
             raise ValueError("manual: works for one run, not for a campaign")
         try:

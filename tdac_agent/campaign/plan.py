@@ -60,6 +60,7 @@ class Cell:
         max_output: Token limit of an answer.
         episodes: Limit of simulated episodes on a task set; None on a task.
         feedback_episodes: Most episodes of a test on a task set; None on a task.
+        options: Further options, as names and values.
     """
 
     folder: str
@@ -76,6 +77,7 @@ class Cell:
     max_output: int
     episodes: int | None = None
     feedback_episodes: int | None = None
+    options: tuple[tuple[str, Any], ...] = ()
 
     @property
     def on_set(self) -> bool:
@@ -115,7 +117,9 @@ class PlannedRun:
     def from_json(cls, text: str) -> PlannedRun:
         """The run that `to_json` serialized."""
         content = json.loads(text)
-        return cls(**{**content, "cell": Cell(**content["cell"])})
+        cell = content["cell"]
+        cell["options"] = tuple(map(tuple, cell["options"]))
+        return cls(**{**content, "cell": Cell(**cell)})
 
 
 @dataclass(frozen=True, slots=True)
@@ -254,6 +258,9 @@ def _cell(
     }
     if on_set:
         facts |= {name: getattr(config, name) for name in SET_LIMITS}
+    # Plans without further options keep the names of their runs.
+    if config.options:
+        facts["options"] = tuple(sorted(config.options.items()))
     question = question_of(task, load_template(template))
     hashed = facts | {
         **_hashes(task),

@@ -38,7 +38,8 @@ class Tally:
     @property
     def finished(self) -> int:
         """Number of runs with nothing left to do."""
-        return self.ended["verified"] + self.ended["not verified"]
+        ended = ("verified", "passed", "not verified")
+        return sum(self.ended[status] for status in ended)
 
     @property
     def halted(self) -> int:

@@ -8,9 +8,10 @@ from typing import Literal
 
 import typer
 
-from tdac_agent.cli.options import json_option, out_option, tier_option
+from tdac_agent.cli.shared_options import json_option, out_option, tier_option
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
+from tdac_agent.planners.names import planner_list
 
 bench_app = typer.Typer(
     help="Drive programs and learned policies on the same unseen worlds.",
@@ -27,8 +28,8 @@ class BenchOptions:
     entrants: tuple[str, ...] = option(
         ...,
         "Controller files, folders of runs and trainings, .zip files of "
-        "stable-baselines3, `builtin`, or a classical planner: `go-to-goal`, "
-        "`tangent-bug`, `follow-the-gap`, `dwa`, `mppi`, `orca`; `privileged` is a "
+        "stable-baselines3, `builtin`, or a classical planner: "
+        f"{planner_list()}; `privileged` is a "
         "planner that knows all movers. NAME=FILE names an entrant; NAME=FILE,FILE are "
         "policies trained alike with several seeds.",
         argument=True,

@@ -29,6 +29,8 @@ from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.prices import PriceList, load_prices, price_file
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
+from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.workload import shares
 
 FOLDER = Path("campaigns")
 LEGEND = (
@@ -112,6 +114,7 @@ def dry_run(options: CampaignOptions) -> int:
 
 
 def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
+    further = SynthOptions().restored(dict(cell.options))
     forecast: CostForecast = cost_of(
         cell.task_name,
         question_of(plan.problem(cell), load_template(cell.prompt)),
@@ -120,7 +123,10 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
         prices,
         iterations=cell.iterations,
         patience=cell.patience,
+        candidates=further.candidates,
         refine=cell.refine,
+        vision=further.vision,
+        variations=shares(cell.episodes, further.improve).asked,
         base_url=cell.base_url,
         max_output=cell.max_output,
     )

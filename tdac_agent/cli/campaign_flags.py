@@ -8,7 +8,7 @@ from typing import Literal
 
 import typer
 
-from tdac_agent.cli.options import (
+from tdac_agent.cli.shared_options import (
     BUDGET,
     json_option,
     key_over_http_option,
@@ -16,7 +16,7 @@ from tdac_agent.cli.options import (
     trust_option,
 )
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 app = typer.Typer()
 

@@ -15,7 +15,6 @@ from rich.table import Table
 from tdac_agent.campaign.perform import Outcome
 from tdac_agent.campaign.progress import CampaignProgress, Doing, RunUpdate, Tally
 from tdac_agent.cli.campaign_table import (
-    COLOURS,
     format_duration,
     labels_of,
     make_table,
@@ -24,6 +23,7 @@ from tdac_agent.cli.campaign_table import (
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.executors.executor import Died, Ended
+from tdac_agent.verification.verdict import COLOURS
 
 FRAME_LINES = 10
 """Screen lines outside the rows of the table."""
@@ -70,7 +70,7 @@ class LiveView:
 
     def _line(self, outcome: Outcome) -> str:
         at = "" if outcome.tau is None else f" in iteration {outcome.tau}"
-        explained = outcome.reason and outcome.status != "verified"
+        explained = outcome.reason and outcome.status not in ("verified", "passed")
         why = f": {outcome.reason}" if explained else ""
         done = f"[{self._progress.finished}/{self._progress.planned}]"
         colour = COLOURS.get(outcome.status, "yellow")
@@ -98,7 +98,7 @@ class LiveView:
         spent = ("tokens", "USD") if self._paid else ()
         table = make_table(
             self._labels.names,
-            ("ended", "verified", "not verified", "halted", *spent),
+            ("ended", "verified", "passed", "not verified", "halted", *spent),
         )
         for tally in tallies:
             figures = [*_counts(tally), *(_spent(tally) if self._paid else [])]
@@ -129,8 +129,9 @@ def _counts(tally: Tally) -> list[str]:
     ended = tally.ended
     return [
         f"{tally.finished}/{tally.planned}",
-        _number(ended["verified"], "green"),
-        _number(ended["not verified"], "red"),
+        _number(ended["verified"], COLOURS["verified"]),
+        _number(ended["passed"], COLOURS["passed"]),
+        _number(ended["not verified"], COLOURS["not verified"]),
         _number(tally.halted, "yellow"),
     ]
 

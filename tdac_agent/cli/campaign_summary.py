@@ -14,6 +14,7 @@ from tdac_agent.cli.campaign_table import ALWAYS, SOMETIMES, make_table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.metrics import Rate
+from tdac_agent.verification.verdict import COLOURS
 
 WIDE = 110
 """Console width from which a rate and its interval share a line."""
@@ -26,7 +27,7 @@ def show_summary(summary: pd.DataFrame, console: Console) -> None:
     shown = _show(summary, "task", console, _figures)
     legend = "95 % intervals; τ: mean iteration of success (docs/metrics.md)"
     if "tokens" in shown:
-        legend += "\ntokens and USD: of all runs, per verified run"
+        legend += "\ntokens and USD: of all runs, per run that passed"
     console.print(f"[dim]{legend}[/]", soft_wrap=True)
 
 
@@ -69,40 +70,43 @@ def _show(
     return shown
 
 
-def _verified(row: dict[Any, Any], between: str) -> str:
-    done, halted = row["verified"], int(row["censored"])
-    verified = f"[{'green' if done else 'red'}]{done}[/]/{row['R']}"
+def _done(row: dict[Any, Any], word: str, between: str) -> str:
+    """How many of the runs passed, or are verified."""
+    done, halted = row[word], int(row["censored"])
+    text = f"[{COLOURS[word] if done else 'red'}]{done}[/]/{row['R']}"
     if halted:
-        verified += f"{between}[yellow]{halted} halted[/]"
-    return verified
+        text += f"{between}[yellow]{halted} halted[/]"
+    return text
 
 
 def _set_figures(row: dict[Any, Any], between: str) -> dict[str, str]:
     return {
-        "verified": _verified(row, between),
+        "verified": _done(row, "verified", between),
         "rate": _rate(row, "rate", between),
         "time score": _rate(row, "time_score", between),
         "episodes": _number(row["episodes_mean"], ",.0f"),
-        **_spent(row),
+        **_spent(row, "verified"),
     }
 
 
 def _figures(row: dict[Any, Any], between: str) -> dict[str, str]:
     """The cells of a kind of run by column; empty where there is no value."""
     return {
-        "verified": _verified(row, between),
+        "passed": _done(row, "passed", between),
+        "verified": f"[green]{row['verified']}[/]" if row["verified"] else "",
         "SR": _rate(row, "sr", between),
         "CS(K)": _rate(row, "cs_K", between),
         "first pass": _rate(row, "first_pass", between),
         "τ": _number(row["tau_mean"], ".1f"),
-        **_spent(row),
+        **_spent(row, "passed"),
     }
 
 
-def _spent(row: dict[Any, Any]) -> dict[str, str]:
-    cost = row["cost_per_verified"] if row["tokens_per_verified"] > 0 else math.nan
+def _spent(row: dict[Any, Any], word: str) -> dict[str, str]:
+    tokens, cost = row[f"tokens_per_{word}"], row[f"cost_per_{word}"]
+    cost = cost if tokens > 0 else math.nan
     return {
-        "tokens": _number(row["tokens_per_verified"], ",.0f"),
+        "tokens": _number(tokens, ",.0f"),
         "USD": _number(cost, ".3f"),
     }
 

@@ -14,7 +14,6 @@ from tdac_agent.campaign.progress import CampaignProgress
 from tdac_agent.cli.console import Console
 from tdac_agent.models.budget import format_usd
 
-COLOURS = {"verified": "green", "not verified": "red"}
 LABEL_WIDTH = 6
 FILE_WIDTH = 130
 """Least width of tables that are written to a file."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.options import (
+from tdac_agent.cli.shared_options import (
     Profile,
     json_option,
     profile_option,
@@ -18,7 +18,7 @@ from tdac_agent.cli.options import (
 )
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 app = typer.Typer()
 

@@ -14,6 +14,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.display import has_display
 from tdac_agent.cli.trials import attempt
+from tdac_agent.models.vendors import VENDORS
 from tdac_agent.sandbox import available_tiers
 from tdac_agent.storage.shipped import shipped, shipped_names
 from tdac_envs.core.extras import install_command
@@ -22,18 +23,17 @@ EXTRAS = {
     "human": "pygame",
     "video": "moviepy",
     "sb3": "stable_baselines3",
-    "openai": "openai",
     "ray": "ray",
     "inspect": "inspect_ai",
     "mcp": "mcp",
     "studio": "nicegui",
 }
+"""The package of each extra, besides those of vendors."""
 TRIALS = (
     ("compiled step", "compiled_step", True),
     ("verification", "verification", True),
     ("video (.mp4, .gif)", "video", False),
 )
-KEYS = ("ANTHROPIC_API_KEY", "OPENAI_API_KEY")
 PACKAGES = ("tdac", "gymnasium", "numpy", "numba", "pytest", "opencv-python-headless")
 
 
@@ -113,8 +113,10 @@ def _window() -> Check:
 
 
 def _extras() -> list[Check]:
+    apis = [vendor.api for vendor in VENDORS.values()]
+    extras = {api.extra: api.package for api in apis if api.extra is not None}
     checks = []
-    for extra, module in EXTRAS.items():
+    for extra, module in {**EXTRAS, **extras}.items():
         is_installed = importlib.util.find_spec(module) is not None
         detail = module if is_installed else f"optional: {install_command(extra)}"
         checks.append(Check(f"extra {extra}", is_installed, detail))
@@ -124,7 +126,7 @@ def _extras() -> list[Check]:
 def _keys() -> list[Check]:
     """Whether API keys are set; does not print or validate them."""
     checks = []
-    for name in KEYS:
+    for name in (vendor.key for vendor in VENDORS.values()):
         is_set = bool(os.environ.get(name, "").strip())
         detail = "set" if is_set else f"optional: set {name} to use its models"
         checks.append(Check(f"key {name}", is_set, detail))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import typer
 
-from tdac_agent.cli.options import Json
+from tdac_agent.cli.shared_options import Json
 
 app = typer.Typer()
 

@@ -7,20 +7,19 @@ import sys
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.synth_flags import RunFlags
-from tdac_agent.cli.task_choice import chosen
+from tdac_agent.cli.task_choice import chosen_problem
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.models.budget import format_usd
 from tdac_agent.models.choice import Options, check_name, missing_for_name
 from tdac_agent.models.prices import SHIPPED, load_prices, price_file
-from tdac_agent.models.tariff import BY_VENDOR, MAX_COST
-from tdac_agent.problems.choice import problem_of
+from tdac_agent.models.tariff import MAX_COST
+from tdac_agent.models.vendors import vendor_of
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.synthesis.synthesize import book_of
 from tdac_agent.synthesis.workload import shares
-from tdac_agent.tasks.task import Task
 
 
 def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int:
@@ -30,10 +29,7 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
     for name in names:
         check_name(name)
     template, book = load_template(options.prompt), book_of(options.rules)
-    named = chosen(flags, options, run_flags)
-    if isinstance(named, Task):
-        named = named.with_profile(run_flags.profile)
-    problem = problem_of(named)
+    problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
     checked_vision(options.vision, names[1], options.patience, options.improve)
     server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]
@@ -119,7 +115,7 @@ def _unbounded(forecast: CostForecast) -> list[str]:
     return [
         f"--max-tokens N, since no price of {name} is known to limit the run's cost"
         for name in forecast.unknown_prices
-        if name.partition(":")[0] in BY_VENDOR
+        if vendor_of(name) is not None
     ]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.options import (
+from tdac_agent.cli.shared_options import (
     VARIATION,
     WRAPPER,
     Variation,
@@ -18,7 +18,8 @@ from tdac_agent.cli.options import (
 )
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, SETS, TASK, TASKS, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
+from tdac_agent.planners.names import planner_list
 
 app = typer.Typer()
 
@@ -30,8 +31,9 @@ class EvaluateOptions:
     policies: tuple[str, ...] = option(
         ...,
         "Controller files, run folders, .zip files of stable-baselines3, `reference`, "
-        "`builtin`, `follow-guidance`, `go-to-goal`, `random`; and files to drive on: "
-        "a map, a world, task.yaml files or a set.yaml.",
+        "`builtin`, `follow-guidance`, `random`, or a classical planner: "
+        f"{planner_list()}; and files to drive on: a map, a world, task.yaml files or "
+        "a set.yaml.",
         argument=True,
         metavar="POLICY...",
     )

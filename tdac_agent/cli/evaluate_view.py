@@ -31,8 +31,8 @@ LEGEND = (
     "interval of the rate (Clopper-Pearson). hit: episodes with a contact. time, path: "
     "relative to the shortest path at full speed; SPARC: smoothness, spectral arc "
     "length of the speed (0 is smoothest); these are medians of the successes. gap: "
-    "clearance beside the body, least / mean. ms/step: median / 99th percentile of a "
-    "policy call, measured by the judge."
+    "between body and obstacles, smallest of all / mean over steps. ms/step: median / "
+    "99th percentile of a policy call, measured by the judge."
 )
 SET_LEGEND = (
     "knows: what the policy may use; sensors include the goal, and the pose where the "

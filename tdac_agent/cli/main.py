@@ -98,6 +98,7 @@ PARTS = {
     "campaign_flags": ("campaign",),
     "check_suite_flags": ("check-suite",),
     "sets_flags": ("sets",),
+    "robots_flags": ("robots",),
     "studio_flags": ("studio",),
     "runs_flags": ("demo", "report", "runs", "rules"),
     "webots_flags": ("webots", "export"),

@@ -8,10 +8,10 @@ from typing import Literal
 
 import typer
 
-from tdac_agent.cli.options import json_option, out_option
+from tdac_agent.cli.shared_options import json_option, out_option
 from tdac_agent.cli.task_flags import MAP_FILE, WORLD_FILE, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 app = typer.Typer()
 NOT_OF_A_MAP = (

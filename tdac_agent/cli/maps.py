@@ -12,9 +12,9 @@ from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.map_flags import MapOptions
 from tdac_agent.cli.sentences import print_plain, print_sentences
 from tdac_agent.cli.task_changes import in_pixels
-from tdac_agent.cli.task_choice import check_values
+from tdac_agent.cli.task_choice import check_values, in_own_units
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.environments.map2d.setting import robot_text
+from tdac_agent.environments.map2d.task_robot import robot_text
 from tdac_envs.core.errors import PicturedError, TaskError
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
@@ -27,7 +27,7 @@ from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.candidates import MapCandidate
 from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.map_folder import write_map
-from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
+from tdac_envs.mapping.params import MapParams, ReadingOptions
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates
 from tdac_envs.mapping.ros_writer import ROS_FILES, write_ros_map
 from tdac_envs.mapping.wording import obstacles_text, scale_text
@@ -51,6 +51,7 @@ def run(options: MapOptions, flags: TaskFlags) -> None:
     if options.image in bundled_maps():
         bundled = bundled_map(options.image)
         path, flags = bundled.image, _or_else(flags, bundled)
+    flags = in_own_units(flags, options.image)
     frame = "metres" if flags.in_metres else "pixels"
     units = units_of(path, frame, scale).with_typed(flags.start, flags.goal)
     task = in_pixels(flags, units)
@@ -62,13 +63,12 @@ def run(options: MapOptions, flags: TaskFlags) -> None:
             f"--yaml: {source.name} gives no resolution; add --resolution METRES"
         )
     folder = options.out or Path(f"{path.stem}-map")
-    radius = RobotParams().radius if task.robot_radius is None else task.robot_radius
     try:
         grid, params, ranked = preprocess_with_candidates(
             source,
             task.start,
             task.goal,
-            radius,
+            task.robot_radius,
             preset=options.preset,
             snap=task.snap,
             heading=task.heading or 0.0,
@@ -236,10 +236,8 @@ def _print_files(
     preview = escape(str(folder / "preview.png"))
     console.print(f"wrote {escape(str(folder))}; look at {preview}")
     if params.start is None:
-        metres = "" if units == PIXELS else " --metres"
         console.print(
             "read start and goal off its rulers, then give --start X Y --goal X Y"
-            + metres
         )
     if params.resolution is not None and units == PIXELS:
         console.print(

@@ -9,16 +9,13 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from tdac_agent.cli.mcp_flags import McpOptions
-from tdac_agent.cli.task_choice import chosen
+from tdac_agent.cli.task_choice import chosen_problem
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import typed_fields
 from tdac_agent.library.listing import next_folder
 from tdac_agent.runs.run_record import Agent
-from tdac_agent.tasks.task import Task
-from tdac_agent.tasks.trust import allowed
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
-from tdac_envs.ladder.task_sets import TaskSet
 
 if TYPE_CHECKING:
     from tdac_agent.mcp.session import Session
@@ -40,7 +37,8 @@ def run(flags: TaskFlags, options: McpOptions) -> None:
 
     out, http = options.out, options.http
     known = begun(out) if out is not None and not typed_fields(flags) else None
-    problem = known.problem if known else _named(flags)
+    problem = known.problem if known else chosen_problem(flags)
+    problem = problem.allowed(options.suite, trust=False)
     most = options.episodes or (known.episodes if known else EPISODES)
     folder = out or next_folder(problem.name)
     agent: Agent = "over HTTP" if http else "unconfined"
@@ -61,14 +59,6 @@ def run(flags: TaskFlags, options: McpOptions) -> None:
         # The thread that reads stdin would keep the process.
         print("interrupted", file=sys.stderr, flush=True)
         os._exit(130)
-
-
-def _named(flags: TaskFlags) -> Task | TaskSet:
-    """The task or the task set of the flags."""
-    problem = chosen(flags)
-    if isinstance(problem, TaskSet):
-        return problem
-    return allowed(problem, None, trust=False)
 
 
 def _serve_http(session: Session, port: int, token: str | None) -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.options import out_option
+from tdac_agent.cli.shared_options import out_option, suite_option
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 app = typer.Typer()
 
@@ -25,6 +25,7 @@ class McpOptions:
         "each takes 6.  [default: 128]",
         least=1,
     )
+    suite: Path | None = suite_option()
     out: Path | None = out_option(
         "Run folder; a run in it is continued, with its own task if none is named.  "
         "[default: runs/TASK-N]"

@@ -16,9 +16,9 @@ from tdac_agent.cli.controller_choice import (
 )
 from tdac_agent.cli.display import has_display
 from tdac_agent.cli.film import film_of
-from tdac_agent.cli.options import NoiseFlags
 from tdac_agent.cli.play_flags import PlayOptions
 from tdac_agent.cli.printed import show_printed
+from tdac_agent.cli.shared_options import NoiseFlags
 from tdac_agent.cli.task_choice import check_scope, check_tier
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import require_flag, typed_fields
@@ -55,7 +55,6 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
         require_flag("--seed N", typed_fields(noise))
     elif options.episode is not None:
         raise TaskError("give --episode or --seed, not both")
-    disturbance = noise.disturbance()
     name = _checked(options.episode)
     flags = with_own_set(options.controller, flags)
     check_scope(flags.set_name is not None, flags, options, noise)
@@ -70,8 +69,7 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
     if options.seed is None:
         rollout = drive(task, source, name, options.tier)
     else:
-        task.disturbed_options(disturbance)
-        setup = options.seed, disturbance, options.tier
+        setup = options.seed, noise.disturbance(task), options.tier
         rollout = drive_disturbed(task, source, *setup).rollout
     frames_of = partial(task.pictures().frames, rollout)
     return show(rollout, frames_of, task.name, options)

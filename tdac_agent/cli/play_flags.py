@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.options import (
+from tdac_agent.cli.shared_options import (
     CONTROLLER,
     VIDEO,
     NoiseFlags,
@@ -16,7 +16,7 @@ from tdac_agent.cli.options import (
 )
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, SETS, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 app = typer.Typer()
 

@@ -12,6 +12,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.run_view import list_tests
 from tdac_agent.models.budget import format_usd
+from tdac_agent.verification.verdict import COLOURS
 
 _ANSWERS = (
     ("generate", "controller", "controllers"),
@@ -21,6 +22,10 @@ _ANSWERS = (
 )
 FINAL = frozenset({"validation", "comparison"})
 """Purposes of worlds whose results are printed."""
+CHECKS = {
+    False: "checking the suite: reference must pass, do-nothing must fail",
+    True: "checking your tests: they must run on a controller that does nothing",
+}
 VERBS = {
     "generate": "writing",
     "edit": "editing",
@@ -65,8 +70,7 @@ class SynthProgress:
         if kind in {"run.start", "run.resume"}:
             self._print_heading(record)
         elif kind == "prove.start":
-            check = "checking the suite: reference must pass, do-nothing must fail"
-            self._console.print(f"  {check}", style="dim")
+            self._console.print(f"  {CHECKS[self._on_set]}", style="dim")
             self._spinner.update(text="checking the suite")
         elif kind == "prove.step":
             self._spinner.update(text=f"checking the suite: {record['doing']} …")
@@ -133,9 +137,19 @@ class SynthProgress:
 
     def _show_episodes(self, at: str, record: dict[str, Any]) -> None:
         """Shows how disturbed episodes go, and prints those of the comparison."""
-        reached = f"{record.get('reached', 0)} of {record['episodes']} goals reached"
+        blind = record["what"] == "confirmation"
+        most = record["episodes"]
+        if blind:
+            most = record.get("driven", record.get("done", 0))
+        reached = f"{record.get('reached', 0)} of {most} goals reached"
+        kind = "disturbed episodes"
+        if blind:
+            kind = f"blind drives (at most {record['episodes']})"
         if record["event"] != "drive.end":
-            self.doing(f"{at}  disturbed episodes: {reached}")
+            self.doing(f"{at}  {kind}: {reached}")
+        elif blind:
+            word = record["word"]
+            self.say(f"  {at}", f"{word}: blind drives: {reached}", COLOURS[word])
         elif record["what"] == "comparison":
             self.say(f"  {at}", f"other disturbed episodes: {reached}", "dim")
 
@@ -162,7 +176,8 @@ class SynthProgress:
         elif record["unchanged"]:
             self.say(f"= {at}", note, "yellow")
         elif record["passed"]:
-            self.say(f"✔ {at}", note if self._on_set else "all tests passed", "green")
+            text = note if self._on_set else "all tests passed"
+            self.say(f"✔ {at}", text, "green" if self._on_set else COLOURS["passed"])
         elif self._on_set:
             self.say(f"[red]✘ {at}[/]", f"[red]{note}[/]")
         else:

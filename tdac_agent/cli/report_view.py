@@ -16,14 +16,21 @@ from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.episodes.trajectory import nominal_first
 from tdac_agent.prompting.feedback import Group, cut, group_failures
 from tdac_agent.tasks.units import UNITS, Units
-from tdac_agent.verification.diagnosis.report import Failure, Report, in_units
+from tdac_agent.verification.diagnosis.gap import gap_figure, too_close_text
+from tdac_agent.verification.diagnosis.report import (
+    Episode,
+    Failure,
+    Report,
+    in_units,
+)
+from tdac_agent.verification.verdict import COLOURS
 
 MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""
 LEGEND = (
     "grid path left, straight left: the smallest distance to the goal in the episode, "
     "out of that at the start, along the grid path and in a straight line; ms per "
-    "call: mean time of policy(obs)"
+    "call: mean time of policy(obs); smallest gap: between body and obstacles"
 )
 
 
@@ -63,9 +70,14 @@ def show_report(
     console.print(episode_table(report, units))
     if report.episodes:
         print_sentences(console, LEGEND, "dim")
+    for episode in report.too_close:
+        assert episode.smallest_gap is not None
+        text = too_close_text(episode.smallest_gap, units)
+        print_sentences(console, f"{episode.name}: reached, {text}", "yellow")
     if out is not None:
         _show_files(out, console)
-    colour, word = ("green", "verified") if verdict.passed else ("red", "not verified")
+    word = "passed" if verdict.passed else "failed"
+    colour = COLOURS["passed" if verdict.passed else "not verified"]
     task = provenance.called or provenance.task
     # Task names are not unique, so the folder is shown, too.
     task += f" of {folder}" if folder is not None and task != provenance.task else ""
@@ -152,8 +164,14 @@ def episode_table(report: Report, units: Units) -> Table:
     )
     table.add_column("start", no_wrap=True)
     table.add_column("outcome", no_wrap=True)
-    figures = ("steps", "contacts", "grid path\nleft", "straight\nleft", "ms per\ncall")
-    for name in figures:
+    figures = (
+        "steps",
+        "contacts",
+        "grid path\nleft",
+        "straight\nleft",
+        "smallest\ngap",
+    )
+    for name in (*figures, "ms per\ncall"):
         table.add_column(name, justify="right", no_wrap=True)
     for episode in (e for e in report.episodes if e.outcome != "not run"):
         colour = "green" if episode.outcome == "reached" else "red"
@@ -164,9 +182,18 @@ def episode_table(report: Report, units: Units) -> Table:
             str(episode.collisions),
             _fraction(units, episode.d_min, episode.d0),
             _fraction(units, episode.d_min_euclidean, episode.d0_euclidean),
+            _gap(episode, units),
             f"{episode.call_ms_mean:.2f}" if episode.call_ms_p99 else "–",
         )
     return table
+
+
+def _gap(episode: Episode, units: Units) -> str:
+    """The smallest gap of an episode, yellow if it reached the goal too close."""
+    if episode.smallest_gap is None:
+        return "–"
+    shown = gap_figure(episode.smallest_gap.gap, units)
+    return f"[yellow]{shown}[/]" if episode.too_close else shown
 
 
 def _fraction(units: Units, left: float, whole: float) -> str:

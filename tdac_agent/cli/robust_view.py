@@ -9,16 +9,16 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import print_sentences
+from tdac_agent.cli.sentences import print_command, print_sentences
 from tdac_agent.tasks.units import Units
-from tdac_agent.verification.episode_report import (
-    EpisodeReport,
-    Interval,
+from tdac_agent.verification.decision import (
     SequentialResult,
     decision_text,
     percent,
 )
+from tdac_agent.verification.episode_report import EpisodeReport, Interval
 from tdac_agent.verification.judge.episode_row import EpisodeRow
+from tdac_agent.verification.verdict import COLOURS, verified_text, word_of
 
 LEAST, MOST, ERRORS = 5, 10, 3
 REACHED = "reached"
@@ -47,11 +47,10 @@ def show_robust(
         f"{report.successes} of {report.count} episodes reached the goal without a "
         f"contact{f' ({others})' if others else ''}; they took {report.seconds:.0f} s"
     )
+    for line in report.gap_lines(units):
+        say(f"  {line}")
     if report.time_outs:
-        say(
-            f"[yellow]warning: {report.time_outs} of them timed out, also when retried "
-            "alone; if this machine was busy, repeat this when it is idle[/]"
-        )
+        say(_warning(report))
     if report.interval is not None and report.rate is not None:
         say(rate_text(report.rate, report.interval))
     if report.sequential is not None:
@@ -63,6 +62,28 @@ def show_robust(
         )
         say(_legend(result))
         say(error_rates(result))
+
+
+def show_confirmation(
+    report: EpisodeReport, console: Console, play: list[str], units: Units
+) -> None:
+    """Prints the verdict of blind drives, with the failures.
+
+    `play` are the words after `tdac` that play one of them, without `--seed`; `units`
+    are those of places and lengths.
+    """
+    if report.failures:
+        console.print(worst_table(report, units), highlight=False)
+        for error in _errors(report):
+            print_sentences(console, error, indent=2)
+        replay = [*play, "--seed", str(report.worst[0].number)]
+        print_command(console, "replay the first of them:", replay)
+    if report.time_outs:
+        console.print(_warning(report), highlight=False)
+    word = word_of(report)
+    text = f"{escape(verified_text(report))}; {report.seconds:.0f} s"
+    console.print(f"[bold {COLOURS[word]}]{word}[/]: {text}", highlight=False)
+    console.print(f"  blind drives: {report.provenance.disturbance}", highlight=False)
 
 
 def worst_table(report: EpisodeReport, units: Units) -> Table:
@@ -80,6 +101,13 @@ def worst_table(report: EpisodeReport, units: Units) -> Table:
     for episode in report.worst[: max(LEAST, min(failures, MOST))]:
         table.add_row(*_row(episode, units)[: len(table.columns)])
     return table
+
+
+def _warning(report: EpisodeReport) -> str:
+    return (
+        f"[yellow]warning: {report.time_outs} of them timed out, also when retried "
+        "alone; if this machine was busy, repeat this when it is idle[/]"
+    )
 
 
 def _row(episode: EpisodeRow, units: Units) -> list[str]:
@@ -131,9 +159,18 @@ def _legend(result: SequentialResult) -> str:
 def error_rates(result: SequentialResult) -> str:
     """How often a sequential test errs."""
     low, high = result.at_refused_rate, result.at_accepted_rate
-    return (
+    text = (
         f"  a true rate of {percent(low.rate)} is accepted with probability "
         f"{percent(low.accepted)}\n"
         f"  a true rate of {percent(high.rate)} is rejected with probability "
         f"{percent(high.rejected)}, undecided with {percent(high.undecided)}"
+    )
+    if result.contact is None:
+        return text
+    low, high = result.contact.at_refused_rate, result.contact.at_accepted_rate
+    return (
+        f"{text}\n"
+        f"  a true share of contacts of {percent(1.0 - low.rate)} is accepted with "
+        f"probability {percent(low.accepted)}, one of {percent(1.0 - high.rate)} with "
+        f"{percent(high.accepted)}"
     )

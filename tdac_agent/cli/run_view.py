@@ -21,7 +21,7 @@ from tdac_agent.runs.improvement_record import (
     is_shown,
     read_improvement,
 )
-from tdac_agent.runs.run_record import Attempt, Run
+from tdac_agent.runs.run_record import Attempt, Run, status_now
 from tdac_agent.runs.selection_record import (
     HIDDEN_FILE,
     CandidateFigures,
@@ -29,7 +29,9 @@ from tdac_agent.runs.selection_record import (
     Selection,
 )
 from tdac_agent.tasks.task_file import SET_FILE
+from tdac_agent.verification.confirmation import CONFIRMATION_FILE, read_confirmation
 from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.verdict import COLOURS, delivered_text, verified_text
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 
@@ -39,19 +41,28 @@ def show_run(run: Run, console: Console) -> None:
     search = read_improvement(folder) if run.improve else None
     if run.attempts:
         console.print(_attempts(run, search))
-    if run.verified:
-        ending = f"[bold green]verified[/] in iteration {run.tau}, "
+    status = status_now(run, before=False)
+    if run.passed and run.status != "budget":
+        ending = f"[bold {COLOURS.get(status, 'yellow')}]{status}[/] "
+        ending += f"{delivered_text(run)}, "
         if search is not None and search.selected != search.first:
             ending += f"improved in iteration {search.k}, "
         ending += f"{run.seconds:.1f} s: {escape(str(run.controller))}"
         console.print(ending, soft_wrap=True)
+        confirmation = read_confirmation(folder) if run.confirmations else None
+        if confirmation is not None:
+            _print_indented(console, verified_text(confirmation))
         if search is not None:
             _print_indented(console, search.told)
-        if run.reason:
+        if run.reason and search is not None:
             _print_indented(console, f"the search ended early: {run.reason}")
+        if run.status == "passed" and not run.confirmations:
+            words = ["tdac", "verify", str(folder)]
+            print_plain(console, f"  not verified yet: {shlex.join(words)}")
         _print_indented(console, usage)
-        evidence = f"{folder / 'report.json'}, {folder / 'trajectory.png'}"
-        print_plain(console, f"  evidence: {evidence}")
+        names = ("report.json", CONFIRMATION_FILE, "trajectory.png")
+        evidence = [str(folder / name) for name in names if (folder / name).is_file()]
+        print_plain(console, f"  evidence: {', '.join(evidence)}")
         drive = shlex.join(["tdac", "play", str(folder), "--video", "drive.mp4"])
         print_plain(console, f"  watch it drive: {drive}")
     elif run.status == "budget":
@@ -106,7 +117,7 @@ def _attempts(run: Run, search: TaskImprovement | None) -> Table:
         table.caption += f"; k above {run.iterations}: a variation"
     table.caption_justify = "left"
     for attempt in run.attempts:
-        failed = list_tests(attempt.failed_tests, 4)
+        failed = "" if attempt.passed else list_tests(attempt.failed_tests, 4)
         if attempt.unchanged or not failed:
             failed = _remark(attempt)
         if search is not None:
@@ -125,6 +136,7 @@ def list_tests(tests: Sequence[str], most: int) -> str:
 def _remark(attempt: Attempt) -> str:
     """The last note on an attempt without valid or new code, or on a variation."""
     is_explained = not attempt.valid or attempt.unchanged or attempt.parent is not None
+    is_explained = is_explained or attempt.confirmed is not None
     return "; ".join(attempt.notes[-1:]) if is_explained else ""
 
 
@@ -133,7 +145,12 @@ def _result(attempt: Attempt) -> str:
         return "[yellow]invalid[/]"
     if attempt.unchanged:
         return "[yellow]same code[/]"
-    return "[green]verified[/]" if attempt.passed else "[red]failed[/]"
+    if not attempt.passed:
+        return "[red]failed[/]"
+    if attempt.confirmed is None:
+        return f"[{COLOURS['passed']}]passed[/]"
+    word = "verified" if attempt.confirmed else "not verified"
+    return f"[{COLOURS[word]}]{word}[/]"
 
 
 def show_selection(run: Run, console: Console) -> None:

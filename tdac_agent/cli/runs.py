@@ -15,16 +15,15 @@ from tdac_agent.cli.sentences import print_plain, print_sentences
 from tdac_agent.errors import RunError
 from tdac_agent.library.listing import folders_of, row_of
 from tdac_agent.models.budget import format_usd
+from tdac_agent.verification.verdict import COLOURS
 
 USUAL = Path("runs")
 """Default folder; it does not exist before the first run."""
 WIDE = 100
 """Console width from which all columns fit."""
 _COLOURS = {
-    "verified": "green",
+    **COLOURS,
     "trained": "green",
-    "selected": "green",
-    "not verified": "red",
     "running": "cyan",
     "unreadable": "red",
 }
@@ -71,9 +70,9 @@ def _training_progress(row: dict[str, Any]) -> str:
 
 
 def _what_goes_on(row: dict[str, Any]) -> str:
-    if row["status"] != "verified":
+    if row["status"] != "passed":
         return "to continue"
-    return f"{row['run']} is verified; to go on improving it"
+    return f"{row['run']} has passed; to go on improving it"
 
 
 def _agent(row: dict[str, Any]) -> str:

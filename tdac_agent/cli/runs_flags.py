@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tdac_agent.cli.options import Json
+from tdac_agent.cli.shared_options import Json
 
 app = typer.Typer()
 RUNS = "Run folder, folder of runs, or campaign; subfolders are searched."

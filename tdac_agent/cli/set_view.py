@@ -12,13 +12,13 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.robust_view import error_rates, rate_text
 from tdac_agent.cli.sentences import print_command, print_plain, print_sentences
-from tdac_agent.verification.episode_report import (
-    EpisodeReport,
-    HiddenCount,
-    decision_text,
-)
+from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.decision import decision_text
+from tdac_agent.verification.diagnosis.report import OWN
+from tdac_agent.verification.episode_report import EpisodeReport, HiddenCount
 from tdac_agent.verification.judge.episode_row import Scores
 from tdac_agent.verification.store import REPORT_FILE, TRAJECTORIES
+from tdac_agent.verification.verdict import COLOURS
 
 MOST_CAUSES = 6
 
@@ -36,12 +36,16 @@ def show_set_report(report: EpisodeReport, console: Console) -> None:
         f"to {last} of {provenance.split}: {report.successes} reached, "
         f"{report.count - report.successes} failed; {report.seconds:.0f} s"
     )
+    if own := [name for name in report.tests if name.startswith(f"{OWN}/")]:
+        say(f"tests of your own: all {len(own)} passed")
     if report.scores is not None and report.interval is not None:
         say(_scores(report, report.scores))
         say(rate_text(report.scores.success, report.interval))
     if report.causes:
         causes = list(report.causes.items())[:MOST_CAUSES]
         say("failures: " + ", ".join(f"{count} {name}" for name, count in causes))
+    for line in report.gap_lines(UNITS[provenance.unit]):
+        say(line)
     for text in report.told:
         print_sentences(console, text, indent=2)
     if report.clock_dependent is not None:
@@ -51,8 +55,8 @@ def show_set_report(report: EpisodeReport, console: Console) -> None:
         )
     result = report.sequential
     if result is not None:
-        colour = "green" if report.passed else "red"
         verdict = "verified" if report.passed else "not verified"
+        colour = COLOURS[verdict]
         say(
             f"[bold {colour}]{verdict}[/]: {decision_text(result)} after "
             f"{report.count} of at most {result.test.limit} worlds"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -30,6 +29,7 @@ from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import SetFile, shipped_names
 from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
+from tdac_envs.mapping.ray_angles import fan
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 ON_A_SHEET = 24
@@ -148,10 +148,8 @@ def _sensor(file: SetFile, pixel: float) -> RangeSensor:
     """The robot's sensor for `dead_ends`; that of an e-puck looks all around."""
     robot = file.robot
     if isinstance(robot, EPuckRobotParams):
-        return RangeSensor(8, math.radians(315.0), (BODY_RADIUS + RANGE) / pixel)
-    return RangeSensor(
-        robot.n_rays, math.radians(robot.field_of_view_deg), robot.range_max
-    )
+        return RangeSensor(fan(315.0, 8), (BODY_RADIUS + RANGE) / pixel)
+    return RangeSensor(robot.angles(), robot.range_max)
 
 
 def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None:
@@ -168,7 +166,8 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
         "disturbed": _disturbed(file) or "nothing",
         "horizon": _horizon(file),
         "verified": f"if a sequential test accepts a success rate of {file.bar:g} "
-        f"against {file.bar - MARGIN:g}",
+        f"against {file.bar - MARGIN:g}, and fewer contacts than "
+        f"{100 * file.most_contacts:g} %",
     }
     if file.movers:
         rows["movers"] = "; ".join(_group(group) for group in file.movers)

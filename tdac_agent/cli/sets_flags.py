@@ -8,9 +8,9 @@ from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.options import Json, json_option
+from tdac_agent.cli.shared_options import Json, json_option
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 sets_app = typer.Typer(help="List and show task sets: worlds new to a controller.")
 app = typer.Typer()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import typer
 
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 app = typer.Typer()
 

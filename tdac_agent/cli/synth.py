@@ -18,14 +18,13 @@ from tdac_agent.cli.progress import SynthProgress
 from tdac_agent.cli.run_view import show_run, show_selection
 from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.synth_flags import RunFlags
-from tdac_agent.cli.task_choice import check_tier, chosen
+from tdac_agent.cli.task_choice import check_tier, chosen_problem
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import flag_name
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.library.listing import next_folder
 from tdac_agent.models.provider import Provider
 from tdac_agent.models.ready import check_ready
-from tdac_agent.problems.choice import problem_of
 from tdac_agent.problems.problem import Problem
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.resume import (
@@ -34,24 +33,20 @@ from tdac_agent.runs.resume import (
     resume_arguments,
     resume_line,
 )
-from tdac_agent.runs.run_record import AGENT, Run, load_run
+from tdac_agent.runs.run_record import AGENT, RUN_FILE, Run, load_run
 from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.synthesis.synthesize import synthesize
+from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
-from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
 
 RECORDED = ("learner", "optimizer", "base_url", "max_cost", "max_tokens")
-ALLOWED = frozenset(
-    {"learner", "optimizer", "base_url", "key_over_http", "prompt", "suite", "seed"}
-)
-"""Flags that, given with --resume, permit a run from elsewhere to use their values."""
-WITH_RESUME = ALLOWED | {
-    *("resume", "max_cost", "max_tokens", "tier", "as_json", "trust", "then_verify"),
-}
-_EXIT = {"verified": 0, "selected": 0, "budget": 4}
+WITH_RESUME = frozenset({"resume", "trust", "as_json"})
+"""Flags of a run as a whole that may be given with --resume; options of the synthesis
+may unless they are part of the run's identity."""
+_EXIT = {"verified": 0, "passed": 0, "selected": 0, "budget": 4}
 
 
 def run(
@@ -71,12 +66,10 @@ def run(
     check_models(options)
     console = Console(stderr=run_flags.as_json)
     with console.status("preparing the task …"):
-        problem = chosen(flags, options, run_flags)
-        if isinstance(problem, Task):
-            problem = problem.with_profile(run_flags.profile)
-            problem = allowed(problem, run_flags.suite, trust=run_flags.trust)
+        problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
+        problem = problem.allowed(options.suite, trust=run_flags.trust)
     folder = run_flags.out or next_folder(problem.name)
-    return write(problem_of(problem), folder, options, console)
+    return write(problem, folder, options, console)
 
 
 def write(
@@ -114,14 +107,15 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
     """Continues a run with its own settings; returns the exit code.
 
     Args:
-        options: Limits and tier may be new; others permit a run from elsewhere to use
-            its own values.
+        options: Limits and tier, among others, may be new; models, server, template and
+            seed permit a run from elsewhere to use its own values.
         run_flags: Folder of the run, and whether a run from elsewhere may run and
             contact all that it names.
         typed: Names of the flags on the command line.
     """
     assert run_flags.resume is not None
-    _refuse_others(typed, TaskFlags(), options, run_flags)
+    may = {each.name for each in fields(options)} - options.identity.keys()
+    _refuse_others(typed, WITH_RESUME | may, TaskFlags(), options, run_flags)
     before = load_run(run_flags.resume)
     if before.learner == AGENT:
         command = resume_line(before, run_flags.resume)
@@ -134,33 +128,45 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
         )
     check_tier(options.tier)
     console = Console(stderr=run_flags.as_json)
-    more = before.status == "selected" and options.then_verify
+    later = {"selected": options.then_verify, "passed": "confirm" in typed}
+    more = later.get(before.status, False)
     if before.finished and not more:
         check_own(before)
         return _show(before, console, before=before)
-    everything = {**_values(options), "suite": run_flags.suite}
-    known = {name: everything[name] for name in ALLOWED & set(typed)}
-    known |= {n: everything[n] for n in ("max_cost", "max_tokens", "tier")}
+    everything = _values(options)
+    known = {name: everything[name] for name in may & set(typed)}
     check_ready_again(before, known)
     with console.status("preparing the task …"):
         wanted = resume_arguments(run_flags.resume, known, trust=run_flags.trust)
     problem, folder, index = (wanted.pop(n) for n in ("problem", "out", "index"))
-    settings = SynthOptions(then_verify=options.then_verify).changed(**wanted)
+    settings = _restored(options, before).changed(**wanted)
     return write(problem, folder, settings, console, index)
+
+
+def _restored(options: SynthOptions, before: Run) -> SynthOptions:
+    """The options of a run that have no field of their own in its record.
+
+    Raises:
+        RunError: The record has an option that there is not.
+    """
+    try:
+        return type(options)().restored(before.options)
+    except ValueError as error:
+        raise RunError(f"{before.folder / RUN_FILE}: {error}") from error
 
 
 def _values(options: SynthOptions) -> dict[str, Any]:
     return {field.name: getattr(options, field.name) for field in fields(options)}
 
 
-def _refuse_others(typed: Collection[str], *options: Any) -> None:
+def _refuse_others(typed: Collection[str], may: Collection[str], *options: Any) -> None:
     """Refuses flags whose values --resume takes from the run folder.
 
     Raises:
         RunError: Such a flag is given; the message names it.
     """
     known = [field for each in options for field in fields(each)]
-    wrong = [each for each in known if each.name in set(typed) - WITH_RESUME]
+    wrong = [each for each in known if each.name in set(typed) - set(may)]
     if wrong:
         names = ", ".join(map(flag_name, wrong))
         raise RunError(f"--resume continues a run as it was begun: leave out {names}")
@@ -198,12 +204,18 @@ def _show(run: Run, console: Console, *, before: Run | None) -> int:
     """Prints a run, as JSON if the console is stderr; returns the exit code."""
     if console.stderr:
         print_json(run)
-        return _EXIT.get(run.status, 1)
+        return exit_code(run)
     if before is not None and before.finished and before.status == run.status:
         note = f"the run in {run.folder} has already finished; nothing was done"
         print_plain(console, note)
     (show_selection if run.on_set else show_run)(run, console)
-    return _EXIT.get(run.status, 1)
+    return exit_code(run)
+
+
+def exit_code(run: Run) -> int:
+    """0 if the run ended as was asked for; 1 for what passed and was not confirmed."""
+    confirmed = run.status != "passed" or not run.confirmations
+    return _EXIT.get(run.status, 1) if confirmed else 1
 
 
 def _so_far(folder: Path) -> str:
@@ -214,8 +226,8 @@ def _so_far(folder: Path) -> str:
     # The first error is the one to report.
     with suppress(RunError):
         run = load_run(folder)
-        if run.verified and not run.on_set:
-            result = f"verified in iteration {run.tau}: {run.controller}"
+        if run.passed:
+            result = f"passed all tests in iteration {run.tau}: {run.controller}"
             return f"{result}; to go on improving it: {command}"
     return f"the run so far is in {folder}; to continue: {command}"
 
@@ -231,12 +243,14 @@ def _heading(problem: Problem, learner: str | Provider, optimizer: Any) -> str:
     if task is None:
         digest = f"[bold]{escape(problem.name)}[/] {problem.sha256[:8]}"
         return f"task set {digest}, worlds of dev; {model}"
-    nominal, setting = task.nominal, task.setting
+    nominal, setting, called = task.nominal, task.setting, display_name(task)
+    # The name of a task that is not bundled says it.
+    near = "" if "goal within" in called else f"goal within {tolerance_text(setting)}, "
     return (
-        f"task [bold]{escape(display_name(task))}[/]: shortest path "
+        f"task [bold]{escape(called)}[/]: shortest path "
         f"{setting.length_text(shortest_path_length(nominal))}, "
         f"body radius {setting.length_text(nominal.body_radius)}, "
-        f"at most {nominal.horizon} steps; {model}" + "".join(_remarks(task))
+        f"{near}at most {nominal.horizon} steps; {model}" + "".join(_remarks(task))
     )
 
 

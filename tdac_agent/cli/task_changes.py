@@ -17,6 +17,7 @@ from tdac_agent.tasks.task_file import TaskFile, checked
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.robots.bundled import bundled_robots, load_robot
 
 KEYS = {
     "tolerance": "tolerance",
@@ -29,6 +30,7 @@ KEYS = {
     "threshold": "threshold",
     "instructions": "instructions",
     "ignore": "ignore",
+    "robot": "robot.file",
     "robot_radius": "robot.radius",
     "max_speed": "robot.max_wheel_speed",
     "rays": "robot.n_rays",
@@ -91,6 +93,10 @@ def _changed(task: Task, flags: TaskFlags) -> Task:
     own = old.pop("robot", {})
     if "radius" in robot and own.get("axle") == 2 * own.get("radius", 0):
         del own["axle"]  # it follows from the radius
+    if "file" in robot:  # another robot: nothing of the old one stays
+        own = {}
+        old.pop("dt", None)
+        old.pop("disturbances", None)
     robot = {**own, **robot}
     made = load_task(
         file_of({**old, **keys, **({"robot": robot} if robot else {})}), base=base
@@ -158,6 +164,9 @@ def keys_of(
             value = _text(value)
         if field.name == "robot_image" and base != Path():
             value = value.absolute()
+        if field.name == "robot" and value not in bundled_robots():
+            load_robot(value)
+            value = str(Path(value).absolute())
         part, _, key = KEYS[field.name].rpartition(".")
         (keys.setdefault(part, {}) if part else keys)[key] = value
     return keys

@@ -17,8 +17,8 @@ from tdac_agent.cli.task_changes import (
 )
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import flag_name, typed_fields
-from tdac_agent.options import flag_of
-from tdac_agent.runs.ownership import load_task
+from tdac_agent.option_fields import flag_of
+from tdac_agent.runs.ownership import load_set_problem, load_task
 from tdac_agent.sandbox import TIERS
 from tdac_agent.tasks.registry import environment_with_key
 from tdac_agent.tasks.task import Task
@@ -26,14 +26,16 @@ from tdac_agent.tasks.task_file import (
     MAP_FILES,
     SET_FILE,
     TASK_FILE,
+    Profile,
     bundled_tasks,
 )
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
-from tdac_envs.map2d.source import check_exists
+from tdac_envs.map2d.source import check_exists, has_resolution
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 
 if TYPE_CHECKING:
+    from tdac_agent.problems.problem import Problem
     from tdac_envs.ladder.task_sets import TaskSet
 
 NAMING = {
@@ -153,6 +155,43 @@ def chosen(flags: TaskFlags, *options: Any) -> Task | TaskSet:
     return load_set(flags.set_name)
 
 
+def chosen_problem(
+    flags: TaskFlags, *options: Any, profile: Profile | None = None
+) -> Problem:
+    """What the flags name; the tests that it brings may need a permission.
+
+    Args:
+        flags: The flags.
+        options: Further options of the command, whose scope is checked.
+        profile: The profile of a task.
+
+    Raises:
+        TaskError: Flags contradict each other, or it cannot be used.
+    """
+    flags = with_named_file(flags)
+    check_scope(flags.set_name is not None, flags, *options)
+    if flags.set_name is None:
+        from tdac_agent.problems.single_task import TaskProblem  # slow to import
+
+        return TaskProblem(chosen_task(flags).with_profile(profile))
+    check_set_profile(profile)
+    return load_set_problem(flags.set_name)
+
+
+def check_set_profile(profile: str | None) -> None:
+    """Refuses the profile `paper` on a task set.
+
+    Raises:
+        TaskError: It is wanted.
+    """
+    if profile == "paper":
+        raise TaskError(
+            "a task set has only the profile policy: the functions of the profile "
+            "paper plan on the one map that a task has, and each world has its own; "
+            "leave out --profile paper"
+        )
+
+
 def chosen_single(flags: TaskFlags) -> Task:
     """The task that the flags name, for a command without task sets.
 
@@ -184,6 +223,7 @@ def chosen_task(flags: TaskFlags, default: str = "maze") -> Task:
         return shown(load_task(file_of(keys), base=Path()), flags)
     refuse_foreign(flags, environment_with_key("map"))
     source = flags.map_image or default
+    flags = in_own_units(flags, source)
     own = source not in bundled_maps()
     if own:
         check_exists(Path(source))
@@ -197,6 +237,21 @@ def chosen_task(flags: TaskFlags, default: str = "maze") -> Task:
     keys = keys_of(flags, start=None if own else bundled_map(source).start)
     frame = "metres" if flags.in_metres else "pixels"
     return load_task(file_of({"map": source, "frame": frame, **keys}), base=Path())
+
+
+def in_own_units(flags: TaskFlags, source: str) -> TaskFlags:
+    """The flags, in metres if their map has a resolution and they choose no units.
+
+    Args:
+        flags: The flags.
+        source: The map.
+    """
+    chosen_ones = flags.metres or flags.frame is not None
+    if chosen_ones or source in bundled_maps():
+        return flags
+    if not has_resolution(source, flags.resolution):
+        return flags
+    return replace(flags, frame="metres")
 
 
 def _refuse_naming(why: str, flags: TaskFlags, names: Collection[str]) -> None:
@@ -249,12 +304,11 @@ def check_heading(heading: float | None) -> None:
 
 def _rulers(map_file: Path, flags: TaskFlags) -> str:
     """Where to read places on a map."""
-    if flags.in_metres:
-        return "read them off the rulers that `tdac map IMAGE --metres` draws"
-    text = "read them off the rulers that `tdac map IMAGE` draws"
-    if map_file.suffix in (".yaml", ".yml"):
-        text += "; for places in metres, give --metres to both commands"
-    return text
+    scale = "" if flags.resolution is None else f" --resolution {flags.resolution:g}"
+    units = ""
+    if flags.in_metres != has_resolution(str(map_file), flags.resolution):
+        units = " --metres" if flags.in_metres else " --frame pixels"
+    return f"read them off the rulers that `tdac map IMAGE{scale}{units}` draws"
 
 
 def check_tier(name: str) -> None:

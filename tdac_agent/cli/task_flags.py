@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 TASK = "Bundled task (`maze`, `epuck`, …), task.yaml, or run folder"
 MAP_FILE = "Map image, ROS map.yaml, MovingAI .map, .npy grid"
@@ -55,30 +55,46 @@ class TaskFlags:
     )
     start: tuple[float, float] | None = option(
         None,
-        "Start: px on a map, m in a world, also as X,Y; for YAW, see --heading.",
+        "Start: px on a map, m in a world and on a map with a resolution; also as X,Y; "
+        "for YAW, see --heading.",
         metavar="X Y [YAW]",
         panel=TASKS,
     )
     goal: tuple[float, float] | None = option(
-        None, "Goal: px on a map, m in a world.", metavar="X Y", panel=TASKS
+        None, "Goal, in the units of --start.", metavar="X Y", panel=TASKS
     )
     heading: float | None = option(
         None,
-        "Start heading, rad, from +x towards +y (down on a map, up with --metres).",
+        "Start heading, rad, from +x towards +y (down in pixels, up in metres).",
         metavar="YAW",
         panel=TASKS,
     )
     tolerance: float | None = option(
         None,
-        "Distance at which the goal counts as reached: px on a map, m in a world.  "
-        "[default: 20 px, less on a short path; 0.02 m]",
+        "Distance at which the goal counts as reached, in the units of --start.  "
+        "[default: 20 px, less on a short path; with a resolution, the body radius; "
+        "in a world 0.02 m]",
+        panel=TASKS,
+    )
+    robot: str | None = option(
+        None,
+        "Robot (`tdac robots`) or robot file: its body, limits, scanner and control "
+        "rate; its noise and latency disturb `--robust`.",
+        metavar="NAME|FILE",
         panel=TASKS,
     )
     robot_radius: float | None = option(
-        None, "Body radius, px.  [default: 15]", panel=TASKS
+        None,
+        "Body radius, px, or m on a map with a resolution, which needs it.  "
+        "[default: 15 px]",
+        "--robot-radius",
+        "--radius",
+        panel=TASKS,
     )
     max_speed: float | None = option(
-        None, "Full speed of a wheel, px/s.  [default: 75.59]", panel=TASKS
+        None,
+        "Full speed of a wheel, px/s or m/s.  [default: 75.59 px/s, or 0.5 m/s]",
+        panel=TASKS,
     )
     rays: int | None = option(
         None, "Number of range rays.  [default: 18]", least=1, panel=TASKS
@@ -87,7 +103,10 @@ class TaskFlags:
         None, "Angle of the fan of rays, degrees.  [default: 110]", panel=TASKS
     )
     range_max: float | None = option(
-        None, "Largest range of a ray, px.  [default: 220]", "--range", panel=TASKS
+        None,
+        "Largest range of a ray, px or m.  [default: 220 px, or 3.5 m]",
+        "--range",
+        panel=TASKS,
     )
     robot_image: Path | None = option(
         None, "Picture of the robot, nose to the right.", metavar="FILE", panel=TASKS
@@ -115,12 +134,15 @@ class TaskFlags:
         "Units of places, lengths and headings, given and printed, and of what a "
         "controller observes: pixels (y down), or metres in the map's frame as in ROS "
         "(map.yaml; y up). The controllers of an existing run or task keep theirs.  "
-        "[default: pixels]",
+        "[default: metres on a map with a resolution, else pixels]",
         panel=TASKS,
     )
     metres: bool = option(False, "The same as --frame metres.", panel=TASKS)
     resolution: float | None = option(
-        None, "Metres per pixel of a map image that gives none.", panel=TASKS
+        None,
+        "Metres per pixel of a map image that gives none; places and lengths then are "
+        "in metres.",
+        panel=TASKS,
     )
     polarity: Literal["dark", "light"] | None = option(
         None,

@@ -8,7 +8,7 @@ from typing import Literal
 
 import typer
 
-from tdac_agent.cli.options import (
+from tdac_agent.cli.shared_options import (
     AXLE_ERROR,
     DELAY,
     MOTOR_LAG,
@@ -26,7 +26,7 @@ from tdac_agent.cli.options import (
 )
 from tdac_agent.cli.task_flags import SET, TASK
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 app = typer.Typer()
 TRAINING, DISTURBED = "Training", "Variation and noise"

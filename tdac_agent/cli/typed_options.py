@@ -4,8 +4,8 @@
     @typed_options("bench:run")
     def bench(options: BenchOptions) -> None: ...
 
-The fields are declared with `tdac_agent.options.option`. The command is called with the
-objects, so that a new field needs no other line here.
+The fields are declared with `tdac_agent.option_fields.option`. The command is called
+with the objects, so that a new field needs no other line here.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 
 from tdac_agent.cli.mistakes import begun
-from tdac_agent.options import Flag, flag_of
+from tdac_agent.option_fields import Flag, flag_of
 
 Command = Callable[..., Any]
 

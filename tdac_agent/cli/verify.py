@@ -14,7 +14,7 @@ from tdac_agent.cli.controller_choice import (
     with_own_set,
 )
 from tdac_agent.cli.spinner import Spinner
-from tdac_agent.cli.task_choice import check_scope, check_tier
+from tdac_agent.cli.task_choice import check_scope, check_set_profile, check_tier
 from tdac_agent.cli.typed_options import (
     flag_name,
     require_flag,
@@ -30,7 +30,7 @@ from tdac_envs.core.errors import TaskError
 
 if TYPE_CHECKING:
     from tdac_agent.cli.driving_bar import DrivingBar
-    from tdac_agent.cli.options import NoiseFlags
+    from tdac_agent.cli.shared_options import NoiseFlags
     from tdac_agent.cli.task_flags import TaskFlags
     from tdac_agent.cli.verify_options import VerifyOptions
     from tdac_agent.tasks.task import Task
@@ -65,7 +65,6 @@ def _check_robust(options: VerifyOptions, noise: NoiseFlags) -> None:
         require_flag("-n N", typed_fields(noise))
     elif options.accept_at is not None:
         SequentialTest(options.accept_at, options.episodes, options.margin)
-    noise.disturbance()
 
 
 def _refuse_noise(noise: NoiseFlags) -> None:
@@ -88,7 +87,7 @@ def _verify_on_task(
         file, task = controller_and_task(options.controller, flags)
     task = allowed(task, options.suite, trust=options.trust)
     if options.episodes is not None:
-        task.disturbed_options(noise.disturbance())
+        noise.disturbance(task)
     _freeze()
     with WarmJudge(child_pool) as judge:
         report = _report(file, task, options, judge)
@@ -102,17 +101,34 @@ def _verify_on_task(
             print_plain(console, note)
         if not options.as_json:
             show_report(report, console, options.out, task.folder, units)
-        robust = None
+        robust = confirmation = None
         if options.episodes is not None and report.passed:
             robust = _measure(file, task, options, noise, judge)
+        elif report.passed and options.confirm and not options.paper:
+            confirmation = _confirm(file, task, options, judge)
+    if options.junit is not None:
+        from tdac_agent.cli.junit import write_junit
+
+        write_junit(report, options.junit, confirmation)
     if options.as_json:
-        print_json(_record(report, options, robust))
+        print_json(_record(report, options, robust, confirmation))
     elif robust is not None:
         from tdac_agent.cli.robust_view import show_robust
 
         show_robust(robust, console, _replay(flags, options, noise), units)
+    elif confirmation is not None:
+        from tdac_agent.cli.robust_view import show_confirmation
+
+        drove_with = confirmation.provenance.disturbance
+        assert drove_with is not None
+        play = _replay(flags, options, type(noise).of(drove_with))
+        show_confirmation(confirmation, console, play[1:], units)
     elif options.episodes is not None:
-        console.print("robustness not measured: the controller is not verified")
+        console.print("robustness not measured: the controller failed its tests")
+    if confirmation is not None:
+        from tdac_agent.verification.verdict import word_of
+
+        return 0 if word_of(confirmation) == "verified" else 1
     return 0 if report.passed and (robust is None or robust.passed) else 1
 
 
@@ -135,10 +151,6 @@ def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) ->
     if report.passed and not report.provenance.paper:
         about = report.provenance
         _print_marked(file, about.task_sha256, about.profile)
-    if options.junit is not None:
-        from tdac_agent.cli.junit import write_junit
-
-        write_junit(report, options.junit)
     return report
 
 
@@ -175,7 +187,7 @@ def _measure(
                 options,
                 judge,
                 bar,
-                disturbance=noise.disturbance(),
+                disturbance=noise.disturbance(task),
                 accept_at=options.accept_at,
                 margin=options.margin,
             )
@@ -187,6 +199,23 @@ def _measure(
             rest = "contains the report of the suite, but no episodes.json"
             print_plain(console, f"{options.out} {rest}")
         raise
+
+
+def _confirm(
+    file: Path, task: Task, options: VerifyOptions, judge: WarmJudge
+) -> EpisodeReport:
+    """Drives blind, with a progress bar; in a run folder, with the number there."""
+    from tdac_agent.cli.console import Console
+    from tdac_agent.cli.driving_bar import DrivingBar
+    from tdac_agent.verification.confirmation import CONFIRMATION, confirm
+    from tdac_agent.verification.judge.confirming import confirming_test
+
+    console, most = Console(stderr=options.as_json), confirming_test().limit
+    with DrivingBar(console, most, "blind drives", is_long=True) as bar:
+        out = None if options.out is None else options.out / CONFIRMATION
+        return confirm(
+            file, task, tier=options.tier, out=out, judge=judge, watch=bar.show
+        )
 
 
 def _driven(
@@ -214,13 +243,16 @@ def _driven(
 
 
 def _record(
-    report: Report, options: VerifyOptions, robust: EpisodeReport | None
+    report: Report,
+    options: VerifyOptions,
+    robust: EpisodeReport | None,
+    confirmation: EpisodeReport | None,
 ) -> Any:
-    """The report; `-n` adds the key `robust`, null if it was not run."""
-    if options.episodes is None:
-        return report
-    added = None if robust is None else robust.model_dump(mode="json")
-    return {**report.model_dump(mode="json"), "robust": added}
+    """The report with the key `robust` or `confirmation`, null if it was not run."""
+    measured = options.episodes is not None
+    name, found = ("robust", robust) if measured else ("confirmation", confirmation)
+    added = None if found is None else found.model_dump(mode="json")
+    return {**report.model_dump(mode="json"), name: added}
 
 
 def _replay(flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags) -> list[str]:
@@ -234,23 +266,33 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
     from tdac_agent.cli.console import Console, print_json
     from tdac_agent.cli.driving_bar import DrivingBar
     from tdac_agent.cli.set_view import show_next_steps, show_set_report
-    from tdac_agent.verification.verify_episodes import most_worlds
-    from tdac_envs.ladder.task_sets import load_set
+    from tdac_agent.runs.ownership import load_set_problem
+    from tdac_agent.verification.verify_episodes import SEED_ON_SETS, most_worlds
 
     if options.hidden_folder is not None and options.split != "hidden":
         raise TaskError("--hidden-folder needs --split hidden")
-    if options.profile == "paper":
-        raise TaskError("--profile paper is for single tasks: leave it out with --set")
-    tasks = load_set(name, options.hidden_folder)
+    check_set_profile(options.profile)
+    problem = load_set_problem(name, options.hidden_folder)
+    problem = problem.allowed(options.suite, trust=options.trust)
+    tasks, suite = problem.tasks, problem.suite
+    if options.seed is not None and suite is None:
+        raise TaskError(SEED_ON_SETS)
     file = _controller_on(tasks, options)
     _freeze()
     most = options.episodes or most_worlds(tasks, options.split)
     console = Console(stderr=options.as_json)
     bar = DrivingBar(console, most, f"worlds of {tasks.name}", is_long=True)
     with WarmJudge(child_pool) as judge, bar:
-        split, salt_file = options.split, options.salt_file
         report = _driven(
-            file, tasks, options, judge, bar, split=split, salt_file=salt_file
+            file,
+            tasks,
+            options,
+            judge,
+            bar,
+            split=options.split,
+            salt_file=options.salt_file,
+            suite=suite,
+            seed=options.seed,
         )
     if report.passed and report.sequential is not None:
         _print_marked(file, report.provenance.sha256, "policy")

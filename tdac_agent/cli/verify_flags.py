@@ -6,7 +6,7 @@ import gc
 
 import typer
 
-from tdac_agent.cli.options import NoiseFlags
+from tdac_agent.cli.shared_options import NoiseFlags
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
 from tdac_agent.cli.verify_options import VerifyOptions

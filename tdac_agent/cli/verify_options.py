@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from tdac_agent.cli.options import (
+from tdac_agent.cli.shared_options import (
     CONTROLLER,
     Profile,
     json_option,
@@ -17,7 +17,7 @@ from tdac_agent.cli.options import (
     trust_option,
 )
 from tdac_agent.cli.task_flags import SETS
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 ROBUST = "Robustness"
 
@@ -29,12 +29,21 @@ class VerifyOptions:
     controller: str = option(..., CONTROLLER, argument=True)
     profile: Profile | None = profile_option()
     paper: bool = option(
-        False, "Run only the nominal episode, as in the paper.", scope="task"
+        False,
+        "Run only the nominal episode and end at `passed`, as in the paper.",
+        scope="task",
     )
-    suite: Path | None = suite_option(scope="task")
-    trust: bool = trust_option(scope="task")
+    confirm: bool = option(
+        True,
+        "Drive what passes all tests blind, from 93 disturbed starts; it is verified "
+        "if at most one of these drives fails. Without it, end at `passed`.",
+        "--confirm/--no-confirm",
+        scope="task",
+    )
+    suite: Path | None = suite_option()
+    trust: bool = trust_option()
     tier: str = tier_option()
-    seed: int | None = seed_option(scope="task")
+    seed: int | None = seed_option()
     junit: Path | None = option(None, "Write a JUnit XML report.", metavar="FILE")
     out: Path | None = out_option(
         "Folder for report.json or episodes.json, the trajectories and a picture of "
@@ -46,8 +55,8 @@ class VerifyOptions:
     )
     episodes: int | None = option(
         None,
-        "Drive N episodes and print the rates: of a task, disturbed ones, if the "
-        "controller is verified; on a set, on N worlds, without a verdict.",
+        "Drive N episodes and print the rates: of a task, disturbed ones, instead of "
+        "the blind drives; on a set, on N worlds. Neither is a verdict.",
         "-n",
         "--robust",
         "--worlds",

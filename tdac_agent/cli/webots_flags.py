@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from tdac_agent.cli.options import (
+from tdac_agent.cli.shared_options import (
     VIDEO,
     json_option,
     speed_option,
@@ -15,7 +15,7 @@ from tdac_agent.cli.options import (
 )
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, SETS, WORLD_FILE, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
 
 webots_app = typer.Typer(
     no_args_is_help=True, help="Run Webots controllers in Webots worlds."

@@ -24,6 +24,7 @@ def use_robot(env_id: str, **options: Any) -> Any:
     env.reset(seed=0)
     env.reset(options={"start": start[:2], "goal": goal})
     env.step(env.action_space.sample())
+    env.watch_gap().note()
     return env
 
 

@@ -22,6 +22,8 @@ from tdac_agent.sandbox.waiting import RunQueue
 from tdac_agent.storage.plain import shown
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_envs.drive.env import Observation
+from tdac_envs.drive.gap_search import GapWatch
+from tdac_envs.drive.smallest_gap import SmallestGap
 from tdac_envs.drive.task import AT_START, Pose
 
 # An episode is stopped if the mean policy call takes longer than this many steps.
@@ -76,6 +78,7 @@ class Record:
     _rooms: list[float] = field(default_factory=list)
     _movers: list[NDArray[np.float32]] = field(default_factory=list)
     _collisions: int = 0
+    _watch: GapWatch | None = None
 
     def reset(self) -> tuple[Observation, dict[str, Any]]:
         """Starts the episode.
@@ -89,6 +92,7 @@ class Record:
         if self.start is not None:
             options = {"start": self.start}
         observation, info = self.env.reset(seed=self.seed, options=options)
+        self._watch = self.env.watch_gap()
         info = self._note(observation, info)
         seen = {key: info[key] for key in info if key not in AT_START}
         return self._shown(observation), seen
@@ -144,6 +148,12 @@ class Record:
         """Returns the clearances so far; see `Rollout.rooms`."""
         return np.array(self._rooms, np.float64)
 
+    def smallest_gap(self) -> SmallestGap | None:
+        """Returns the smallest gap so far; None before the first step."""
+        if self._watch is None or not self._actions:
+            return None
+        return self._watch.smallest()
+
     def _shown(self, observation: Observation) -> Observation:
         return observation if self.seen is None else self.seen(observation)
 
@@ -153,6 +163,8 @@ class Record:
         self._distances.append(info["path_distance"])
         self._ranges.append(observation[self.env.readings])
         self._rooms.append(info["clearance"])
+        assert self._watch is not None
+        self._watch.note()
         self.contact = info.get("contact") or self.contact
         self._movers.append(self.env.discs().astype(np.float32))
         self._collisions = self.collisions_before + info["collisions"]
@@ -322,6 +334,8 @@ def _rollout(
         rooms=record.rooms(),
         calls=np.array(calls, np.float64),
         contact=record.contact,
+        smallest_gap=record.smallest_gap(),
+        required_gap=record.env.required_gap,
         timed_out=isinstance(error, ControllerTimeout) or slow,
         is_retryable=slow
         or (isinstance(error, ControllerFault) and error.is_retryable),

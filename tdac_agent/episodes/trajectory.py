@@ -14,6 +14,7 @@ from tdac_agent.errors import RunError
 from tdac_envs.core.errors import one_line_reason
 from tdac_envs.core.intake import read_array, read_file, read_zip
 from tdac_envs.drawing.marks import GHOST_SECONDS
+from tdac_envs.drive.smallest_gap import SmallestGap
 
 SCHEMA_VERSION = 1
 MOST_BYTES = 256_000_000
@@ -183,6 +184,9 @@ class Rollout:
         printed: What the controller printed, of bounded length.
         contact: What the body touched at last, as in `info`; None if nothing, or if the
             environment does not say.
+        smallest_gap: Smallest gap between body and obstacles, along the exact arcs;
+            None if no step was taken.
+        required_gap: Gap that the robot should keep, px or m.
     """
 
     name: str
@@ -201,6 +205,8 @@ class Rollout:
     calls: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     printed: str = ""
     contact: Contact | None = None
+    smallest_gap: SmallestGap | None = None
+    required_gap: float = 0.0
 
     @property
     def reached(self) -> bool:

@@ -57,7 +57,7 @@ RESULTS, EPISODE_TABLE, TIMING = "evaluation.json", "episodes.csv", "timing.csv"
 POLICIES = "policies"
 """Folder with the episodes of each policy on each problem."""
 NO_DISTURBANCE = Disturbance(0.0, 0.0, 0.0, 0)
-NOT_VERIFIED = "tdac synth verified no candidate; this is its last one"
+NOT_PASSED = "no candidate of tdac synth passed; this is its last one"
 MOST_LATE = 3
 """Time-outs of a policy on a task after which the rest is skipped."""
 _MOST = 512 << 20
@@ -261,8 +261,8 @@ def _compete(entrant: Entrant, problem: Problem, part: Part, terms: _Terms) -> D
     watch(0, 0)
     folder = terms.place / POLICIES / problem.name
     folder.mkdir(parents=True, exist_ok=True)
-    entrant, verified = prepared(entrant, problem, terms.tier)
-    note = None if verified else NOT_VERIFIED
+    entrant, passed = prepared(entrant, problem, terms.tier)
+    note = None if passed else NOT_PASSED
     request = Request(
         entrant.policy,
         entrant.sha256,

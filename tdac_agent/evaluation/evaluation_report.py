@@ -204,7 +204,7 @@ def row_of(result: Result) -> PolicyRow:
     successes = [episode for episode in episodes if episode.success]
     reasons = Counter(e.error for e in episodes if e.error is not None)
     spl = sum(1.0 / max(e.path_ratio or 1.0, 1.0) for e in successes)
-    gaps = [each.clearance_min for each in episodes if each.clearance_min is not None]
+    gaps = [each.least_gap for each in episodes if each.least_gap is not None]
     means = [e.clearance_mean for e in episodes if e.clearance_mean is not None]
     return PolicyRow(
         task=result.task,

@@ -20,15 +20,17 @@ from tdac_agent.episodes.sb3_file import (
 )
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.controller_file import check_controller
-from tdac_agent.planners.planner import planner_names, planner_on
+from tdac_agent.planners.names import planner_names
+from tdac_agent.planners.planner import planner_on
 from tdac_agent.problems.episodes import episodes_of
-from tdac_agent.problems.set_episodes import planner_sha256, write_set
+from tdac_agent.problems.set_episodes import planner_sha256
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file
 from tdac_agent.verification.judge.policy_spec import Kind, PolicySpec
+from tdac_agent.verification.judge.set_files import write_set
 from tdac_agent.verification.verify import read_source
 from tdac_agent.verification.verify_episodes import written_by
 from tdac_envs.core.errors import TaskError, hint
@@ -323,19 +325,21 @@ def prepared(
     """A fitted entrant, ready to drive: on a task, `builtin` is written here.
 
     Returns:
-        The entrant, and whether it is verified, if it was written. If no candidate is,
-        it is the last one.
+        The entrant, and whether it passed its tests, if it was written. If no candidate
+        did, it is the last one.
     """
     if entrant.kind != "builtin" or isinstance(problem, TaskSet):
         return entrant, True
-    source, verified = _written_for(problem, tier)
-    return replace(entrant, source=source, sha256=sha256_of(source)), verified
+    source, passed = _written_for(problem, tier)
+    return replace(entrant, source=source, sha256=sha256_of(source)), passed
 
 
 def _written_for(task: Task, tier: str) -> tuple[bytes, bool]:
     with tempfile.TemporaryDirectory(prefix="tdac-evaluate-") as name:
-        run = synthesize(task, BUILTIN, out=Path(name) / "run", tier=tier)
-        if run.verified:
+        run = synthesize(
+            task, BUILTIN, out=Path(name) / "run", tier=tier, confirm=False
+        )
+        if run.passed:
             return run.controller.read_bytes(), True  # raw read: our temporary folder
         candidates = sorted((run.folder / "iterations").rglob("controller.py"))
         return candidates[-1].read_bytes(), False  # raw read: our temporary folder

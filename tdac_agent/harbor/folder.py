@@ -17,12 +17,12 @@ from tdac_agent.harbor.judge import SALT_FILE, TASK_FOLDER, WORLDS_FILE
 from tdac_agent.harbor.wheel import pinned_versions, write_wheel
 from tdac_agent.problems.choice import problem_of
 from tdac_agent.problems.episodes import episodes_of
-from tdac_agent.problems.set_episodes import write_set
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.synthesis.answers import Exam, files_of, reference_of
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.tasks.task_file import SET_FILE
+from tdac_agent.verification.judge.set_files import write_set
 from tdac_agent.verification.salt import SALT_BYTES
 from tdac_agent.verification.verify import DEADLINE_SECONDS
 from tdac_envs.ladder.task_sets import TaskSet

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 
-from tdac_agent.html_report.scene import data_address
+from tdac_agent.html_report.figures import drawn
 from tdac_agent.metrics import (
     ASSUMPTIONS,
     Rate,
@@ -23,7 +22,7 @@ from tdac_agent.metrics import (
     summarise_sets,
 )
 from tdac_agent.metrics.table import KIND
-from tdac_agent.plots import figure_bytes, plot_cumulative_success, plot_success_rates
+from tdac_agent.plots import plot_cumulative_success, plot_success_rates
 from tdac_agent.runs.history import RunHistory
 
 MOST_CURVES = 8
@@ -72,7 +71,7 @@ def _kind(
         "first_pass": _rate(row, "first_pass"),
         "cs_K": _rate(row, "cs_K"),
         "tau_mean": _number(row["tau_mean"], ".1f"),
-        **_means(row),
+        **_means(row, "passed"),
     }
 
 
@@ -89,14 +88,14 @@ def _set_kinds(histories: Sequence[RunHistory]) -> Iterator[dict[str, Any]]:
             "rate": _rate(row, "rate"),
             "time_score": _rate(row, "time_score"),
             "episodes_mean": _number(row["episodes_mean"], ",.0f"),
-            **_means(row),
+            **_means(row, "verified"),
         }
 
 
-def _means(row: dict[str, Any]) -> dict[str, str]:
+def _means(row: dict[str, Any], word: str) -> dict[str, str]:
     return {
-        "tokens_per_verified": _number(row["tokens_per_verified"], ",.0f"),
-        "cost_per_verified": _number(row["cost_per_verified"], ".3f"),
+        "tokens_each": _number(row[f"tokens_per_{word}"], ",.0f"),
+        "cost_each": _number(row[f"cost_per_{word}"], ".3f"),
         "seconds_mean": _number(row["seconds_mean"], ",.0f"),
     }
 
@@ -136,11 +135,6 @@ def _figures(frames: RunFrames) -> tuple[tuple[str, str], ...]:
         ),
     }
     return tuple((name, drawn(figure)) for name, figure in figures.items())
-
-
-def drawn(figure: Figure) -> str:
-    """A figure as a data URL; browsers never run scripts in the SVG of an `<img>`."""
-    return data_address(figure_bytes(figure), "image/svg+xml")
 
 
 def format_seconds(seconds: float) -> str:

@@ -10,7 +10,8 @@ from typing import Any
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.animation import animations
-from tdac_agent.html_report.overview import drawn, format_seconds
+from tdac_agent.html_report.figures import drawn
+from tdac_agent.html_report.overview import format_seconds
 from tdac_agent.html_report.scene import TaskPicture, data_address
 from tdac_agent.html_report.set_part import set_part_of
 from tdac_agent.models.budget import format_usd
@@ -28,6 +29,7 @@ from tdac_agent.runs.run_record import (
     PICTURE_FILE,
     PROMPT_FILE,
 )
+from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
@@ -81,6 +83,7 @@ def section_of(
         "iterations": [(k, list(group)) for k, group in iterations],
         "failures": list(_failures(history)),
         "scene": scene,
+        "task_near": _near(history),
         "episodes": episodes,
         "watchable": {(e["candidate"], e["name"]): n for n, e in enumerate(episodes)},
         "most_lines": max(least, min(most, share)),
@@ -93,6 +96,11 @@ def section_of(
         "improvement": read_improvement(run.folder) if run.improve else None,
         "units": None if report is None else UNITS[report.provenance.unit],
     }
+
+
+def _near(history: RunHistory) -> str:
+    """Formats the goal tolerance of the run's task; empty without a task."""
+    return "" if history.task is None else tolerance_text(history.task.setting)
 
 
 def _breakdown(history: RunHistory) -> str | None:
@@ -258,7 +266,7 @@ def _uses(
     if run.on_set and run.tau is not None:
         verify = ["tdac", "verify", f"{name}/controller.py", *problem]
         yield shlex.join(verify), "verify the controller on public worlds"
-    elif run.verified:
+    elif run.passed:
         yield shlex.join(["tdac", "verify", name]), "verify the controller again"
         video = ["tdac", "play", name, "--video", "drive.mp4"]
         yield shlex.join(video), "record a video of the drive"

@@ -17,14 +17,14 @@ from inspect_ai.dataset import Sample
 from inspect_ai.scorer import Scorer
 
 from tdac_agent.inspect_tasks.names import registered
-from tdac_agent.inspect_tasks.scoring import driven, verified
+from tdac_agent.inspect_tasks.scoring import driven, passed
 from tdac_agent.inspect_tasks.solvers import repair, tdac_builtin
 from tdac_agent.synthesis.answers import exam_of, files_of
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.registry import own_environments
 from tdac_envs.ladder.set_file import set_names
 
-__all__ = ["driven", "repair", "tdac_builtin", "verified"]
+__all__ = ["driven", "passed", "repair", "tdac_builtin"]
 WORLDS = 20
 """Worlds on which an answer for a level drives."""
 
@@ -57,7 +57,7 @@ def _name(name: str) -> str:
 def _register_single(inspect_name: str, name: str) -> None:
     @task(name=registered(inspect_name))
     def bundled() -> Task:
-        return _task(name, {"task": name}, verified())
+        return _task(name, {"task": name}, passed())
 
 
 def _register_level(inspect_name: str, name: str) -> None:
@@ -78,7 +78,7 @@ def _task(name: str, about: dict[str, Any], judge: Scorer) -> Task:
     exam = exam_of(about)  # checks the values
     sample = Sample(
         input=exam.question(),
-        target="a verified controller.py",
+        target="a controller.py that passes",
         id=name,
         metadata=about,
         files={name: _data_uri(raw) for name, raw in files_of(exam.problem).items()},

@@ -54,13 +54,13 @@ def stderr_of_worlds() -> Metric:
     return compute
 
 
-@scorer(metrics=[accuracy()], name=registered("verified"))
-def verified() -> Scorer:
-    """1 if the controller in the answer is verified on its task, otherwise 0."""
+@scorer(metrics=[accuracy()], name=registered("passed"))
+def passed() -> Scorer:
+    """1 if the controller in the answer passes the tests of its task, otherwise 0."""
 
     async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
         scores, rest = await _judged(state)
-        return Score(value=scores.get("verified", 0.0), **rest)
+        return Score(value=scores.get("passed", 0.0), **rest)
 
     return score
 

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 from pydantic import BaseModel, Field
 
-from tdac_agent.verification.episode_report import EpisodeReport, decision_text
+from tdac_agent.verification.decision import decision_text
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.verdict import verified_text, word_of
 
 
 class Refused(Exception):
@@ -19,6 +21,10 @@ class EpisodeAnswer(BaseModel):
     name: str = Field(description="Its name, for `picture`.")
     outcome: str = Field(description="`reached`, `collision`, `out of time`, …")
     steps: int
+    gap: float | None = Field(
+        description="Smallest gap to obstacles, px or m; 0 with a contact."
+    )
+    too_close: bool = Field(description="Whether it is smaller than the required gap.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +57,9 @@ class SubmitAnswer(BaseModel):
     """Answer of `submit`."""
 
     submission: int = Field(description="Its number, for the other tools.")
-    verified: bool = Field(
+    passed: bool = Field(
         description="Whether it passed all tests of the task. On a task set always "
-        "false: there, only `choose` verifies."
+        "false. Only `choose` verifies."
     )
     summary: str = Field(description="The result in one line.")
     episodes: list[EpisodeAnswer] = Field(description="Episodes that may be shown.")
@@ -67,7 +73,8 @@ class SubmissionLine(BaseModel):
     """One of the submissions."""
 
     submission: int
-    verified: bool
+    passed: bool = Field(description="As `submit` told it.")
+    verified: bool = Field(description="Whether it was chosen, and verified.")
     can_be_chosen: bool
     summary: str
 
@@ -92,12 +99,12 @@ class ChooseAnswer(BaseModel):
     reached: int | None = Field(description="Those in which the goal was reached.")
 
 
-def suite_verdict(number: int, *, verified: bool) -> ChooseAnswer:
-    """The verdict on a task, which its suite gave before the choice."""
+def blind_verdict(number: int, report: EpisodeReport) -> ChooseAnswer:
+    """The verdict on a task: blind drives of what passed the suite."""
     return ChooseAnswer(
         submission=number,
-        verified=verified,
-        summary=f"submission {number} is the verified controller of this run",
+        verified=word_of(report) == "verified",
+        summary=verified_text(report),
         worlds=None,
         reached=None,
     )
@@ -120,8 +127,3 @@ def hidden_verdict(number: int, report: EpisodeReport) -> ChooseAnswer:
         worlds=report.count,
         reached=report.successes,
     )
-
-
-def first_word(*, verified: bool) -> str:
-    """The first word of the text of a result."""
-    return "verified" if verified else "failed"

@@ -5,8 +5,9 @@ from __future__ import annotations
 from tdac_agent.mcp.answers import Left
 
 _ON_TASK = """\
-Each submission is verified by the task's test suite. `verified` means that all tests
-passed; such a submission can be chosen."""
+Each submission is tested by the task's test suite. `passed` means that all tests
+passed; such a submission can be chosen. Only `choose` verifies: the submission drives
+blind, from about a hundred other starts with noise and slip, of which one may fail."""
 _ON_SET = """\
 Each submission drives on the next few worlds of the split `dev`, none of which comes
 twice. That is feedback, and no verdict: only `choose` verifies, by driving one

@@ -112,7 +112,7 @@ def open_session(
             run.episodes or 0, validation=0, explore=0, block=1, comparison=0
         )
         with WarmJudge(task=problem.task, watch=watch.poll) as judge:
-            terms = Terms(recorder, judge, TIER, parts, FEEDBACK_EPISODES)
+            terms = Terms(recorder, judge, parts, SynthOptions(tier=TIER))
             yield Session(problem, trials_of(problem, terms), watch)
 
 
@@ -123,8 +123,9 @@ def _new_run(problem: Problem, out: Path, episodes: int) -> Run:
     problem.check()
     own_seeds = lasting_secret() is not None
     facts: dict[str, Any] = {"seed": None if own_seeds else drawn_seed()}
+    facts["confirm"] = not problem.has_hidden
     if problem.has_hidden:
-        facts = {"seed": drawn_seed(), "episodes": episodes, "then_verify": True}
+        facts |= {"seed": drawn_seed(), "episodes": episodes, "then_verify": True}
         facts["feedback_episodes"] = FEEDBACK_EPISODES
     return new_run(
         problem,

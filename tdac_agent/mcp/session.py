@@ -15,8 +15,8 @@ from tdac_agent.mcp.answers import (
     SubmissionLine,
     SubmissionsAnswer,
     SubmitAnswer,
+    blind_verdict,
     hidden_verdict,
-    suite_verdict,
 )
 from tdac_agent.mcp.instructions import instructions
 from tdac_agent.mcp.pictures import draw
@@ -31,6 +31,7 @@ from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.hidden import read_hidden_report
 from tdac_agent.synthesis.terms import Chosen
 from tdac_agent.synthesis.trials import Trials, conclude
+from tdac_agent.verification.confirmation import CONFIRMATION_FILE, read_confirmation
 from tdac_envs.core.errors import TdacError, one_line_reason
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
@@ -151,10 +152,8 @@ class Session:
         result = self.trials.result(self._submission(number))
         if not result.passed and result.failure is not None:
             return result.failure.text
-        if self.problem.has_hidden:
-            told = f"nothing failed: {result.summary}"
-            return f"{told}; only choose({number}) can verify it"
-        return "nothing failed: it is verified"
+        told = f"nothing failed: {result.summary}"
+        return f"{told}; only choose({number}) can verify it"
 
     def picture(self, number: int, episode: str) -> bytes:
         """A PNG of an episode of a submission."""
@@ -167,7 +166,8 @@ class Session:
             submissions=[
                 SubmissionLine(
                     submission=each.k,
-                    verified=self._is_verified(each),
+                    passed=self._passed(each),
+                    verified=self.run.verified and each.k == self.chosen,
                     can_be_chosen=not self._unfit(each) and not self.run.finished,
                     summary=self.trials.result(each).summary,
                 )
@@ -179,18 +179,17 @@ class Session:
             ended=self._ending() if self.run.finished else None,
         )
 
-    def _is_verified(self, submission: Candidate) -> bool:
-        """Whether it passed the suite, or is the verified result of the run."""
-        if self.run.verified and submission.k == self.chosen:
-            return True
-        return not self.problem.has_hidden and self.trials.result(submission).passed
+    def _passed(self, submission: Candidate) -> bool:
+        """Whether it passed the suite of a task."""
+        result = self.trials.result(submission)
+        return not self.problem.has_hidden and not result.unfit
 
     def _unfit(self, submission: Candidate) -> str:
         """Why it cannot be chosen; empty if it can."""
         unfit = self.trials.result(submission).unfit
         if not unfit or self.problem.has_hidden:
             return unfit
-        return f"{unfit}; only a verified submission can be chosen"
+        return f"{unfit}; only a submission that passed can be chosen"
 
     def choose(self, number: int) -> ChooseAnswer:
         """Fixes the controller, gives the verdict, and ends the run.
@@ -216,7 +215,10 @@ class Session:
             raise Refused(self._ending())
         if self.problem.has_hidden:
             return hidden_verdict(number, read_hidden_report(self.run.folder))
-        return suite_verdict(number, verified=self.run.verified)
+        found = read_confirmation(self.run.folder)
+        if found is None:
+            raise Refused(f"{self._ending()}; there is no {CONFIRMATION_FILE}")
+        return blind_verdict(number, found)
 
     def close(self) -> None:
         """Records that the run was interrupted, unless it has ended."""
@@ -307,11 +309,17 @@ class Session:
         result, left = self.trials.result(submission), self.left
         return SubmitAnswer(
             submission=submission.k,
-            verified=not self.problem.has_hidden and result.passed,
+            passed=self._passed(submission),
             summary=result.summary,
             episodes=[
-                EpisodeAnswer(name=name, outcome=outcome, steps=steps)
-                for name, outcome, steps in result.episodes
+                EpisodeAnswer(
+                    name=each.name,
+                    outcome=each.outcome,
+                    steps=each.steps,
+                    gap=None if (gap := each.smallest_gap) is None else gap.gap,
+                    too_close=gap is not None and gap.too_close,
+                )
+                for each in result.episodes
             ],
             submissions_left=left.submissions,
             episodes_left=left.episodes,

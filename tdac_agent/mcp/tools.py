@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.mcp.answers import (
     ChooseAnswer,
+    SubmissionLine,
     SubmissionsAnswer,
     SubmitAnswer,
-    first_word,
 )
 from tdac_agent.mcp.session import Session
 
@@ -109,16 +109,18 @@ def _read_task(session: Session, arguments: Nothing, client: str) -> CallToolRes
 def _submit(session: Session, arguments: Source, client: str) -> CallToolResult:
     answer = session.submit(arguments.source, client)
     number, left = answer.submission, session.left
-    text = f"{first_word(verified=answer.verified)}: {answer.summary}."
-    if answer.verified:
-        text += f" choose({number}) makes it the result, and ends the run."
+    text = f"{'passed' if answer.passed else 'failed'}: {answer.summary}."
+    if answer.passed:
+        text += f" choose({number}) lets it drive blind, and ends the run."
     elif left.episodes is not None:
         text = f"failed to be verified so far: {answer.summary}. Only choose verifies."
     text += f"\nThis is submission {number}; failures({number}) tells more.\n"
     return _said(f"{text}Left: {left}.", answer)
 
 
-_STATE = {True: "verified", False: "not verified"}
+def _state(line: SubmissionLine) -> str:
+    """The state of a submission in one word or two."""
+    return "verified" if line.verified else "passed" if line.passed else "not verified"
 
 
 def _failures(session: Session, arguments: Numbered, client: str) -> CallToolResult:
@@ -142,7 +144,7 @@ def _submissions(session: Session, arguments: Nothing, client: str) -> CallToolR
     del arguments, client
     answer = session.listed()
     lines = [
-        f"{each.submission}: {_STATE[each.verified]}: {each.summary}"
+        f"{each.submission}: {_state(each)}: {each.summary}"
         for each in answer.submissions
     ]
     lines = lines or ["nothing has been submitted"]
@@ -153,7 +155,7 @@ def _submissions(session: Session, arguments: Nothing, client: str) -> CallToolR
 def _choose(session: Session, arguments: Numbered, client: str) -> CallToolResult:
     del client
     answer = session.choose(arguments.submission)
-    word = first_word(verified=answer.verified)
+    word = "verified" if answer.verified else "failed"
     return _said(f"{word}: {answer.summary}. The run has ended.", answer)
 
 
@@ -168,9 +170,9 @@ TOOLS = (
     ToolSpec(
         "submit",
         "Submit a controller, a whole Python file. It is judged in a sandbox, which "
-        "takes from seconds to minutes. The answer's text begins with `verified` or "
+        "takes from seconds to minutes. The answer's text begins with `passed` or "
         "`failed`. On a task set it drives on new worlds of `dev`, within the budget "
-        "of episodes, and is never `verified`: only `choose` verifies there.",
+        "of episodes. Only `choose` verifies.",
         Source,
         _submit,
         SubmitAnswer,
@@ -202,9 +204,10 @@ TOOLS = (
     ToolSpec(
         "choose",
         "Choose a submission as the result and end the run; this cannot be undone, and "
-        "nothing can be submitted afterwards. On a task, it must be a verified one. On "
-        "a task set, it drives on hidden worlds that are drawn now, at most 400, which "
-        "may take many minutes; the answer is the verdict. If your client gives up "
+        "nothing can be submitted afterwards. On a task, it must be one that passed; "
+        "it drives blind, from about a hundred disturbed starts. On a task set, it "
+        "drives on hidden worlds that are drawn now, at most 400, which may take many "
+        "minutes. The answer is the verdict. If your client gives up "
         "waiting, call it again with the same number.",
         Numbered,
         _choose,

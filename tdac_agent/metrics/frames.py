@@ -200,7 +200,7 @@ def frames_from_tau(
         [*ends, *((None, n, True) for n in ended)]
     ):
         run = f"{' '.join(labels.values())} {number + 1}"
-        status = "verified" if first else "interrupted" if cut else "not verified"
+        status = "passed" if first else "interrupted" if cut else "not verified"
         facts = {"run": run, "K": most, "status": status, "tau": first, "done": done}
         rows.append(dict.fromkeys(RUN_COLUMNS) | facts | {"censored": cut, **labels})
         for k in range(1, done + 1):

@@ -12,7 +12,7 @@ from scipy.stats import ttest_1samp
 
 from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
 from tdac_agent.metrics.frames import RUN_COLUMNS, Row, labels_of
-from tdac_agent.metrics.table import KIND, per_verified
+from tdac_agent.metrics.table import KIND, per_success
 from tdac_agent.runs.run_record import Run
 from tdac_agent.runs.selection_record import Selection, read_selection
 
@@ -82,8 +82,8 @@ def _metrics(runs: pd.DataFrame) -> Row:
         "time_score_low": least,
         "time_score_high": most,
         "episodes_mean": float(runs["episodes"].astype(float).mean()),
-        "tokens_per_verified": per_verified(runs["tokens"], verified),
-        "cost_per_verified": per_verified(runs["cost"], verified),
+        "tokens_per_verified": per_success(runs["tokens"], verified),
+        "cost_per_verified": per_success(runs["cost"], verified),
         "seconds_mean": float(runs["seconds"].mean()),
     }
 

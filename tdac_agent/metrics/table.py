@@ -28,12 +28,13 @@ def summarise(frames: RunFrames, by: Sequence[str] = KIND) -> pd.DataFrame:
         by: Columns of `runs` that define a kind.
 
     Returns:
-        A row per kind: the columns of `by`; R, verified, censored (numbers of runs);
+        A row per kind: the columns of `by`; R, passed (all tests), verified (by a blind
+        confirmation), censored (numbers of runs);
         sr, sr_low, sr_high (runs resampled); sr_unbiased; first_pass with _low and
         _high (exact); cs_K, the fraction of the uncensored runs that were solved, with
-        _low and _high (exact); candidate_rate; tau_mean (of verified runs);
-        tokens_per_verified and cost_per_verified (total of all runs of the kind,
-        divided by the number of verified ones); seconds_mean.
+        _low and _high (exact); candidate_rate; tau_mean (of runs that passed);
+        tokens_per_passed and cost_per_passed (total of all runs of the kind, divided by
+        the number of those that passed); seconds_mean.
     """
     columns = list(by)
     rows = []
@@ -45,13 +46,14 @@ def summarise(frames: RunFrames, by: Sequence[str] = KIND) -> pd.DataFrame:
 
 def _metrics(frames: RunFrames) -> dict[str, object]:
     runs = frames.runs
-    verified = int(runs["tau"].notna().sum())
+    passed = int(runs["tau"].notna().sum())
     whole = runs[~runs["censored"]]
     done = int(solved(whole, int(runs["K"].max())).sum())
     low, high = exact_interval(done, len(whole))
     return {
         "R": len(runs),
-        "verified": verified,
+        "passed": passed,
+        "verified": int(runs["status"].eq("verified").sum()),
         "censored": int(runs["censored"].sum()),
         **_with_interval("sr", success_rate(frames)),
         "sr_unbiased": unbiased_success_rate(frames),
@@ -60,9 +62,9 @@ def _metrics(frames: RunFrames) -> dict[str, object]:
         "cs_K_low": low,
         "cs_K_high": high,
         "candidate_rate": candidate_rate(frames).value,
-        "tau_mean": float(runs["tau"].mean()) if verified else float("nan"),
-        "tokens_per_verified": per_verified(runs["tokens"], verified),
-        "cost_per_verified": per_verified(runs["cost"], verified),
+        "tau_mean": float(runs["tau"].mean()) if passed else float("nan"),
+        "tokens_per_passed": per_success(runs["tokens"], passed),
+        "cost_per_passed": per_success(runs["cost"], passed),
         "seconds_mean": float(runs["seconds"].mean()),
     }
 
@@ -71,8 +73,8 @@ def _with_interval(name: str, rate: Rate) -> dict[str, float]:
     return {name: rate.value, f"{name}_low": rate.low, f"{name}_high": rate.high}
 
 
-def per_verified(spent: pd.Series, verified: int) -> float:
-    """Total spent per verified run; NaN if none is verified or some is unknown."""
-    if not verified or spent.isna().any():
+def per_success(spent: pd.Series, successes: int) -> float:
+    """Total spent per success; NaN if there is none, or some expense is unknown."""
+    if not successes or spent.isna().any():
         return float("nan")
-    return float(spent.sum()) / verified
+    return float(spent.sum()) / successes

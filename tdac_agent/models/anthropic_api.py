@@ -1,4 +1,4 @@
-"""`anthropic:MODEL`: models of Anthropic, through the official package."""
+"""Models of Anthropic, through the official package."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from tdac_agent.models.faults import as_faults
 from tdac_agent.models.picture import MEDIA_TYPE, Picture
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.streamed import Stop, StreamedAnswer
-from tdac_agent.models.vendor import Vendor, VendorModel
+from tdac_agent.models.vendor_model import VendorModel
+from tdac_agent.models.vendors import VENDORS
 
 if TYPE_CHECKING:
     import anthropic
@@ -31,15 +32,7 @@ STOPS: dict[str, Stop] = {
 class AnthropicModel(VendorModel["anthropic.Anthropic"]):
     """A model of Anthropic, or of a server with a compatible API."""
 
-    vendor = Vendor(
-        package="anthropic",
-        extra=None,
-        client="Anthropic",
-        company="Anthropic",
-        key="ANTHROPIC_API_KEY",
-        base_url="ANTHROPIC_BASE_URL",
-        example="claude-sonnet-5-5",
-    )
+    usual = VENDORS["anthropic"]
 
     def _ask(self, client: anthropic.Anthropic, request: Request) -> Reply:
         import anthropic
@@ -109,6 +102,3 @@ def _count(
         cached = gathered.tokens_cached + gathered.tokens_written
         gathered.tokens_in = check_count(usage.input_tokens) + cached
     gathered.tokens_out = check_count(usage.output_tokens)
-
-
-make = AnthropicModel.make

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from urllib.parse import urlsplit
 
 from tdac_agent.errors import ProviderError
 from tdac_agent.models.provider import Provider, missing_for
+from tdac_agent.models.vendors import VENDORS, forms, vendor_of
 from tdac_agent.tasks.setting import Setting
 from tdac_envs.core.errors import hint
 
@@ -22,17 +24,14 @@ GROUP = "tdac.providers"
 # A provider and the packages it needs are imported only when it is chosen.
 OWN = {
     "builtin": "tdac_agent.builtin.provider:make_builtin",
-    "anthropic": "tdac_agent.models.anthropic_api:make",
-    "openai": "tdac_agent.models.openai_api:make",
     "command": "tdac_agent.models.command:make",
     "manual": "tdac_agent.models.manual:make",
     "replay": "tdac_agent.runs.replay:make",
     "scripted": "tdac_agent.builtin.scripted:make",
 }
-FORMS = (
-    "builtin, anthropic:MODEL, openai:MODEL, command:PROGRAM, manual:DIR, replay:RUN, "
-    "scripted:SCRIPT"
-)
+"""Providers that are no vendors; those are in `VENDORS`."""
+OF_VENDORS = "tdac_agent.models.vendor_model:make_model"
+OTHER_FORMS = "command:PROGRAM, manual:DIR, replay:RUN, scripted:SCRIPT"
 OFFLINE = frozenset({"builtin", "command", "manual", "replay", "scripted"})
 IN_FILES = frozenset({"replay", "scripted"})
 """Providers whose answers are all stored in files."""
@@ -50,8 +49,9 @@ MEANT = {
 """Names of other programs, as patterns with the model's name as a group, and what they
 are here. The servers' ports are the defaults of these programs."""
 
-WITHOUT_TASK = frozenset({"anthropic", "openai", "command", "replay"})
-"""Providers that can be made before the task is known, without side effects."""
+WITHOUT_TASK = frozenset({"command", "replay"})
+"""Providers, besides vendors, that can be made before the task is known, without side
+effects."""
 
 BLIND = frozenset({"builtin", "scripted"})
 """Providers that ignore pictures; a replay needs them, to find the same questions."""
@@ -63,8 +63,8 @@ class Options:
 
     Attributes:
         setting: Setting of the task, for providers that know the environments, or the
-            task set if the controller is for one. None for the providers in
-            `WITHOUT_TASK` if no task is loaded yet.
+            task set if the controller is for one. None if no task is loaded yet, for
+            providers that need none (`needs_task`).
         base_url: URL of the models' server; None for the default.
         key_over_http: Whether a key may go to another machine unencrypted.
     """
@@ -119,12 +119,30 @@ def choose_model(name: str, options: Options) -> Provider:
         ProviderError: The name is unknown, or cannot be used.
     """
     kind, _, words = name.partition(":")
-    if kind in OWN:
-        make: Make = resolve_name(OWN[kind])
-        return make(words, options)
-    check_name(name)
-    others = {point.name: point for point in entry_points(group=GROUP)}
-    return _load(others[kind])(words, options)
+    make = _own(name)
+    if make is None:
+        check_name(name)
+        others = {point.name: point for point in entry_points(group=GROUP)}
+        make = _load(others[kind])
+    return make(words, options)
+
+
+def needs_task(name: str) -> bool:
+    """Whether a provider cannot be made, without side effects, before a task is known.
+
+    Args:
+        name: Name of the model.
+    """
+    return vendor_of(name) is None and name.partition(":")[0] not in WITHOUT_TASK
+
+
+def _own(name: str) -> Make | None:
+    """What makes a provider of tdac; None for the name of another one."""
+    vendor, kind = vendor_of(name), name.partition(":")[0]
+    if vendor is not None:
+        return partial(resolve_name(OF_VENDORS), vendor)
+    make: Make | None = resolve_name(OWN[kind]) if kind in OWN else None
+    return make
 
 
 def missing_for_name(name: str, options: Options) -> tuple[str, ...]:
@@ -136,7 +154,7 @@ def missing_for_name(name: str, options: Options) -> tuple[str, ...]:
     check_name(name)
     kind, _, words = name.partition(":")
     # Making a third-party provider may need its key; `manual` would create its folder.
-    if kind not in OWN or (kind == "manual" and words):
+    if kind not in {*OWN, *VENDORS} or (kind == "manual" and words):
         return ()
     return missing_for(choose_model(name, options))
 
@@ -173,11 +191,13 @@ def check_name(name: str) -> None:
     """
     kind = name.partition(":")[0]
     others = {point.name for point in entry_points(group=GROUP)}
-    if kind in OWN or kind in others:
+    if kind in {*OWN, *VENDORS, *others}:
         return
-    meant = _meant(name) or hint(kind, [*OWN, *others])
-    also = "".join(f", {other}:…" for other in sorted(others))
-    raise ProviderError(f"unknown model {name!r}{meant}; known: {FORMS}{also}")
+    meant = _meant(name) or hint(kind, [*OWN, *VENDORS, *others])
+    known = ", ".join(
+        ["builtin", *forms(), OTHER_FORMS, *(f"{other}:…" for other in sorted(others))]
+    )
+    raise ProviderError(f"unknown model {name!r}{meant}; known: {known}")
 
 
 def _meant(name: str) -> str:
@@ -220,10 +240,12 @@ def _check_url(url: str, named: Sequence[str]) -> None:
     kinds = {name.partition(":")[0] for name in named} - OFFLINE
     if not kinds:
         raise ProviderError(
-            "--base-url is for anthropic:MODEL and openai:MODEL; no such model is used"
+            f"--base-url is for {' and '.join(forms())}; no such model is used"
         )
     if len(kinds) > 1:
+        asked = sorted(kinds & {*VENDORS} or VENDORS)
+        variables = [VENDORS[kind].base_url for kind in asked]
         raise ProviderError(
             f"--base-url cannot be used for {' and '.join(sorted(kinds))} at once; set "
-            "ANTHROPIC_BASE_URL or OPENAI_BASE_URL for one of them"
+            f"{' or '.join(variables)} for one of them"
         )

@@ -1,4 +1,4 @@
-"""`openai:MODEL`: models of OpenAI, through the official package."""
+"""Models of OpenAI, and of servers with its API, through the official package."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from tdac_agent.models.faults import as_faults
 from tdac_agent.models.picture import MEDIA_TYPE, Picture
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.streamed import Stop, StreamedAnswer
-from tdac_agent.models.vendor import Vendor, VendorModel
+from tdac_agent.models.vendor_model import VendorModel
+from tdac_agent.models.vendors import VENDORS
 
 if TYPE_CHECKING:
     import openai
@@ -31,22 +32,14 @@ STOPS: dict[str, Stop] = {
 class OpenAIModel(VendorModel["openai.OpenAI"]):
     """A model of OpenAI, or of a server with a compatible API."""
 
-    vendor = Vendor(
-        package="openai",
-        extra="openai",
-        client="OpenAI",
-        company="OpenAI",
-        key="OPENAI_API_KEY",
-        base_url="OPENAI_BASE_URL",
-        example="gpt-6-sol",
-    )
+    usual = VENDORS["openai"]
 
     def _ask(self, client: openai.OpenAI, request: Request) -> Reply:
         import httpx2
         import openai
 
-        # Local servers know only the older name of the limit; OpenAI needs the newer.
-        is_openai = self._base_url is None
+        # Other servers know only the older name of the limit; OpenAI needs the newer.
+        is_openai = self._url is None
         gathered = StreamedAnswer(STOPS)
         with as_faults((openai.OpenAIError, httpx2.HTTPError)):
             with client.chat.completions.create(
@@ -98,6 +91,3 @@ def _add_chunk(gathered: StreamedAnswer, chunk: ChatCompletionChunk) -> None:
         if details is not None:
             gathered.tokens_cached = check_count(details.cached_tokens)
             gathered.tokens_written = check_count(details.cache_write_tokens)
-
-
-make = OpenAIModel.make

@@ -12,10 +12,10 @@ from urllib.request import getproxies, proxy_bypass
 from tdac_agent.errors import Fault
 from tdac_agent.models.choice import (
     OFFLINE,
-    WITHOUT_TASK,
     Options,
     check_names,
     choose_model,
+    needs_task,
 )
 from tdac_agent.models.provider import Provider, ProviderFault, served_at
 from tdac_agent.models.tariff import bounds_of, tariffs_of
@@ -44,11 +44,7 @@ def check_ready(names: Iterable[str | None], wanted: Mapping[str, Any]) -> None:
     base_url = wanted.get("base_url")
     check_names(known, base_url)
     options = Options(None, base_url, wanted.get("key_over_http", False))
-    models = [
-        choose_model(name, options)
-        for name in known
-        if name.partition(":")[0] in WITHOUT_TASK
-    ]
+    models = [choose_model(name, options) for name in known if not needs_task(name)]
     limits = (wanted.get("max_cost"), wanted.get("max_tokens"))
     bounds_of(models, tariffs_of(models), *limits)
     check_servers(models)
@@ -90,11 +86,10 @@ def needs_limit(name: str, base_url: str | None) -> bool:
         ProviderError: The name is unknown, or cannot be used.
     """
     check_names([name], None)
-    kind = name.partition(":")[0]
-    if kind in OFFLINE:
+    if name.partition(":")[0] in OFFLINE:
         return False
-    own = kind in WITHOUT_TASK
-    url = served_at(choose_model(name, Options(None, base_url))) if own else None
+    other = needs_task(name)
+    url = None if other else served_at(choose_model(name, Options(None, base_url)))
     return url is None or not is_loopback(url)
 
 

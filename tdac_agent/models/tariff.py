@@ -16,11 +16,8 @@ from tdac_agent.models.provider import (
     missing_for,
     served_at,
 )
-from tdac_agent.models.tokens import (
-    MOST_PICTURE_TOKENS,
-    most_tokens,
-    picture_tokens,
-)
+from tdac_agent.models.tokens import most_tokens, picture_tokens
+from tdac_agent.models.vendors import MOST_PICTURE_TOKENS, vendor_of
 
 MAX_COST = 2.0
 """Default limit of a run, USD."""
@@ -28,7 +25,6 @@ UNPRICED_TOKENS = 1_000_000
 """Default token limit of a run with a model of unknown price."""
 UNKNOWN_COST = frozenset({"command", "manual"})
 """Providers whose cost cannot be known."""
-BY_VENDOR = frozenset({"anthropic", "openai"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +118,7 @@ def bounds_of(
         if tariff.free or tariff.price is not None or kind in UNKNOWN_COST:
             continue
         address = served_at(model)
-        if max_tokens is None and address is None and kind in BY_VENDOR:
+        if max_tokens is None and address is None and vendor_of(model.name):
             problems.append(
                 f"no price is known for {model.name}, so --max-cost cannot bound it: "
                 "give --max-tokens N, or enter its price (docs/models.md)"

@@ -5,20 +5,18 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.builtin.level import level_of
+from tdac_agent.planners.names import FOLDER, PLANNERS
 from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, parse_yaml, read_file
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 
-FOLDER = Path(__file__).with_name("files")
-"""Folder of their files."""
-PLANNERS, TUNED = "planners.yaml", "tuned.json"
+TUNED = "tuned.json"
 
 
 class _Entry(BaseModel):
@@ -44,11 +42,6 @@ class Planner:
 
     source: str
     tuned: bool | None
-
-
-def planner_names() -> tuple[str, ...]:
-    """The names of all planners."""
-    return tuple(_known())
 
 
 def planner_on(name: str, problem: Task | TaskSet) -> Planner:
@@ -113,7 +106,7 @@ def with_values(source: str, values: dict[str, float]) -> str:
 
 @cache
 def _known() -> dict[str, _Entry]:
-    data = parse_yaml(read_file(FOLDER / PLANNERS, TEXT_BYTES))
+    data = parse_yaml(read_file(PLANNERS, TEXT_BYTES))
     return {name: _Entry.model_validate(each) for name, each in data.items()}
 
 

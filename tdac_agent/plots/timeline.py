@@ -106,7 +106,7 @@ def _entries(history: RunHistory, records: list[JournalRecord]) -> Iterator[Entr
             yield Entry(k, "rules", lines, RULE, "s")
         elif event == "call.fault":
             yield Entry(k, "fault", _wrapped([record["reason"]]), TROUBLE, "X")
-        elif event == "run.end" and record["status"] != "verified":
+        elif event == "run.end" and record["status"] not in ("verified", "passed"):
             reason = [record["reason"]] if record.get("reason") else []
             yield Entry(None, record["status"], _wrapped(reason), FAILED, "X")
 
@@ -115,7 +115,7 @@ def _verdict(record: JournalRecord, tried: CandidateHistory | None) -> Entry:
     k, at, notes = record["k"], f"j = {record['j']}", record["notes"][:3]
     if record["passed"]:
         lines = _wrapped(["all tests passed", *notes])
-        return Entry(k, f"{at}  verified", lines, PASSED)
+        return Entry(k, f"{at}  passed", lines, PASSED)
     if not record["valid"]:
         return Entry(k, f"{at}  no code", _wrapped(notes), TROUBLE)
     head = f"{at}  {len(record['failed_tests'])} failed"

@@ -37,7 +37,8 @@ def kept_problem(folder: Path) -> Problem | None:
         TaskError: The task or the task set cannot be read.
     """
     if (folder / SET_FILE).is_file():
-        from tdac_envs.ladder.task_sets import load_set
+        # As above.
+        from tdac_agent.problems.task_set import kept_set
 
-        return problem_of(load_set(folder / SET_FILE))
+        return kept_set(folder)
     return kept_task(folder) if (folder / TASK_FILE).is_file() else None

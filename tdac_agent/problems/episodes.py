@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from tdac_agent.problems.part import Episodes, Part
 from tdac_agent.sandbox import Limits
-from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.provenance import origin
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.verification.judge.policy_spec import PolicySpec
@@ -81,7 +80,7 @@ class OfTask:
         return TaskWorld(
             on_level=policy.on_level,
             task=lay_out(self.task, folder / "work"),
-            disturbance=part.disturbance or Disturbance(),
+            disturbance=part.disturbance or self.task.own_disturbance(),
             variation=part.variation,
         )
 
@@ -93,7 +92,7 @@ class OfTask:
         return {
             **facts,
             "controller_sha256": sha256,
-            "disturbance": part.disturbance or Disturbance(),
+            "disturbance": part.disturbance or self.task.own_disturbance(),
             "variation": part.variation,
             "first": part.first,
         }

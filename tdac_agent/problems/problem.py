@@ -113,6 +113,17 @@ class Problem(Protocol):
             suite: Folder of other tests that replace them.
         """
 
+    def allowed(self, suite: Path | None, *, trust: bool) -> Problem:
+        """The same, with tests that the user gave or trusts.
+
+        Args:
+            suite: Folder of the flag `--suite`; replaces the tests that it brings.
+            trust: Whether the user gave `--trust`.
+
+        Raises:
+            NotTrustedError: It brings tests that are not permitted.
+        """
+
     def question(
         self, rules: tuple[RepairRule, ...] = (), template: PromptTemplate = FULL
     ) -> str:

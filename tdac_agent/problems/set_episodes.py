@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from tdac_agent.tasks.first_run import compile_first
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.registry import environment
 from tdac_agent.verification.judge.policy_spec import PolicySpec
+from tdac_agent.verification.judge.set_files import write_set
 from tdac_agent.verification.judge.worlds import SetWorlds
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.salt import read_salt
@@ -140,10 +140,3 @@ def planner_sha256() -> str:
     files = (space_time.__file__, orca_driver.__file__)
     # raw read: shipped
     return sha256_of(b"".join(Path(file).read_bytes() for file in files))
-
-
-def write_set(tasks: TaskSet, path: Path) -> Path:
-    """Writes the set file of a set, for other processes; returns its path."""
-    values = tasks.file.model_dump(mode="json", by_alias=True)
-    path.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
-    return path

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from tdac_agent.prompting.prompt import (
 )
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.task import (
     Task,
@@ -27,6 +25,7 @@ from tdac_agent.tasks.task import (
     write_workdir,
 )
 from tdac_agent.tasks.task_file import OWN_SUITE, TASK_FILE, Profile
+from tdac_agent.tasks.trust import allowed, keep_suite
 from tdac_agent.verification.verify import suite_sha256
 from tdac_envs.core.errors import one_line_reason
 from tdac_envs.core.intake import IMAGE_BYTES, TEXT_BYTES, parse_json, read_file
@@ -95,14 +94,16 @@ class TaskProblem:
     def check(self, improve: int = 0) -> None:
         """See `Problem`."""
         if improve:
-            self.task.disturbed_options(Disturbance())
+            self.task.disturbed_options(self.task.own_disturbance())
 
     def permitted(self, suite: Path | None) -> TaskProblem:
         """See `Problem`."""
-        if self.suite is None:
-            return self
         own = suite or self.suite
         return TaskProblem(replace(self.task, suite=own, trusted=True))
+
+    def allowed(self, suite: Path | None, *, trust: bool) -> TaskProblem:
+        """See `Problem`."""
+        return TaskProblem(allowed(self.task, suite, trust=trust))
 
     def question(
         self, rules: tuple[RepairRule, ...] = (), template: PromptTemplate = FULL
@@ -119,9 +120,7 @@ class TaskProblem:
         setting = self.task.setting
         write_atomic(folder / PREVIEW_FILE, png(setting.preview()))
         if self.suite is not None:
-            ignored = shutil.ignore_patterns("__pycache__")
-            own = folder / OWN_SUITE
-            shutil.copytree(self.suite, own, ignore=ignored, dirs_exist_ok=True)
+            keep_suite(self.suite, folder)
         if setting.original is not None:
             content = read_file(setting.original.file, IMAGE_BYTES)
             write_atomic(folder / setting.original.name, content)

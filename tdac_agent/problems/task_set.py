@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +12,28 @@ from tdac_agent.prompting.prompt import FULL, PromptTemplate
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.tasks.task_file import SET_FILE, Profile
+from tdac_agent.tasks.task_file import OWN_SUITE, SET_FILE, Profile
+from tdac_agent.tasks.trust import keep_suite, permit, suite_wish
 from tdac_agent.verification.judge.set_files import level_params
-from tdac_envs.ladder.task_sets import TaskSet
+from tdac_agent.verification.verify import suite_folder, tests_sha256
+from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SetProblem:
-    """See `Problem`."""
+    """See `Problem`.
+
+    Attributes:
+        tasks: The task set.
+        suite: Folder of the user's own tests, or None.
+        trusted: Whether these tests may run; they run outside the sandbox.
+    """
 
     tasks: TaskSet
+    suite: Path | None = None
+    trusted: bool = True
 
     task = None
-    suite = None
-    suite_sha256 = ""
     scope = "this task set"
     contract = (POLICY,)
     file = SET_FILE
@@ -45,6 +53,16 @@ class SetProblem:
     def sha256(self) -> str:
         """See `Problem`."""
         return self.tasks.sha256
+
+    @property
+    def suite_sha256(self) -> str:
+        """See `Problem`: of the user's own tests alone.
+
+        Raises:
+            NotTrustedError: They may not run.
+        """
+        own = self.allowed(None, trust=False).suite
+        return "" if own is None else tests_sha256(suite_folder(own))
 
     @property
     def profile(self) -> Profile:
@@ -68,9 +86,14 @@ class SetProblem:
         check_generated(self.tasks)
 
     def permitted(self, suite: Path | None) -> SetProblem:
-        """See `Problem`: there are no tests."""
-        del suite
-        return self
+        """See `Problem`."""
+        return replace(self, suite=suite or self.suite, trusted=True)
+
+    def allowed(self, suite: Path | None, *, trust: bool) -> SetProblem:
+        """See `Problem`."""
+        if suite is None and self.suite is not None and not self.trusted:
+            permit(self.suite.parent, [suite_wish(self.suite)], trust=trust)
+        return self.permitted(suite)
 
     def question(
         self, rules: tuple[RepairRule, ...] = (), template: PromptTemplate = FULL
@@ -84,4 +107,17 @@ class SetProblem:
         write_atomic(folder / "params.json", text)
 
     def write_originals(self, folder: Path) -> None:
-        """See `Problem`: there is nothing else."""
+        """See `Problem`: the user's own tests."""
+        if self.suite is not None:
+            keep_suite(self.suite, folder)
+
+
+def kept_set(folder: Path) -> SetProblem:
+    """The task set of a run folder; its own tests may not run.
+
+    Raises:
+        TaskError: The task set cannot be read.
+    """
+    suite = folder / OWN_SUITE
+    own = suite if suite.is_dir() else None
+    return SetProblem(load_set(folder / SET_FILE), own, trusted=own is None)

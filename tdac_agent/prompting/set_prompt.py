@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
+import math
 from typing import Any
 
 from tdac_agent.prompting.context import allowed_code
+from tdac_agent.prompting.params_text import params_text
 from tdac_agent.prompting.prompt import PromptError, PromptTemplate, fill_in
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.prompting.set_observations import (
@@ -19,6 +20,7 @@ from tdac_envs.epuck.infrared import PLACES, TABLE
 from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.mapping.params import RobotParams
 
 SET_TEMPLATE = "set"
 """Name of the shipped template, `full` to the user."""
@@ -73,7 +75,7 @@ def set_context(tasks: TaskSet) -> dict[str, Any]:
         "full_step": file.full_step,
         "observation_rows": list(observation_rows(tasks)),
         "disturbances": list(disturbance_lines(file)),
-        "params_text": json.dumps(level_params(file), indent=2),
+        "params_text": params_text(level_params(file)),
         **allowed_code({"__future__", "sensors"}),
         "memory": f"{limits.memory_bytes >> 30}",
         "wall_seconds": f"{limits.call_seconds:g}",
@@ -89,7 +91,7 @@ def _robot(tasks: TaskSet) -> dict[str, Any]:
         return {
             "robot": robot,
             "turn": 2.0 * file.full_step / robot.axle_length,
-            "ray_step": robot.field_of_view_deg / max(1, robot.n_rays - 1),
+            "rays": _rays(robot),
             "side": tasks.largest_side,
         }
     floors = [each for each in file.worlds if isinstance(each, Plates)]
@@ -107,6 +109,18 @@ def _robot(tasks: TaskSet) -> dict[str, Any]:
         "readings": ", ".join(f"{1e3 * row[0]:g}: {row[1]:g}" for row in table),
         "nothing": f"{table[-1][1]:g}",
     }
+
+
+def _rays(robot: RobotParams) -> str:
+    """Formats where the rays of a robot point, and in which order they are."""
+    turns = [math.degrees(angle) for angle in robot.angles().tolist()]
+    if robot.ray_angles is not None:
+        return "; `ranges` are in this order"
+    step = turns[1] - turns[0] if len(turns) > 1 else 0.0
+    return (
+        f", at {turns[0]:g} + i * {step:.4g} degrees; `ranges[0]` is its leftmost ray, "
+        "`ranges[-1]` its\n  rightmost"
+    )
 
 
 def _band(*bands: tuple[float, float]) -> str:

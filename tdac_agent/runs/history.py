@@ -96,8 +96,8 @@ class RunHistory:
         status: Its present status; see `status_now`.
         task: Its task; None if it cannot be read, or for a task set.
         tried: Its candidates, oldest first.
-        report: Report on the verified controller, or else the last report.
-        source: The verified or selected controller, or else the last candidate with
+        report: Report on the delivered controller, or else the last report.
+        source: The delivered controller, or else the last candidate with
             code.
         book: Its rules.
         problems: What could not be read, one line each.
@@ -141,11 +141,11 @@ def gather_run(source: Path | Run) -> RunHistory:
     report = verified_source = None
     if run.on_set and run.tau is not None:
         verified_source = read_text(folder, "controller.py")
-    elif run.verified:
+    elif run.passed:
         report = _report(folder, "report.json", problems)
         verified_source = read_text(folder, "controller.py")
         if verified_source is None:
-            problems.append("controller.py of the verified run is missing")
+            problems.append("controller.py of the run is missing")
     return RunHistory(
         run,
         status,

@@ -45,7 +45,7 @@ def goals_text(reached: int, count: int) -> str:
 
 
 class MemberFigures(StrictRecord):
-    """A verified candidate in the disturbed episodes of the search."""
+    """A candidate that passed, in the disturbed episodes of the search."""
 
     k: int
     j: int
@@ -68,7 +68,7 @@ class PairedChange(StrictRecord):
     The interval is that of a paired bootstrap over episodes, with 95 % confidence.
     """
 
-    before: float = Field(description="Of the first verified controller.")
+    before: float = Field(description="Of the first controller that passed.")
     after: float = Field(description="Of the selected one.")
     low: float = Field(description="Lower end of the difference.")
     high: float = Field(description="Upper end of the difference.")
@@ -92,7 +92,7 @@ class PairedChange(StrictRecord):
 
 
 class TaskImprovement(StrictRecord):
-    """The search for a better controller, after the first verified one."""
+    """The search for a better controller, after the first that passed."""
 
     schema_version: int = 1
     unit: Place = Field(description="Unit of the clearance.")
@@ -103,14 +103,14 @@ class TaskImprovement(StrictRecord):
     used: int
     asked: int = Field(description="Number of variations that were answered.")
     members: tuple[MemberFigures, ...] = Field(description="Oldest first.")
-    first: tuple[int, int] = Field(description="(k, j) of the first verified one.")
+    first: tuple[int, int] = Field(description="(k, j) of the first that passed.")
     k: int = Field(description="Iteration of the selected candidate.")
     j: int = Field(description="Its edit.")
     controller_sha256: str
     first_comparison: int = Field(description="Seed of its first episode.")
     episodes: int = Field(
         description="Episodes of the comparison, which decided nothing; 0 if the first "
-        "verified candidate was selected."
+        "candidate that passed was selected."
     )
     robustness: PairedChange | None = None
     time: PairedChange | None = None
@@ -134,7 +134,7 @@ class TaskImprovement(StrictRecord):
         """What the search brought, in one line."""
         varied = sum(each.parent is not None for each in self.members)
         about = f"{self.asked} variation{'' if self.asked == 1 else 's'}"
-        about = f"improving: {about}, {varied} of them verified"
+        about = f"improving: {about}, {varied} of them passed"
         first, selected = (
             "k={} j={}".format(*one) for one in (self.first, self.selected)
         )

@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Container, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.tariff import MAX_COST
@@ -20,6 +21,9 @@ from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import Task, read_task
 from tdac_agent.tasks.task_file import OWN_SUITE, SET_FILE, TaskFile
 from tdac_agent.tasks.trust import Wish, asking, suite_wish
+
+if TYPE_CHECKING:
+    from tdac_agent.problems.task_set import SetProblem
 
 OURS = "builtin"
 """The learner that needs no permission."""
@@ -172,6 +176,32 @@ def load_task(
     except (RunError, OSError):
         own = False
     return replace(task, trusted=own)
+
+
+def load_set_problem(name: str | Path, hidden_folder: Path | None = None) -> SetProblem:
+    """Reads a task set; the tests of a run of this installation may run.
+
+    Args:
+        name: Name of a shipped set, path of a `set.yaml`, or a run folder.
+        hidden_folder: Folder with the held-out maps of a set of real maps.
+
+    Raises:
+        TaskError: The set cannot be read.
+    """
+    # Slow to import, and not needed on a task.
+    from tdac_agent.problems.task_set import SetProblem
+    from tdac_envs.ladder.task_sets import load_set
+
+    tasks, path = load_set(name, hidden_folder), Path(name)
+    folder = path.parent if path.name == SET_FILE else path
+    suite = suite_in(folder) if (folder / RUN_FILE).is_file() else None
+    if suite is None:
+        return SetProblem(tasks)
+    try:
+        own = is_own(load_run(folder), suite)
+    except (RunError, OSError):
+        own = False
+    return SetProblem(tasks, suite, trusted=own)
 
 
 def _earlier_facts(run: Run) -> bytes | None:

@@ -306,7 +306,7 @@ class Recorder:
         self.run.status, self.run.enough = status, enough
         self.run.reason = str(facts.get("reason", ""))
         self.run.outlook = str(facts.get("outlook", ""))
-        self.run.censored = not (self.run.finished or self.run.verified)
+        self.run.censored = not (self.run.finished or self.run.passed)
         facts |= {} if enough is None else {"enough": str(enough)}
         self.event("run.end", status=status, **facts)
         self.save()
@@ -330,7 +330,7 @@ class Recorder:
         ended = ("reason", "enough", "outlook")
         present = {name: getattr(self.run, name) for name in (*kept, *ended)}
         run = before.model_copy(update=present)
-        cut_short = run.status != "running" and not run.verified
+        cut_short = run.status != "running" and not run.passed
         return run.model_copy(update={"censored": cut_short})
 
     def _take_files(self, suite: Path | None) -> None:

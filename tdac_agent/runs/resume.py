@@ -79,8 +79,13 @@ def existing_run(folder: Path) -> Run | None:
     return None
 
 
-def check_same(before: Run, now: Run) -> None:
+def check_same(before: Run, now: Run, further: Mapping[str, Any] | None = None) -> None:
     """Checks that the run in the folder is the requested one.
+
+    Args:
+        before: The run in the folder.
+        now: The requested run.
+        further: Names of `Run.options` in which equal runs agree, with their defaults.
 
     Raises:
         RunError: They differ; names all differences.
@@ -90,6 +95,10 @@ def check_same(before: Run, now: Run) -> None:
         for name, words in CONFIGURATION.items()
         if getattr(before, name) != getattr(now, name)
     ]
+    for name, default in (further or {}).items():
+        values = [run.options.get(name, default) for run in (before, now)]
+        if values[0] != values[1]:
+            differences.append(f"{name} {values[0]} instead of {values[1]}")
     if differences:
         command = resume_line(before, before.folder)
         raise RunError(
@@ -188,6 +197,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "iterations": run.iterations,
         "patience": run.patience,
         "candidates": run.candidates,
+        "confirm": run.confirm,
         "improve": run.improve,
         **_of_episodes(run),
         "seed": run.seed,

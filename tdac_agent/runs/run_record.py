@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, ConfigDict, Field, JsonValue
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.budget import Enough
@@ -20,6 +20,7 @@ from tdac_envs.core.intake import RECORD_BYTES, parse_json
 Status = Literal[
     "running",
     "verified",
+    "passed",
     "not verified",
     "selected",
     "interrupted",
@@ -52,6 +53,9 @@ class Attempt(PrintableRecord):
     passed: bool
     failed_tests: tuple[str, ...] = ()
     seed: int | None = Field(None, description="Seed of its jittered starts.")
+    confirmed: bool | None = Field(
+        None, description="Result of its blind confirmation; None without one."
+    )
     notes: tuple[str, ...] = ()
     unchanged: bool = Field(
         False, description="Same code as an earlier candidate, whose report is reused."
@@ -59,6 +63,18 @@ class Attempt(PrintableRecord):
     parent: tuple[int, int] | None = Field(
         None, description="(k, j) of the candidate that it improves; k is then above K."
     )
+
+
+class Confirmation(PrintableRecord):
+    """The blind confirmation of a candidate that passed all tests."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    k: int
+    j: int
+    episodes: int = Field(description="Drives, up to the decision.")
+    failures: int
+    passed: bool
 
 
 class Run(PrintableRecord):
@@ -131,6 +147,17 @@ class Run(PrintableRecord):
     then_verify: bool = Field(
         False, description="Whether the selected controller drives on hidden worlds."
     )
+    confirm: bool = Field(
+        False,
+        description="Whether a controller of a task that passed all tests drives blind "
+        "before it is verified; False in records of earlier versions.",
+    )
+    confirmations: list[Confirmation] = Field(
+        default_factory=list, description="Of a task, in the order of their numbers."
+    )
+    options: dict[str, JsonValue] = Field(
+        {}, description="Options of the synthesis that have no field of their own."
+    )
     agent: Agent = Field(
         "",
         description="How the agent that submits candidates is connected, if one does: "
@@ -156,14 +183,21 @@ class Run(PrintableRecord):
 
     @property
     def verified(self) -> bool:
-        """Whether a controller passed, though the search may go on."""
-        delivered = self.tau is not None and not (self.finished or self.on_set)
-        return self.status == "verified" or delivered
+        """Whether its controller drove blind, with few enough failures.
+
+        Runs on a task of earlier versions have no such drives: they only passed.
+        """
+        return self.status == "verified" and (self.on_set or self.confirm)
+
+    @property
+    def passed(self) -> bool:
+        """Whether a controller of a task passed all tests, though the run may go on."""
+        return self.tau is not None and not self.on_set
 
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
-        return self.status in {"verified", "not verified", "selected"}
+        return self.status in {"verified", "passed", "not verified", "selected"}
 
     @property
     def on_set(self) -> bool:
@@ -184,7 +218,7 @@ class Run(PrintableRecord):
 
     @property
     def controller(self) -> Path:
-        """Path of the verified or selected controller."""
+        """Path of the controller that was verified, passed or was selected."""
         return self.folder / "controller.py"
 
 
@@ -219,8 +253,8 @@ def at_work(folder: Path) -> bool:
 def status_now(run: Run, *, before: bool) -> str:
     """Its present status; `killed` if the process that wrote `running` is gone.
 
-    A run that has ended early with a verified controller is `verified`, though it may
-    go on to improve it.
+    A run with a controller that passed all tests is `passed`, though it has ended early
+    and may go on to improve it.
 
     Args:
         run: The run.
@@ -228,11 +262,11 @@ def status_now(run: Run, *, before: bool) -> str:
             run that ended in between would seem to be killed.
     """
     if run.finished:
-        return run.status
+        return run.status if run.verified or run.status != "verified" else "passed"
     if before or at_work(run.folder):
         return "running"
-    if run.verified:
-        return "verified"
+    if run.passed:
+        return "passed"
     return "killed" if run.status == "running" else run.status
 
 

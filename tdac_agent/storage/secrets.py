@@ -36,10 +36,8 @@ def read_key(variable: str, vendor: str, *, needed: bool) -> str:
     return key or NO_KEY
 
 
-def is_safe_for_keys(url: str | None) -> bool:
+def is_safe_for_keys(url: str) -> bool:
     """Whether a key is safe on its way to a server: https, or this machine."""
-    if url is None:
-        return True
     return urlsplit(url).scheme == "https" or is_loopback(url)
 
 

@@ -11,6 +11,8 @@ from tdac_agent.library.listing import row_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.storage.plain import printable
+from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.diagnosis.gap import gap_text
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_yaml, read_file
 
@@ -115,11 +117,15 @@ def _nominal_drive(folder: Path) -> str:
     """How the last candidate drove from the fixed start, if it did."""
     try:
         data = read_file(folder / "report.json", RECORD_BYTES)
-        episodes = Report.model_validate_json(data).episodes
+        report = Report.model_validate_json(data)
     except (OSError, ValueError):
         return NONE
+    units, episodes = UNITS[report.provenance.unit], report.episodes
     first = next((each for each in episodes if each.name == "nominal"), None)
-    return NONE if first is None else f"{first.outcome}, {first.steps:,} steps"
+    if first is None:
+        return NONE
+    text, gap = f"{first.outcome}, {first.steps:,} steps", first.smallest_gap
+    return text if gap is None else f"{text}, smallest gap {gap_text(gap, units)}"
 
 
 def _controller(folder: Path) -> str | None:

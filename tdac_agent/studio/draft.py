@@ -16,6 +16,7 @@ from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.core.errors import TdacError
 from tdac_envs.grid.plan import path_length
+from tdac_envs.map2d.source import has_resolution
 from tdac_envs.map2d.task import Map2DTask
 
 DIGITS = {"px": 1, "m": 3}
@@ -56,8 +57,7 @@ class TaskDraft:
         """The task of the file itself, as far as it has one."""
         start = None if view.start is None else (view.start[0], view.start[1])
         heading = None if view.start is None else view.start[2]
-        radius = view.radius or (15.0 if view.kind == "map" else None)
-        return cls(view.kind, source, start, view.goal, heading, radius, polarity)
+        return cls(view.kind, source, start, view.goal, heading, view.radius, polarity)
 
     def words(self) -> list[str]:
         """The flags of the command line that name this task."""
@@ -69,6 +69,8 @@ class TaskDraft:
             words += ["--heading", f"{self.heading:g}"]
         if self.radius is not None:
             words += ["--robot-radius", f"{self.radius:g}"]
+        if self.kind == "map" and has_resolution(self.source):
+            words += ["--frame", "pixels"]
         if self.polarity is not None:
             words += ["--polarity", self.polarity]
         return words

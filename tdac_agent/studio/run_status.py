@@ -36,7 +36,7 @@ def progress_of(row: dict[str, Any], running: bool) -> str:
     if not row or "k" not in row:
         return "preparing the task …" if running else ""
     text, varied = f"iteration {row['k']}", variations_text(row)
-    if row["status"] in ("verified", "selected"):
+    if row["status"] in ("verified", "passed", "selected"):
         text = f"in {text}{varied}, {row['seconds']:.0f} s"
     else:
         text += f" of at most {row['iterations']}{varied}"
@@ -124,7 +124,7 @@ def initial_controller_text(run: Run) -> str:
     failed = len(first.failed_tests)
     text = f"Your controller failed {failed} test{'' if failed == 1 else 's'}"
     text += ": see iteration 1 below"
-    if not run.verified:
+    if not run.passed:
         return f"{text}."
     author = "the built-in template" if run.optimizer == "builtin" else run.optimizer
-    return f"{text}. The verified controller is another one, by {author}."
+    return f"{text}. The controller that passed is another one, by {author}."

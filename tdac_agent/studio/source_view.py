@@ -51,7 +51,7 @@ class SourceView:
         notes: What the reader is to know.
         start: Where the robot of the file starts, with its heading, if it says so.
         goal: Where the file has its goal.
-        radius: Body radius of a bundled map, px.
+        radius: Body radius of a bundled map, or the usual one, px.
         widest: Largest body radius that gets from one place to another, in the unit;
             negative for none. None for worlds, whose robot has one size.
         laid_over: The picture with another occupied grid over it: the reading of a
@@ -122,7 +122,7 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
     image = load_image(bundled.image if bundled else Path(source))
     said = ReadingOptions(None if image.occupied is not None else polarity, None)  # type: ignore[arg-type]
     grid, params, _ = preprocess_with_candidates(
-        image, None, None, 15.0, preset="default", snap=False, heading=0.0, options=said
+        image, None, None, None, preset="default", snap=False, heading=0.0, options=said
     )
     zoom = _zoom(grid.cells)
     picture = _laid_over(image, grid.cells, zoom)
@@ -148,7 +148,7 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
         tuple(params.notes),
         (*bundled.start, bundled.heading) if bundled else None,
         bundled.goal if bundled else None,
-        bundled.robot_radius if bundled else None,
+        bundled.robot_radius if bundled else params.robot.radius,
         widest,
         laid_over,
     )

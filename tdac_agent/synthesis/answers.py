@@ -60,7 +60,7 @@ class Exam:
     @property
     def scores(self) -> tuple[str, ...]:
         """Names of the scores, the main one first."""
-        return ("success", "time") if self.problem.has_hidden else ("verified",)
+        return ("success", "time") if self.problem.has_hidden else ("passed",)
 
     def question(self) -> str:
         """The first question to a model."""
@@ -100,7 +100,7 @@ class Exam:
         salt_file: Path | None,
     ) -> Judged:
         if self.problem.task is not None:
-            return _verified(verify(source, self.problem.task, meanwhile=poll))
+            return _tested(verify(source, self.problem.task, meanwhile=poll))
         assert self.problem.tasks is not None
         report = verify_episodes(
             source,
@@ -141,7 +141,7 @@ def files_of(problem: Problem) -> dict[str, bytes]:
 def reference_of(problem: Problem) -> str:
     """The source of tdac's own controller, which knows what a model knows.
 
-    On a task, it is tuned until it is verified.
+    On a task, it is tuned until it passes.
 
     Raises:
         RunError: Tuning did not help.
@@ -151,10 +151,10 @@ def reference_of(problem: Problem) -> str:
         # raw read: shipped
         return controller_of(problem.tasks, "ask a model").read_text(encoding="utf-8")
     with tempfile.TemporaryDirectory(prefix="tdac-builtin-") as name:
-        run = synthesize(problem, out=Path(name) / "run")
-        if not run.verified:
+        run = synthesize(problem, out=Path(name) / "run", confirm=False)
+        if not run.passed:
             raise RunError(
-                "the learner `builtin` has no verified controller for the task "
+                "the learner `builtin` has no controller that passes the task "
                 f"{problem.name}"
             )
         # raw read: just written
@@ -169,11 +169,11 @@ def unusable(problem: str) -> str:
     )
 
 
-def _verified(report: Report) -> Judged:
+def _tested(report: Report) -> Judged:
     about, passed = report.provenance, f"all {report.verdict.expected} tests passed"
     return Judged(
         passed=report.passed,
-        scores={"verified": float(report.passed)},
+        scores={"passed": float(report.passed)},
         feedback=passed if report.passed else render_feedback(report),
         facts={
             "task_sha256": about.task_sha256,

@@ -16,7 +16,6 @@ from tdac_agent.errors import Fault
 from tdac_agent.models.bounds import check_reply
 from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
 from tdac_agent.models.provider import (
-    MAX_OUTPUT_TOKENS,
     PermanentFault,
     Provider,
     ProviderFault,
@@ -27,6 +26,7 @@ from tdac_agent.models.retry import FailedCall, RetryPolicy, answer
 from tdac_agent.models.tariff import Tariff
 from tdac_agent.runs.journal_state import call_key
 from tdac_agent.runs.recorder import Recorder
+from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.workload import Rest, rest_of
 
 MIN_FREE_BYTES = 16 << 20
@@ -71,15 +71,20 @@ class Calls:
         budget: Budget of this run, or shared by several.
         tariffs: Tariffs by model name.
         retry: Retry policy after faults.
-        max_output: Token limit of an answer.
+        options: Options of the synthesis.
     """
 
     recorder: Recorder
     budget: Budget
     tariffs: Mapping[str, Tariff]
     retry: RetryPolicy
-    max_output: int = MAX_OUTPUT_TOKENS
+    options: SynthOptions
     _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    @property
+    def max_output(self) -> int:
+        """Token limit of an answer."""
+        return self.options.max_output
 
     def unused(self, request: Request, **facts: Any) -> None:
         """Records why an answer could not be used; see `Recorder.unused`."""

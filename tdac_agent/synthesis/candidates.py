@@ -6,14 +6,32 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
+from typing import NamedTuple
 
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.verification.diagnosis.gap import Gap
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
+
+
+class ToldEpisode(NamedTuple):
+    """What may be told of an episode.
+
+    Attributes:
+        name: Its name, or the number of its world.
+        outcome: How it ended.
+        steps: Its steps.
+        smallest_gap: Its smallest gap; None if it was not driven.
+    """
+
+    name: str
+    outcome: str
+    steps: int
+    smallest_gap: Gap | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +48,8 @@ class Result:
         unfit: Why it cannot be delivered; empty if it can.
         failed: What failed.
         seed: Seed of its jittered starts, if its tests had one.
-        episodes: Name, outcome and steps of the episodes that may be told.
+        episodes: The episodes that may be told.
+        confirmed: Result of its blind confirmation; None without one.
     """
 
     passed: bool
@@ -41,7 +60,8 @@ class Result:
     unfit: str = ""
     failed: tuple[str, ...] = ()
     seed: int | None = None
-    episodes: tuple[tuple[str, str, int], ...] = ()
+    episodes: tuple[ToldEpisode, ...] = ()
+    confirmed: bool | None = None
 
     @property
     def works(self) -> bool:
@@ -56,8 +76,9 @@ class Result:
             k=k,
             j=j,
             valid=True,
-            passed=self.passed,
+            passed=self.passed or self.confirmed is False,
             failed_tests=self.failed,
+            confirmed=self.confirmed,
             seed=self.seed,
             notes=notes,
             unchanged=not new,
@@ -134,6 +155,7 @@ class Candidate:
         source: Its source.
         folder: Its folder.
         report: The report of a suite; None before it was tested by one.
+        confirmation: The report of its blind confirmation, if there was one.
         feedback: Reports on feedback worlds, in order.
         validation: Its episodes on validation worlds.
         explored: What came of it in a search, if it took part in one.
@@ -144,6 +166,7 @@ class Candidate:
     source: str
     folder: Path
     report: Report | None = None
+    confirmation: EpisodeReport | None = None
     feedback: list[EpisodeReport] = field(default_factory=list)
     validation: list[EpisodeRow] = field(default_factory=list)
     explored: Explored | None = None
@@ -167,6 +190,11 @@ class Candidate:
     def drives(self) -> bool:
         """Whether it passed the static and contract tests, so that it drove."""
         return any(report.count for report in self.feedback)
+
+    @property
+    def refused(self) -> bool:
+        """Whether it failed a suite, so that it does not drive."""
+        return self.report is not None and not self.report.passed
 
     @property
     def first_failure(self) -> EpisodeReport | None:

@@ -18,7 +18,6 @@ from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.archive import Member
 from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.terms import Chosen, Terms
-from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import draw_trajectories
 from tdac_agent.verification.judge.episode_row import scores_of
@@ -80,7 +79,7 @@ def task_improvement(
     first = archive.members[0].candidate
     return TaskImprovement(
         unit=task.setting.units.place,
-        disturbance=Disturbance(),
+        disturbance=task.own_disturbance(),
         block=terms.shares.block,
         improve=terms.recorder.run.improve,
         asked=chosen.asked,

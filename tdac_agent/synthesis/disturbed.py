@@ -6,7 +6,7 @@ from pathlib import Path
 from statistics import fmean
 
 from tdac_agent.models.picture import LARGEST_SIDE
-from tdac_agent.prompting.feedback import cut
+from tdac_agent.prompting.feedback import Feedback, cut
 from tdac_agent.runs.episode_pictures import failure_pictures, scene_of
 from tdac_agent.runs.improvement_record import goals_text
 from tdac_agent.runs.run_record import Run
@@ -14,11 +14,14 @@ from tdac_agent.storage.hashes import number_of
 from tdac_agent.synthesis.candidates import Figures
 from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.tasks.task import Task
+from tdac_agent.verification.confirmation import CONFIRMATION
 from tdac_agent.verification.diagnosis.measures import least_steps
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
-from tdac_agent.verification.diagnosis.report import Report
+from tdac_agent.verification.diagnosis.report import Diagnosis, Failure, Report
 from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.store import TRAJECTORIES
+from tdac_agent.verification.verdict import confirmed_text
 from tdac_envs.drive.scores import time_score
 
 PURPOSES = ("improve", "comparison")
@@ -73,6 +76,39 @@ def disturbed_feedback(driven: EpisodeReport) -> str | None:
     parts = [f"{line[0].upper()}{line[1:]}; {counts}."]
     parts += [f"{n}. {cut(text)}" for n, text in enumerate(texts[:MOST_TOLD], 1)]
     return "\n\n".join(parts)
+
+
+def confirmation_feedback(report: Report, driven: EpisodeReport) -> Feedback:
+    """What the models are told about a confirmation that failed.
+
+    Args:
+        report: The report of the suite, which the candidate passed.
+        driven: The confirmation. Another one will have other starts.
+    """
+    line = f"all tests passed, but {confirmed_text(driven)}"
+    bad = [each for each in driven.episodes if each.too_close or not each.success]
+    failures = tuple(_as_failure(each) for each in bad)
+    text = "All tests passed. Then it drove blind, from other starts and with {}. {}"
+    found = disturbed_feedback(driven) or f"{confirmed_text(driven)}."
+    text = (
+        "All tests passed. Then it drove blind, from other starts, with "
+        f"{driven.provenance.disturbance}. {found}"
+    )
+    as_failed = report.model_copy(update={"failures": failures})
+    return Feedback(text, line, (CONFIRMATION,), as_failed)
+
+
+def _as_failure(episode: EpisodeRow) -> Failure:
+    """A failed drive, as a failed test of the suite."""
+    text = episode.text or episode.error or episode.outcome
+    cause = episode.cause or ("collision" if episode.too_close else "error")
+    diagnosis = Diagnosis(cause=cause, text=text)
+    return Failure(
+        test=f"{CONFIRMATION}::drive",
+        group="end to end",
+        message=text,
+        diagnosis=diagnosis,
+    )
 
 
 def task_figures(task: Task, report: Report, driven: EpisodeReport) -> Figures:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tdac_agent.options import option
+from tdac_agent.models.vendors import forms
+from tdac_agent.option_fields import Flag, flag_of, option
 
 if TYPE_CHECKING:
     from tdac_agent.models.provider import Provider
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
 
 MODELS, BUDGET, SETS = "Models", "Budget", "Task set"
 """Headings of the help."""
+SUITE = "Folder with additional test_*.py files to run."
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +25,18 @@ class SynthOptions:
 
     `learner` and `optimizer` may also be providers, `rules` a rule book, and
     `start_from` the source of a controller.
+
+    A field is a flag and an argument of `synthesize`. The loop has it as
+    `Terms.options` and `Calls.options`. The record of a run keeps it, `--resume` uses
+    the recorded value or a new one, and a campaign file can set it, unless the field
+    says otherwise (`Flag.identity`, `Flag.recorded`).
     """
 
-    iterations: int = option(20, "Maximum iterations.", "-K", "--iterations", least=1)
+    iterations: int = option(
+        20, "Maximum iterations.", "-K", "--iterations", least=1, identity=True
+    )
     patience: int = option(
-        1, "Maximum edits per iteration.", "-J", "--patience", least=0
+        1, "Maximum edits per iteration.", "-J", "--patience", least=0, identity=True
     )
     candidates: int = option(
         1,
@@ -34,52 +44,80 @@ class SynthOptions:
         "repaired. Each counts as an iteration.",
         *("-N", "--candidates"),
         least=1,
+        identity=True,
     )
     improve: int = option(
         0,
         "After a success, try variations of the controllers that work, in N further "
         "simulated episodes (disturbed ones on a task), and deliver the best.",
         least=32,
+        identity=True,
     )
     start_from: str | Path | None = option(
-        None, "Controller to begin with.", "--from", metavar="FILE", type=Path
+        None,
+        "Controller to begin with.",
+        "--from",
+        metavar="FILE",
+        type=Path,
+        identity=True,
+        recorded=False,
     )
     prompt: str = option(
         "full",
         "Prompt template: `full`, `underspecified`, or a file.",
         metavar="NAME",
+        recorded=False,
     )
     refine: bool = option(
         True,
         "Turn failures into rules in the prompt, or keep the prompt as it is.",
         "--refine/--no-refine",
+        identity=True,
     )
     rules: Path | RuleBook | None = option(
         None,
         "Rules for the prompt: of earlier runs (`tdac rules export`), or your own.",
         metavar="FILE",
         type=Path,
+        identity=True,
+        recorded=False,
     )
+    suite: Path | None = option(None, SUITE, metavar="DIR", recorded=False)
     vision: bool = option(
-        False, "Show the optimizer a picture of the failure that it is to repair."
+        False,
+        "Show the optimizer a picture of the failure that it is to repair.",
+        identity=True,
+    )
+    confirm: bool = option(
+        True,
+        "Drive what passes all tests blind, from about a hundred disturbed starts; a "
+        "controller is verified if at most one of these drives fails. Without it, the "
+        "run ends at `passed`.",
+        "--confirm/--no-confirm",
+        scope="task",
     )
     seed: int | None = option(
         None,
         "Seed of the jittered starts, or of the choice of worlds on a task set.  "
         "[default: derived from a secret of this installation]",
         least=0,
+        recorded=False,
     )
     tier: str = option(
-        "auto", "Sandbox tier; `tdac doctor` lists them.", metavar="NAME"
+        "auto",
+        "Sandbox tier; `tdac doctor` lists them.",
+        metavar="NAME",
+        recorded=False,
     )
     learner: str | Provider = option(
         "builtin",
         "Model that writes controllers: `builtin` (a template, no language model), "
-        "`anthropic:MODEL`, `openai:MODEL`, `command:PROGRAM`, `manual:DIR`, "
-        "`replay:RUN` or `scripted:SCRIPT`.",
+        f"{', '.join(forms(mark='`'))}, `command:PROGRAM`, `manual:DIR`, `replay:RUN` "
+        "or `scripted:SCRIPT`.",
         metavar="MODEL",
         panel=MODELS,
         type=str,
+        recorded=False,
     )
     optimizer: str | Provider | None = option(
         None,
@@ -88,10 +126,11 @@ class SynthOptions:
         metavar="MODEL",
         panel=MODELS,
         type=str,
+        recorded=False,
     )
     base_url: str | None = option(
         None,
-        "Server of the `openai:` or `anthropic:` models (vLLM, Ollama, LM Studio, …), "
+        "Server of the models, instead of the vendor's (vLLM, Ollama, LM Studio, …), "
         "for example http://localhost:8000/v1.",
         metavar="URL",
         panel=MODELS,
@@ -100,6 +139,7 @@ class SynthOptions:
         False,
         "Allow sending an API key unencrypted to a server on another machine.",
         panel=MODELS,
+        recorded=False,
     )
     max_output: int = option(
         16_000,
@@ -107,6 +147,7 @@ class SynthOptions:
         "was cut off.",
         least=1,
         panel=MODELS,
+        identity=True,
     )
     max_cost: float | None = option(
         None,
@@ -115,6 +156,7 @@ class SynthOptions:
         least=0,
         metavar="USD",
         panel=BUDGET,
+        recorded=False,
     )
     max_tokens: int | None = option(
         None,
@@ -122,6 +164,7 @@ class SynthOptions:
         "for a server with unknown prices]",
         least=0,
         panel=BUDGET,
+        recorded=False,
     )
     episodes: int = option(
         128,
@@ -130,6 +173,7 @@ class SynthOptions:
         least=2,
         panel=SETS,
         scope="set",
+        identity=True,
     )
     feedback_episodes: int = option(
         8,
@@ -137,6 +181,7 @@ class SynthOptions:
         least=1,
         panel=SETS,
         scope="set",
+        identity=True,
     )
     then_verify: bool = option(
         False,
@@ -144,6 +189,7 @@ class SynthOptions:
         "exit 0 only if a sequential test accepts it.",
         panel=SETS,
         scope="set",
+        recorded=False,
     )
 
     def changed(self, **values: Any) -> SynthOptions:
@@ -160,3 +206,58 @@ class SynthOptions:
                 f"{', '.join(sorted(known))}"
             )
         return replace(self, **values)
+
+    def recorded(self, scope: str) -> dict[str, Any]:
+        """The values that the record of a run keeps, by name.
+
+        Args:
+            scope: `task` or `set`, for a run on a single task or a task set.
+        """
+        return {
+            field.name: getattr(self, field.name)
+            for field, flag in _flags(self)
+            if flag.recorded and flag.scope in {"", scope}
+        }
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """The options in which equal runs agree, with their defaults."""
+        return {
+            field.name: field.default for field, flag in _flags(self) if flag.identity
+        }
+
+    @property
+    def least(self) -> dict[str, int]:
+        """The least value of each whole number whose value is not its default."""
+        return {
+            field.name: int(flag.least)
+            for field, flag in _flags(self)
+            if type(field.default) is int and flag.least is not None
+            if getattr(self, field.name) is not field.default
+        }
+
+    def restored(self, values: Mapping[str, Any]) -> SynthOptions:
+        """The same with recorded values, or with those of a file.
+
+        Raises:
+            ValueError: An option is unknown, not one that is recorded, or its value is
+                too small or of another type.
+        """
+        known = {f.name: (f, flag) for f, flag in _flags(self) if flag.recorded}
+        for name, value in values.items():
+            if name not in known:
+                text = ", ".join(sorted(known))
+                raise ValueError(f"there is no option {name!r}; expected one of {text}")
+            field, flag = known[name]
+            kind, least = type(field.default), flag.least
+            if field.default is not None and type(value) is not kind:
+                raise ValueError(f"{name}: expected {kind.__name__}, got {value!r}")
+            if least is not None and value != field.default and value < least:
+                raise ValueError(f"{name}: expected at least {least:g}, got {value!r}")
+        return replace(self, **values)
+
+
+def _flags(options: SynthOptions) -> list[tuple[Field[Any], Flag]]:
+    """The fields of options with their flags."""
+    pairs = [(field, flag_of(field)) for field in fields(options)]
+    return [(field, flag) for field, flag in pairs if flag is not None]

@@ -17,6 +17,7 @@ from tdac_agent.models.choice import BLIND
 from tdac_agent.models.provider import Author, Provider, recorded_seed, served_at
 from tdac_agent.models.ready import check_servers
 from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
+from tdac_agent.models.vendors import forms
 from tdac_agent.problems.problem import Problem
 from tdac_agent.prompting.prompt import FULL, PromptTemplate
 from tdac_agent.runs.journal_state import read_past
@@ -131,7 +132,7 @@ def checked_vision(
     if vision and optimizer.partition(":")[0] in BLIND:
         raise ProviderError(
             f"--vision has no effect: {optimizer}, which edits controllers, sees "
-            "no pictures; give --optimizer anthropic:MODEL, openai:MODEL, "
+            f"no pictures; give --optimizer {', '.join(forms())}, "
             "command:PROGRAM or manual:DIR, or leave out --vision"
         )
     if vision and not patience and not improve:

@@ -6,16 +6,22 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
 
 from tdac_agent.models.picture import LARGEST_SIDE
-from tdac_agent.prompting.feedback import feedback_of
 from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
-from tdac_agent.runs.run_record import Status
+from tdac_agent.runs.run_record import Confirmation, Status
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.archive import Archive, Member
 from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.confirming import (
+    confirmed_result,
+    drive_blind,
+    is_confirmed,
+    keep_confirmation,
+)
 from tdac_agent.synthesis.delivery import (
     compared,
     place_verified,
@@ -32,8 +38,10 @@ from tdac_agent.synthesis.disturbed import (
 )
 from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.terms import Chosen, Terms
+from tdac_agent.synthesis.tested import failed_tests, recorded_report, suite_result
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
+from tdac_agent.verification.confirmation import CONFIRMATION
 from tdac_agent.verification.diagnosis.model_picture import (
     FailurePicture,
     failure_picture,
@@ -42,10 +50,9 @@ from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
+from tdac_agent.verification.verdict import confirmed_text
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
-from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
 
-NOT_RUN = "not run"
 IMPROVE = "improve"
 """Folder of the episodes of a search, inside that of a candidate."""
 
@@ -58,7 +65,7 @@ class SuiteTrials:
         terms: What all tests share.
     """
 
-    status: Status = "verified"
+    status: Status = "passed"
     ended = ""
     needs_new_code = False
     tests_left = None
@@ -70,6 +77,12 @@ class SuiteTrials:
     def __init__(self, task: Task, terms: Terms) -> None:
         self.task, self.terms = task, terms
         self.used = 0
+        self._secured: Candidate | None = None
+
+    @property
+    def confirms(self) -> bool:
+        """See `Trials`."""
+        return self.terms.recorder.run.confirm
 
     def prove(self) -> None:
         """See `Trials`: the reference passes the suite, one that stands still fails."""
@@ -137,39 +150,28 @@ class SuiteTrials:
         return report
 
     def go_on(self, candidate: Candidate) -> None:
-        """See `Trials`: the suite has tested everything."""
+        """See `Trials`: what passed the suite drives blind."""
+        if self.confirms and _report(candidate).passed:
+            self.confirm(candidate)
 
     def recall(self, candidate: Candidate) -> None:
         """See `Trials`."""
-        content = parse_json(read_file(candidate.folder / "report.json", RECORD_BYTES))
-        candidate.report = Report.model_validate(content)
+        candidate.report = recorded_report(candidate)
 
     def result(self, candidate: Candidate) -> Result:
         """See `Trials`."""
-        report = _report(candidate)
-        failure, verdict = feedback_of(report), report.verdict
-        summary = f"{verdict.passed_tests} of {verdict.expected} tests passed"
-        if not report.passed:
-            summary = f"{len(report.failures)} of {verdict.expected} tests failed"
-            if verdict.passed_tests == 0:
-                summary += f", the first because {report.failures[0].message}"
-        return Result(
-            report.passed,
-            (float(report.passed), -len(report.failures)),
-            failure,
-            summary,
-            unfit="" if report.passed else summary,
-            failed=failure.failed,
-            seed=report.provenance.seed,
-            episodes=tuple(
-                (each.name, each.outcome, each.steps)
-                for each in report.episodes
-                if not each.held_out and each.outcome != NOT_RUN
-            ),
-        )
+        report, confirmation = _report(candidate), candidate.confirmation
+        result = suite_result(report)
+        if confirmation is None:
+            return result
+        return confirmed_result(result, report, confirmation)
 
     def picture(self, candidate: Candidate) -> FailurePicture | None:
         """See `Trials`."""
+        confirmation = candidate.confirmation
+        if confirmation is not None and not is_confirmed(confirmation):
+            folder = candidate.folder / CONFIRMATION
+            return failed_picture(self.task, confirmation, folder)
         trajectories = load_trajectories(candidate.folder / "trajectories")
         return failure_picture(
             self.task, _report(candidate), trajectories, LARGEST_SIDE
@@ -185,12 +187,9 @@ class SuiteTrials:
         is_variation = candidate.report is None
         if is_variation:
             self.test([candidate])
-        report, result = _report(candidate), self.result(candidate)
+        report = _report(candidate)
         if not report.passed:
-            assert result.failure is not None
-            drove = any(each.outcome != NOT_RUN for each in report.episodes)
-            said, failed = result.failure.line, result.failed
-            return Explored(None, said, failed=failed, drove=drove, seed=result.seed)
+            return failed_tests(report)
         folder = candidate.folder / IMPROVE
         driven = self._drive(candidate, IMPROVE, self.terms.shares.block)
         figures = task_figures(self.task, report, driven)
@@ -202,7 +201,7 @@ class SuiteTrials:
             figures,
             told(driven),
             passed=True,
-            seed=result.seed,
+            seed=report.provenance.seed,
             episodes=len(driven.episodes),
             feedback=disturbed_feedback(driven),
             picture=partial(failed_picture, self.task, driven, folder),
@@ -245,17 +244,21 @@ class SuiteTrials:
     def secure(self, candidate: Candidate) -> None:
         """See `Trials`."""
         place_verified(self.task, candidate, self.terms.recorder)
+        self._secured = candidate
+        keep_confirmation(self.terms, candidate)
         recorder = self.terms.recorder
         if recorder.run.tau is None:
-            recorder.run.tau = candidate.k
+            passed = (each.k for each in recorder.run.attempts if each.passed)
+            recorder.run.tau = min(passed, default=candidate.k)
         recorder.save()
 
-    def deliver(self, chosen: Chosen) -> None:
+    def deliver(self, chosen: Chosen) -> Candidate:
         """See `Trials`."""
         if chosen.archive is None:
             self.secure(chosen.candidate)
-            return
+            return chosen.candidate
         terms, first = self.terms, chosen.archive.members[0].candidate
+        chosen = self._confirmed(chosen, first)
         changes = compared(self.compare, first, chosen.candidate)
         found = task_improvement(
             terms,
@@ -272,10 +275,42 @@ class SuiteTrials:
         terms.recorder.event("select.end", **facts)
         if chosen.candidate is not first:
             self.secure(chosen.candidate)
+        return chosen.candidate
 
-    def verify_hidden(self, candidate: Candidate) -> bool:
-        """See `Trials`: there are no hidden worlds, and it passed the suite."""
-        return _report(candidate).passed
+    def _confirmed(self, chosen: Chosen, first: Candidate) -> Chosen:
+        """What is delivered after a search: not what fails where the first one passes.
+
+        The error of the confirmations of a run together stays below 5 %.
+        """
+        if not self.confirms or chosen.candidate is first:
+            return chosen
+        found = self.confirm(chosen.candidate)
+        known = first.confirmation
+        if is_confirmed(found) or known is None or not is_confirmed(known):
+            return chosen
+        stopped = f"the best variation was not confirmed: {confirmed_text(found)}"
+        return replace(chosen, candidate=first, stopped=stopped)
+
+    def confirm(self, candidate: Candidate) -> EpisodeReport:
+        """See `Trials`; a candidate drives once."""
+        if candidate.confirmation is None:
+            run = self.terms.recorder.run
+            number = len(run.confirmations) + 1
+            candidate.confirmation = found = drive_blind(
+                self.terms, self.task, candidate, number
+            )
+            run.confirmations.append(
+                Confirmation(
+                    k=candidate.k,
+                    j=candidate.j,
+                    episodes=found.count,
+                    failures=found.count - found.successes,
+                    passed=is_confirmed(found),
+                )
+            )
+            if candidate is self._secured:
+                keep_confirmation(self.terms, candidate)
+        return candidate.confirmation
 
     def _drive(self, candidate: Candidate, purpose: str, count: int) -> EpisodeReport:
         """Drives episodes, the same for all candidates; those on record are reused."""
@@ -285,7 +320,7 @@ class SuiteTrials:
         seeds = seeds_for(terms.recorder.run, purpose, count)
         found = drive_candidate(
             *(terms, candidate, self.task, seeds, out, about),
-            disturbance=Disturbance(),
+            disturbance=self.task.own_disturbance(),
         )
         self.used += count
         terms.recorder.event("drive.end", **about, reached=found.successes)

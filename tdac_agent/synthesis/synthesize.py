@@ -46,12 +46,6 @@ from tdac_envs.core.errors import TaskError
 if TYPE_CHECKING:
     from tdac_envs.ladder.task_sets import TaskSet
 
-ALIKE = (
-    *("iterations", "patience", "candidates", "improve", "refine"),
-    *("base_url", "max_output"),
-)
-"""Options that the record of a run keeps as they are."""
-
 
 def synthesize(
     problem: Task | TaskSet | Problem,
@@ -69,9 +63,10 @@ def synthesize(
 ) -> Run:
     """Writes, tests and repairs controllers, and delivers the best one.
 
-    On a task, the first controller that passes its suite is delivered, or with
-    `improve` the best variation of it. On a task set, controllers drive on worlds of
-    `dev`, and the best one is selected on further worlds.
+    On a task, a controller that passes its suite drives blind (`confirm`); the first
+    one that is confirmed is delivered, or with `improve` the best variation of it. On a
+    task set, controllers drive on worlds of `dev`, and the best one is selected on
+    further worlds.
 
     If `out` contains the same run, unfinished, that run is resumed: recorded answers
     and results are reused (docs/models.md).
@@ -91,8 +86,9 @@ def synthesize(
         **keywords: Fields of `SynthOptions` that replace those of `options`.
 
     Returns:
-        The run: `verified`, `selected` (on a task set without `then_verify`), `not
-        verified`, or `budget`. If it has a controller, that is `run.controller`.
+        The run: `verified`, `passed` (on a task without `confirm`), `selected` (on a
+        task set without `then_verify`), `not verified`, or `budget`. If it has a
+        controller, that is `run.controller`.
 
     Raises:
         TypeError: There is no option of this name.
@@ -108,6 +104,8 @@ def synthesize(
     given = {name: value for name, value in named.items() if value is not None}
     wanted = (options or SynthOptions()).changed(**keywords, **given)
     about = problem_of(problem)
+    if wanted.suite is not None:
+        about = about.permitted(wanted.suite)
     _check(wanted, about)
     models = _models(wanted, about)
     template, book = load_template(wanted.prompt), book_of(wanted.rules)
@@ -126,16 +124,16 @@ def synthesize(
     account = account_of(models, before, *limits, budget)
     with hold_folder(out), ExitStack() as stack:
         before = existing_run(out)
-        if before is not None and _is_over(before, run):
+        if before is not None and _is_over(before, run, wanted):
             return before
         recorder = open_record(about, run, before, account, template, source, on_event)
         asking = account.budget, account.tariffs, retry or RetryPolicy()
-        calls = Calls(recorder, *asking, wanted.max_output)
+        calls = Calls(recorder, *asking, wanted)
         dialogue = Dialogue(about, *models, calls, book, template)
         dialogue.begin()
         warm = judge or stack.enter_context(WarmJudge(task=about.task))
-        parts, block = shares(run.episodes, wanted.improve), wanted.feedback_episodes
-        terms = Terms(recorder, warm, wanted.tier, parts, block)
+        parts = shares(run.episodes, wanted.improve)
+        terms = Terms(recorder, warm, parts, wanted)
         return _run(dialogue, trials_of(about, terms), source)
 
 
@@ -161,9 +159,8 @@ def _check(wanted: SynthOptions, problem: Problem) -> None:
     Raises:
         TaskError: A number is out of range, or the problem cannot be used.
     """
-    whole_number("iterations", wanted.iterations, 1)
-    whole_number("patience", wanted.patience, 0)
-    whole_number("candidates", wanted.candidates, 1)
+    for name, least in wanted.least.items():
+        whole_number(name, getattr(wanted, name), least)
     if problem.has_hidden:
         whole_number("episodes", wanted.episodes, 2, MOST_EPISODES)
         whole_number("feedback_episodes", wanted.feedback_episodes, 1, MOST_EPISODES)
@@ -181,18 +178,18 @@ def _recorded(
     before: Run | None,
 ) -> dict[str, Any]:
     """What the record of a run keeps of its options."""
-    facts = {name: getattr(wanted, name) for name in ALIKE}
+    kept = wanted.recorded("set" if problem.has_hidden else "task")
+    facts = {name: value for name, value in kept.items() if name in Run.model_fields}
+    facts["options"] = {n: value for n, value in kept.items() if n not in facts}
     if problem.has_hidden:
-        facts["episodes"] = wanted.episodes
-        facts["feedback_episodes"] = wanted.feedback_episodes
         known = before is not None and before.then_verify
         facts["then_verify"] = wanted.then_verify or known
+    else:
+        facts["confirm"] = wanted.confirm or (before is not None and before.confirm)
     # The worlds of a set, and the episodes of a search, follow from it.
     needed = problem.has_hidden or wanted.improve > 0
     facts["seed"] = settled_seed(wanted.seed, models[0], before, needed=needed)
-    facts["vision"] = checked_vision(
-        wanted.vision, models[1].name, wanted.patience, wanted.improve
-    )
+    checked_vision(wanted.vision, models[1].name, wanted.patience, wanted.improve)
     return facts
 
 
@@ -211,14 +208,18 @@ def _source(given: str | Path | None) -> str | None:
         raise ControllerFileError(message) from error
 
 
-def _is_over(before: Run, now: Run) -> bool:
-    """Whether nothing is left to do in a run; a selected one may be verified later.
+def _is_over(before: Run, now: Run, wanted: SynthOptions) -> bool:
+    """Whether nothing is left to do; what passed or was selected may be verified later.
 
     Raises:
         RunError: It is another run, or one that this installation did not begin.
     """
-    check_same(before, now)
-    over = before.finished and not (now.then_verify and before.status == "selected")
+    check_same(before, now, wanted.identity)
+    later = {
+        "selected": now.then_verify,
+        "passed": now.confirm and not before.confirmations,
+    }
+    over = before.finished and not later.get(before.status, False)
     if over:
         check_own(before)
     return over
@@ -260,12 +261,14 @@ def _write(dialogue: Dialogue, trials: Trials, given: str | None) -> None:
     archive, asked = None, 0
     works = any(trials.result(each).works for each in able)
     if trials.terms.recorder.run.improve and works:
-        trials.secure(able[0])
+        trials.secure(max(able, key=lambda each: trials.result(each).rank))
         search = ImprovingSearch(dialogue, trials, written)
         stopped = search.run(able) or stopped
         archive, asked = search.archive, search.asked
         able = trials.finalists(archive)
     validation = trials.terms.shares.validation
+    if not validation:  # the tests have decided
+        able.sort(key=lambda each: trials.result(each).rank, reverse=True)
     chosen = select(able, validation, trials.validate) if able else None
     if chosen is None or (validation and not chosen.score):
         reason = trials.why_none(able)

@@ -10,6 +10,7 @@ from typing import Any
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.synthesis.archive import Archive
 from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.workload import Shares
 from tdac_agent.verification.judge.warm import WarmJudge
 
@@ -21,16 +22,24 @@ class Terms:
     Attributes:
         recorder: Records the run.
         judge: A warm judge.
-        tier: Sandbox tier.
         shares: How the episodes are divided.
-        block: Most episodes of a test on a task set.
+        options: Options of the synthesis.
     """
 
     recorder: Recorder
     judge: WarmJudge
-    tier: str
     shares: Shares
-    block: int
+    options: SynthOptions
+
+    @property
+    def tier(self) -> str:
+        """Sandbox tier."""
+        return self.options.tier
+
+    @property
+    def block(self) -> int:
+        """Most episodes of a test on a task set."""
+        return self.options.feedback_episodes
 
     def watch(self, **about: Any) -> Callable[[int, int], None]:
         """Returns what tells how a drive goes; it takes episodes and successes."""

@@ -12,6 +12,8 @@ from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.suite_trials import SuiteTrials
 from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.verdict import confirmed_text, word_of
 
 
 class Trials(Protocol):
@@ -19,7 +21,8 @@ class Trials(Protocol):
 
     Attributes:
         terms: What all tests share.
-        status: Status of a run that has delivered a controller.
+        status: Status of a run that has delivered a controller without a confirmation.
+        confirms: Whether the delivered controller is to be confirmed.
         ended: Why the writing ends after a candidate with nothing to repair, or
             without episodes; empty if its pass is the aim of the run.
         needs_new_code: Whether an iteration without new code ends the writing.
@@ -31,6 +34,10 @@ class Trials(Protocol):
     ended: str
     needs_new_code: bool
     aim: str
+
+    @property
+    def confirms(self) -> bool:
+        """See the class."""
 
     @property
     def tests_left(self) -> int | None:
@@ -88,15 +95,19 @@ class Trials(Protocol):
     def secure(self, candidate: Candidate) -> None:
         """Delivers a verified candidate before a search, which may be interrupted."""
 
-    def deliver(self, chosen: Chosen) -> None:
+    def deliver(self, chosen: Chosen) -> Candidate:
         """Writes the selected controller, its evidence, and what a search brought.
 
         It is compared with what the search began with, in episodes that decided
         nothing.
+
+        Returns:
+            The delivered candidate: what the search began with if that is confirmed,
+            and the selected one is not.
         """
 
-    def verify_hidden(self, candidate: Candidate) -> bool:
-        """Whether the delivered controller is verified on hidden worlds."""
+    def confirm(self, candidate: Candidate) -> EpisodeReport:
+        """The blind drives of the delivered controller; on a set, on hidden worlds."""
 
 
 def trials_of(problem: Problem, terms: Terms) -> Trials:
@@ -112,22 +123,25 @@ def trials_of(problem: Problem, terms: Terms) -> Trials:
     # Task sets need much that a task does not.
     from tdac_agent.synthesis.world_trials import WorldTrials
 
-    return WorldTrials(problem.tasks, terms)
+    return WorldTrials(problem.tasks, terms, problem.suite)
 
 
 def conclude(trials: Trials, chosen: Chosen) -> None:
-    """Delivers a candidate, verifies it on hidden worlds if wanted, and ends the run.
+    """Delivers a candidate, confirms it if wanted, and ends the run.
 
     Args:
         trials: The trials.
         chosen: The candidate.
     """
-    recorder, selected = trials.terms.recorder, chosen.candidate
-    run, status = recorder.run, trials.status
-    trials.deliver(chosen)
-    if run.tau is None:
-        run.tau = selected.k
-    if run.then_verify:
-        passed = trials.verify_hidden(selected)
-        status = "verified" if passed else "not verified"
-    recorder.finish(status, k=selected.k, j=selected.j, reason=chosen.stopped)
+    recorder, status, reason = trials.terms.recorder, trials.status, chosen.stopped
+    delivered = trials.deliver(chosen)
+    if recorder.run.tau is None:
+        recorder.run.tau = delivered.k
+    if trials.confirms:
+        found = trials.confirm(delivered)
+        if recorder.run.on_set:
+            status = "verified" if found.passed else "not verified"
+        else:
+            status = word_of(found)
+            reason = reason if status == "verified" else confirmed_text(found)
+    recorder.finish(status, k=delivered.k, j=delivered.j, reason=reason)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
 
 from tdac_agent.runs.improvement_record import PairedChange
 from tdac_agent.runs.run_record import Status
@@ -11,7 +12,12 @@ from tdac_agent.runs.selection_record import SELECTION_FILE
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import number_of
 from tdac_agent.synthesis.archive import Archive, Member
-from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.candidates import (
+    Candidate,
+    Explored,
+    Result,
+    ToldEpisode,
+)
 from tdac_agent.synthesis.delivery import compared, selection_of
 from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.hidden import hidden_report
@@ -22,9 +28,17 @@ from tdac_agent.synthesis.set_reports import (
     world_picture,
 )
 from tdac_agent.synthesis.terms import Chosen, Terms
+from tdac_agent.synthesis.tested import (
+    REPORT_FILE,
+    failed_tests,
+    recorded_report,
+    suite_result,
+)
 from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
+from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.own_tests import kept_tests, run_own_tests
 from tdac_agent.verification.store import read_report
 from tdac_envs.ladder.task_sets import TaskSet
 
@@ -32,6 +46,7 @@ BLOCKS = 2**30
 """Feedback worlds have smaller numbers than this; each other purpose has as many."""
 PURPOSES = ("feedback", "validation", "improve", "comparison")
 """What worlds are used for, in the order of their numbers."""
+STANDS_STILL = b"def policy(obs):\n    return 0.0, 0.0\n"
 FINALISTS = 4
 """Most candidates that go on to the selection, beside the best one of the loop."""
 FEEDBACK, EXPLORED = "feedback-{}", "improve-1"
@@ -49,6 +64,7 @@ class WorldTrials:
     Args:
         tasks: The task set.
         terms: What all tests share.
+        suite: Folder of the user's own tests, which come before the first world.
 
     Attributes:
         used: Number of episodes that were driven, by purpose.
@@ -59,9 +75,14 @@ class WorldTrials:
     needs_new_code = True
     aim = "Raise its mean time score on worlds that nobody has seen yet."
 
-    def __init__(self, tasks: TaskSet, terms: Terms) -> None:
-        self.tasks, self.terms = tasks, terms
+    def __init__(self, tasks: TaskSet, terms: Terms, suite: Path | None = None) -> None:
+        self.tasks, self.terms, self.suite = tasks, terms, suite
         self.used = dict.fromkeys(PURPOSES, 0)
+
+    @property
+    def confirms(self) -> bool:
+        """See `Trials`."""
+        return self.terms.recorder.run.then_verify
 
     @property
     def tests_left(self) -> int:
@@ -69,19 +90,28 @@ class WorldTrials:
         return self.terms.shares.feedback - self.used["feedback"]
 
     def prove(self) -> None:
-        """See `Trials`: there is no suite."""
+        """See `Trials`: the user's own tests give a verdict, whichever it is."""
+        recorder = self.terms.recorder
+        if self.suite is None or (recorder.past.proven and self.terms.trusts_record):
+            return
+        recorder.event("prove.start")
+        report = self._own_tests(STANDS_STILL, self.suite)
+        about = report.provenance
+        facts = {"suite": about.suite, "suite_sha256": about.suite_sha256}
+        recorder.event("prove.end", **facts, sandbox=about.sandbox, proven=True)
 
     def test(self, candidates: Sequence[Candidate]) -> None:
         """See `Trials`: all of them drive on the same next worlds.
 
-        If the episodes do not suffice for all, the first ones drive on one world.
+        One that fails the user's own tests drives on none. If the episodes do not
+        suffice for all, the first ones drive on one world.
         """
         if not candidates:
             return
         count = min(self.terms.block, max(1, self.tests_left // len(candidates)))
         first = self.first_for("feedback") + self.used["feedback"]
         for candidate in candidates:
-            if self.tests_left >= count:
+            if self.tests_left >= count and self._passes(candidate):
                 out = FEEDBACK.format(len(candidate.feedback) + 1)
                 report = self._drive(candidate, "feedback", first, count, out)
                 candidate.feedback.append(report)
@@ -90,9 +120,15 @@ class WorldTrials:
         """See `Trials`: it drives on the next worlds."""
         while self.tests_left and candidate.first_failure is None:
             self.test([candidate])
+            if candidate.refused:
+                break
 
     def recall(self, candidate: Candidate) -> None:
         """See `Trials`."""
+        if self.suite is not None:
+            candidate.report = recorded_report(candidate)
+            if candidate.refused:
+                return
         folder = candidate.folder / FEEDBACK.format(1)
         report = read_report(folder)
         if report is None:
@@ -102,6 +138,8 @@ class WorldTrials:
 
     def result(self, candidate: Candidate) -> Result:
         """See `Trials`."""
+        if candidate.report is not None and candidate.refused:
+            return suite_result(candidate.report)
         reports, failed = candidate.feedback, candidate.first_failure
         worlds = sum(each.count for each in reports)
         reached = sum(each.successes for each in reports)
@@ -124,7 +162,9 @@ class WorldTrials:
             unfit="" if worlds else "the static and contract tests refused it",
             failed=() if failure is None else failure.failed,
             episodes=tuple(
-                (str(each.index), each.outcome, each.steps)
+                ToldEpisode(
+                    str(each.index), each.outcome, each.steps, each.smallest_gap
+                )
                 for report in reports
                 for each in report.episodes
             ),
@@ -147,6 +187,9 @@ class WorldTrials:
 
     def explore(self, candidate: Candidate) -> Explored:
         """See `Trials`."""
+        if not self._passes(candidate):
+            assert candidate.report is not None
+            return failed_tests(candidate.report)
         report = self._driven(candidate, "improve", self.terms.shares.block)
         if not report.count:
             said, failed = set_feedback(report).line, tuple(report.told)
@@ -200,7 +243,7 @@ class WorldTrials:
     def secure(self, candidate: Candidate) -> None:
         """See `Trials`: nothing is verified before the selection."""
 
-    def deliver(self, chosen: Chosen) -> None:
+    def deliver(self, chosen: Chosen) -> Candidate:
         """See `Trials`."""
         terms, changes = self.terms, dict[str, PairedChange]()
         if chosen.archive is not None:
@@ -219,10 +262,42 @@ class WorldTrials:
         write_atomic(terms.folder / SELECTION_FILE, text)
         values = selection.model_dump(mode="json", exclude={"candidates", "stopped"})
         terms.recorder.event("select.end", **values)
+        return chosen.candidate
 
-    def verify_hidden(self, candidate: Candidate) -> bool:
+    def confirm(self, candidate: Candidate) -> EpisodeReport:
         """See `Trials`."""
-        return hidden_report(self.tasks, candidate, self.terms).passed
+        return hidden_report(self.tasks, candidate, self.terms)
+
+    def _passes(self, candidate: Candidate) -> bool:
+        """Whether it passes the user's own tests, if there are any; tested once."""
+        if self.suite is not None and candidate.report is None:
+            self.terms.recorder.event("verify.start", k=candidate.k, j=candidate.j)
+            candidate.report = self._tested(candidate, self.suite)
+        return not candidate.refused
+
+    def _tested(self, candidate: Candidate, suite: Path) -> Report:
+        """The report of the user's own tests; a recorded one is reused."""
+        recorder, folder = self.terms.recorder, candidate.folder
+        if recorder.vouches(folder / REPORT_FILE):
+            seed, raw = recorder.run.seed, candidate.raw
+            kept = kept_tests(folder, self.tasks, suite, raw, seed)
+            if kept is not None:
+                return kept
+        report = self._own_tests(candidate.raw, suite, folder)
+        recorder.vouch(folder / REPORT_FILE)
+        return report
+
+    def _own_tests(self, source: bytes, suite: Path, out: Path | None = None) -> Report:
+        terms = self.terms
+        return run_own_tests(
+            source,
+            self.tasks,
+            suite,
+            tier=terms.tier,
+            seed=terms.recorder.run.seed,
+            out=out,
+            judge=terms.judge,
+        )
 
     def first_for(self, purpose: str) -> int:
         """Number of the first world for a purpose."""

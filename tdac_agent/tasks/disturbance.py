@@ -2,16 +2,67 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, NamedTuple
 
-from tdac_envs.core.arguments import finite, whole_number
-from tdac_envs.core.errors import TaskError
+from tdac_envs.core.arguments import LARGEST, finite, whole_number
+from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.drive.disturbances import MOST_HIDDEN
+from tdac_envs.map2d.reception import MOST_STEPS_LATE, Reception
 
 # With a longer delay, no action of an ordinary episode takes effect in time.
 MAX_DELAY = 1000
-_NOT_EVERYWHERE = ("wheel_gains", "axle_error", "range_dropout")
+
+
+class Part(NamedTuple):
+    """A part of a disturbance.
+
+    Attributes:
+        words: What it is, in words.
+        most: Its largest size.
+        text: Format of its size in reports; `{}` stands for a number of steps.
+        percent: Whether its size is shown in per cent.
+        everywhere: Whether each environment has it; else only maps, but see `OF_ALL`.
+    """
+
+    words: str
+    most: float
+    text: str
+    percent: bool = False
+    everywhere: bool = False
+
+
+PARTS = {
+    "range_noise": Part("range noise", 1.0, "range noise {:g} %", True, True),
+    "range_dropout": Part("range dropout", 1.0, "range dropout {:g} %", True),
+    "wheel_slip": Part("wheel slip", 1.0, "wheel slip {:g} %", True, True),
+    "wheel_gains": Part(
+        "bound of the wheel gains", MOST_HIDDEN, "wheel gains ±{:g} %", True
+    ),
+    "axle_error": Part(
+        "bound of the axle error", MOST_HIDDEN, "axle error ±{:g} %", True
+    ),
+    "motor_lag": Part("motor lag", 60.0, "motor lag {:g} s", everywhere=True),
+    "delay": Part("delay", MAX_DELAY, "delay {}", everywhere=True),
+    "wheel_radius_error": Part(
+        "bound of the wheel radius error", MOST_HIDDEN, "wheel radii ±{:g} %", True
+    ),
+    "pose_noise": Part("pose noise", LARGEST, "pose noise {:g}"),
+    "heading_noise": Part("heading noise", 3.1, "heading noise {:g} rad"),
+    "pose_correlation": Part("pose correlation", 3600.0, "correlated over {:g} s"),
+    "pose_jumps": Part("rate of pose jumps", 6000.0, "{:g} pose jumps a minute"),
+    "pose_delay": Part("pose delay", MOST_STEPS_LATE, "pose {} late"),
+    "scan_delay": Part("scan delay", MOST_STEPS_LATE, "scan {} late"),
+    "message_drop": Part("message drop", 1.0, "{:g} % of messages lost", True),
+}
+"""All parts by their names, in the order in which reports list them."""
+STEPS = "delay", "pose_delay", "scan_delay"
+"""Parts that are numbers of steps."""
+OF_ALL = "wheel_gains", "axle_error", "wheel_radius_error"
+"""Parts of both robots which other environments may not have."""
+LENGTHS = ("pose_noise",)
+"""Parts that are lengths, in the units of the task."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +87,15 @@ class Disturbance:
         axle_error: Bound of the hidden relative error of the axle length, constant too.
         range_dropout: Probability that a ray reads its maximum range in a step; only
             on maps.
+        wheel_radius_error: Bound of the hidden relative error of each wheel's radius.
+        pose_noise: Standard deviation of the observed x and y, in units of the task;
+            this and what follows only on maps.
+        heading_noise: Standard deviation of the observed heading, rad.
+        pose_correlation: Time constant of both errors, s.
+        pose_jumps: Jumps of the observed pose in a minute.
+        pose_delay: Steps by which the pose is late.
+        scan_delay: Steps by which the ranges are late.
+        message_drop: Probability that pose and scan of a step are lost.
     """
 
     range_noise: float = 0.025
@@ -45,18 +105,41 @@ class Disturbance:
     wheel_gains: float = 0.0
     axle_error: float = 0.0
     range_dropout: float = 0.0
+    wheel_radius_error: float = 0.0
+    pose_noise: float = 0.0
+    heading_noise: float = 0.0
+    pose_correlation: float = 0.0
+    pose_jumps: float = 0.0
+    pose_delay: int = 0
+    scan_delay: int = 0
+    message_drop: float = 0.0
 
     def __post_init__(self) -> None:
-        _check_range("range noise", self.range_noise, 1.0)
-        _check_range("wheel slip", self.wheel_slip, 1.0)
-        _check_range("motor lag", self.motor_lag, 60.0)
-        _check_range("bound of the wheel gains", self.wheel_gains, MOST_HIDDEN)
-        _check_range("bound of the axle error", self.axle_error, MOST_HIDDEN)
-        _check_range("range dropout", self.range_dropout, 1.0)
-        if whole_number("delay", self.delay, 0) > MAX_DELAY:
-            raise TaskError(
-                f"expected a delay of at most {MAX_DELAY} steps, got {self.delay}"
-            )
+        for name, part in PARTS.items():
+            _check(name, part, getattr(self, name))
+        Reception(
+            self.pose_noise, self.heading_noise, self.pose_correlation, self.pose_jumps
+        )
+
+    @classmethod
+    def none(cls) -> Disturbance:
+        """Returns a disturbance whose parts are all 0."""
+        return cls(range_noise=0.0, wheel_slip=0.0, delay=0)
+
+    def changed(self, sizes: Mapping[str, Any]) -> Disturbance:
+        """Returns the same with other sizes of some parts.
+
+        Raises:
+            TaskError: There is no such part, or a size is out of range.
+        """
+        known = [each.name for each in fields(self)]
+        for name in sizes:
+            if name not in known:
+                raise TaskError(
+                    f"unknown disturbance {name!r}{hint(str(name), known)}; known: "
+                    f"{', '.join(known)}"
+                )
+        return Disturbance(**{**asdict(self), **sizes})
 
     def env_options(self) -> dict[str, Any]:
         """Returns the additional arguments of `Map2DEnv`, with a jittered start.
@@ -66,23 +149,29 @@ class Disturbance:
         given = {
             name: size
             for name, size in asdict(self).items()
-            if size or name not in _NOT_EVERYWHERE
+            if size or PARTS[name].everywhere
         }
         return {"variation": "jitter", **given}
 
     def __str__(self) -> str:
-        parts = {
-            f"range noise {100 * self.range_noise:g} %": self.range_noise,
-            f"range dropout {100 * self.range_dropout:g} %": self.range_dropout,
-            f"wheel slip {100 * self.wheel_slip:g} %": self.wheel_slip,
-            f"wheel gains ±{100 * self.wheel_gains:g} %": self.wheel_gains,
-            f"axle error ±{100 * self.axle_error:g} %": self.axle_error,
-            f"motor lag {self.motor_lag:g} s": self.motor_lag,
-            f"delay {self.delay} step{'' if self.delay == 1 else 's'}": self.delay,
-        }
-        return ", ".join(["jittered starts", *(p for p, size in parts.items() if size)])
+        return ", ".join(["jittered starts", *self._texts()])
+
+    def _texts(self) -> list[str]:
+        texts = []
+        for name, part in PARTS.items():
+            size = getattr(self, name)
+            if not size:
+                continue
+            steps = f"{size} step{'' if size == 1 else 's'}"
+            shown = 100 * size if part.percent else size
+            texts.append(part.text.format(steps if name in STEPS else shown))
+        return texts
 
 
-def _check_range(name: str, value: float, most: float) -> None:
-    if not 0.0 <= finite(name, value) <= most:
-        raise TaskError(f"expected a {name} from 0 to {most:g}, got {value!r}")
+def _check(name: str, part: Part, size: Any) -> None:
+    words, most = part.words, part.most
+    if name in STEPS:
+        if whole_number(words, size, 0) > most:
+            raise TaskError(f"expected a {words} of at most {most:g} steps, got {size}")
+    elif not 0.0 <= finite(words, size) <= most:
+        raise TaskError(f"expected a {words} from 0 to {most:g}, got {size!r}")

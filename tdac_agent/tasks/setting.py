@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from tdac_agent.tasks.units import Units
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.gap_search import GapWatch
+from tdac_envs.drive.task import Pose, radii_text
 from tdac_envs.grid.plan import Path as Way
 
 
@@ -73,6 +74,13 @@ class Nominal(Protocol):
         """Returns a random feasible start of the jitter variation."""
 
 
+def tolerance_text(setting: Setting) -> str:
+    """Formats the goal tolerance of a setting: `0.2 m (1.0 radii)`."""
+    own = setting.nominal
+    length = setting.length_text(own.goal_tolerance)
+    return f"{length} ({radii_text(own.goal_tolerance, own.body_radius)})"
+
+
 class JudgedEnv(Protocol):
     """An environment whose episodes are judged."""
 
@@ -111,6 +119,13 @@ class JudgedEnv(Protocol):
 
     def discs(self) -> NDArray[np.float64]:
         """Returns the movers as they are now, shape (n, 3): x, y, radius (px or m)."""
+
+    def watch_gap(self) -> GapWatch:
+        """Returns a watch of the smallest gap in the episode that has just begun."""
+
+    @property
+    def required_gap(self) -> float:
+        """The gap to obstacles that the robot should keep, px or m."""
 
 
 class Params(Protocol):
@@ -204,7 +219,14 @@ class Setting(Protocol):
 
     @property
     def has_dropouts(self) -> bool:
-        """Whether the environment has the option `range_dropout`."""
+        """Whether the robot is on a map: it has `range_dropout` and `pose_noise`."""
+
+    @property
+    def disturbances(self) -> dict[str, Any]:
+        """What the robot's file says of its disturbances, in units of the task."""
+
+    def length_of(self, length: float) -> float:
+        """Converts a length in units of the task to those of the environment."""
 
     def facts(self) -> dict[str, Any]:
         """Returns all that determines an episode, the map or world by its hash."""

@@ -5,19 +5,19 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from tdac_agent.storage.hashes import sha256_of_json
-from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.disturbance import LENGTHS, OF_ALL, PARTS, Disturbance
 from tdac_agent.tasks.environment import Environment
 from tdac_agent.tasks.first_run import compile_first
 from tdac_agent.tasks.parts import Pictures
 from tdac_agent.tasks.registry import environment, own_environments
-from tdac_agent.tasks.setting import JudgedEnv, Nominal, Params, Setting
+from tdac_agent.tasks.setting import JudgedEnv, Nominal, Params, Setting, tolerance_text
 from tdac_agent.tasks.task_file import (
     TASK_FILE,
     Profile,
@@ -27,8 +27,10 @@ from tdac_agent.tasks.task_file import (
     check_frame,
     read_task_file,
 )
+from tdac_agent.tasks.units import Units
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import printable
+from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose
 
 SENSORS_FILE = Path(__file__).parents[2] / "tdac_envs" / "controller_kit" / "sensors.py"
@@ -71,10 +73,19 @@ class Task:
         return self.setting.nominal
 
     @property
+    def progress_fraction(self) -> float:
+        """Share of the distance that may be left in the progress test."""
+        return self.spec.progress.fraction
+
+    @property
     def progress_steps(self) -> int:
         """Step limit of the progress test."""
-        default = max(MIN_PROGRESS_STEPS, math.ceil(0.16 * self.nominal.horizon))
-        return self.spec.progress.steps or default
+        return self.spec.progress.steps or progress_steps(self.nominal.horizon)
+
+    @property
+    def told_units(self) -> Units | None:
+        """Units of diagnoses for models; None for those of the environment."""
+        return None
 
     def with_profile(self, profile: Profile | None) -> Task:
         """Returns the task with another profile; None keeps its own.
@@ -106,6 +117,10 @@ class Task:
     def pictures(self) -> Pictures:
         """Returns an object that draws this task's episodes."""
         return self.environment.pictures(self.setting)
+
+    def seen(self, observation: Observation) -> Observation:
+        """An observation as a controller gets it."""
+        return self.setting.seen(observation)
 
     def start_check(self) -> Callable[[Pose], bool]:
         """Returns a function: whether an episode may begin at a feasible start.
@@ -144,12 +159,45 @@ class Task:
                 f"the sensors of {self.spec.env} have no dropouts; leave out "
                 "--range-dropout"
             )
+        if not self.setting.has_dropouts:
+            _refuse_reception(options, self.spec.env)
+        for name in LENGTHS:
+            if name in options:
+                options[name] = self.setting.length_of(options[name])
         return options | self.setting.noise(options.pop("range_noise"))
+
+    def own_disturbance(self, **sizes: Any) -> Disturbance:
+        """Returns what disturbs this task's robot when it is confirmed.
+
+        It is what the robot's file says, or else the default, then the task file's
+        `disturbances`, then the given sizes.
+
+        Raises:
+            TaskError: A size is out of range.
+        """
+        robot = self.setting.disturbances
+        usual = Disturbance.none().changed(robot) if robot else Disturbance()
+        return usual.changed(self.spec.disturbances).changed(sizes)
 
     def sha256(self) -> str:
         """Returns the hash of all that determines an episode and the progress test."""
         facts = {**self.setting.facts(), "progress": self.spec.progress.model_dump()}
+        if (own := self.own_disturbance()) != Disturbance():
+            facts["disturbances"] = asdict(own)
         return sha256_of_json(facts)
+
+
+def progress_steps(horizon: int) -> int:
+    """Default step limit of the progress test, for episodes of `horizon` steps."""
+    return max(MIN_PROGRESS_STEPS, math.ceil(0.16 * horizon))
+
+
+def _refuse_reception(options: dict[str, Any], env: str) -> None:
+    """Refuses parts of a disturbance that only robots on maps have."""
+    for name, part in PARTS.items():
+        if name in options and not part.everywhere and name not in OF_ALL:
+            flag = name.replace("_", "-")
+            raise TaskError(f"{env} has no {part.words}; leave out --{flag}")
 
 
 def read_task(
@@ -200,8 +248,8 @@ def display_name(task: Task) -> str:
         name = f"{alias}, changed"
     elif name in bundled_tasks():
         name += ", not the bundled one"
-    tolerance = setting.length_text(task.nominal.goal_tolerance)
-    return f"{name} (map {setting.world_sha256()[:8]}, goal within {tolerance})"
+    near = tolerance_text(setting)
+    return f"{name} (map {setting.world_sha256()[:8]}, goal within {near})"
 
 
 @functools.cache
@@ -240,6 +288,9 @@ def portable_task_file(task: Task, own_suite: str | None = None) -> str:
     spec = task.spec.model_dump(
         mode="json", exclude_none=True, exclude=excluded, by_alias=True
     )
+    spec.pop("disturbances", None)
+    if (own := task.own_disturbance()) != Disturbance():
+        spec["disturbances"] = asdict(own)
     spec["name"] = task.name
     spec.update(task.setting.portable())
     if task.suite is not None and own_suite is not None:

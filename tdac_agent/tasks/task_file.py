@@ -14,6 +14,7 @@ from pydantic import (
     model_validator,
 )
 
+from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
 from tdac_envs.core.arguments import MOST_STEPS, in_radians
 from tdac_envs.core.errors import TaskError, first_problem, hint
@@ -54,15 +55,45 @@ def _movers_of(given: Any) -> tuple[AnySpec, ...]:
         raise ValueError(str(error).removeprefix("movers: ")) from None
 
 
-class RobotSpec(StrictModel):
-    """Properties of the robot that differ from the default."""
+def _named(given: Any) -> Any:
+    """A name or path of a robot file is short for the key `file`."""
+    return {"file": given} if isinstance(given, str) else given
 
+
+def _sizes(given: dict[str, int | float]) -> dict[str, int | float]:
+    try:
+        Disturbance().changed(given)
+    except TaskError as error:
+        raise ValueError(str(error)) from None
+    return given
+
+
+class RobotSpec(StrictModel):
+    """Properties of the robot that differ from the default, or from its file."""
+
+    file: str | None = Field(
+        None,
+        description="Bundled robot (`tdac robots`), or path of a robot file relative "
+        "to this file; `robot: NAME` is short for it.",
+    )
     radius: Length | None = Field(None, description="px")
     axle: Length | None = Field(None, description="px; default 2 x radius")
     max_wheel_speed: Length | None = Field(None, description="px/s")
     n_rays: int | None = Field(None, ge=1, le=MOST_RAYS)
     field_of_view: float | None = Field(None, gt=0, le=360, description="degrees")
     range_max: Length | None = Field(None, description="px")
+    ray_angles: tuple[float, ...] | None = Field(
+        None, max_length=MOST_RAYS, description="rad, instead of n_rays."
+    )
+    range_min: Length | None = Field(None, description="px")
+    below_min: Literal["range_max", "range_min", "zero"] | None = None
+    scanner_offset: tuple[Place, Place] | None = Field(
+        None, description="Where the rays start, px: ahead, to the right."
+    )
+    max_speed: Length | None = Field(None, description="Of the body, px/s.")
+    max_turn_rate: Length | None = Field(None, description="Of the body, rad/s.")
+    max_acceleration: Length | None = Field(None, description="Of a wheel, px/s².")
+    max_turn_acceleration: Length | None = Field(None, description="rad/s²")
     image: Path | None = Field(None, description="Picture of the robot, facing +x.")
 
 
@@ -96,7 +127,10 @@ class TaskFile(StrictModel):
     left_out: tuple[Name, ...] = Field(
         (), description="Nodes that were ignored when this world file was written."
     )
-    robot: RobotSpec = RobotSpec()
+    robot: Annotated[RobotSpec, BeforeValidator(_named)] = RobotSpec()
+    disturbances: Annotated[dict[str, int | float], AfterValidator(_sizes)] = Field(
+        {}, description="Of confirmations, as flags of `--robust`: `wheel_slip: 0.02`."
+    )
     start: Annotated[
         tuple[Place, ...] | None,
         Field(min_length=2, max_length=3),
@@ -151,7 +185,7 @@ def check_frame(frame: FrameName, profile: Profile) -> None:
     if frame == "metres" and profile == "paper":
         raise TaskError(
             "profile: the functions of the profile `paper` use pixels; in metres "
-            "(`frame`), give the profile `policy`"
+            "(`frame`), give the profile `policy`, or the frame `pixels`"
         )
 
 

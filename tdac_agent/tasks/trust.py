@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import json
 import shlex
+import shutil
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from pathlib import Path
 
 from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.task_file import OWN_SUITE
 from tdac_envs.core.errors import TdacError
 
 MOST_FILES, MOST_BYTES = 2000, 64 << 20
@@ -104,6 +106,12 @@ def allowed(task: Task, suite: Path | None, *, trust: bool) -> Task:
     if task.suite is not None and not task.trusted:
         permit(task.folder or task.name, [suite_wish(task.suite)], trust=trust)
     return replace(task, trusted=True)
+
+
+def keep_suite(suite: Path, folder: Path) -> None:
+    """Copies the user's own tests to a run folder."""
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(suite, folder / OWN_SUITE, ignore=ignored, dirs_exist_ok=True)
 
 
 def suite_wish(suite: Path) -> Wish:

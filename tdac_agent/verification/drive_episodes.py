@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -13,16 +14,17 @@ from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.provenance import versions
+from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import (
     EpisodeProvenance,
     EpisodeReport,
     clock_dependence,
     summarise,
 )
+from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.episode_job import EpisodeJob
 from tdac_agent.verification.judge.policy_spec import PolicySpec
-from tdac_agent.verification.judge.sequential import SequentialTest
-from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks
+from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks, checks_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.ledger import SEQUENTIAL, HiddenEvaluation, on_record
 from tdac_agent.verification.run_episodes import Watch, run_episodes
@@ -53,12 +55,14 @@ class Request:
         episodes: The task or the task set.
         part: Which of its episodes.
         source: Source of a controller without a file.
-        test: A sequential test that ends them early; then there are no scores.
+        test: A test that may end them early; then there are no scores.
         lineage: Id of the run that wrote a controller, if one did.
         patience: Time-outs after which the rest is skipped; None for never.
         tier: Sandbox tier; `auto` for the best one on this machine.
         limits: Limits of a controller's process; those of the problem by default.
         trajectories: Whether the trajectories of public episodes are kept.
+        own_tests: Runs the user's own tests on a set; without a pass, nothing is
+            driven.
     """
 
     policy: PolicySpec
@@ -66,12 +70,13 @@ class Request:
     episodes: Episodes
     part: Part
     source: bytes | None = None
-    test: SequentialTest | None = None
+    test: EndingTest | None = None
     lineage: str | None = None
     patience: int | None = None
     tier: str = "auto"
     limits: Limits | None = None
     trajectories: bool = False
+    own_tests: Callable[[], Report] | None = None
 
 
 def drive(
@@ -104,24 +109,54 @@ def drive(
         refuse_links(out, *WRITTEN)
     policy, own, part = request.policy, request.episodes, request.part
     own.check(policy)
-    secret = own.secret(part)
-    if secret is None or policy.kind == "privileged":
-        return _driven(request, out, judge, watch)
-    if policy.kind == "controller":
+    secret = None if policy.kind == "privileged" else own.secret(part)
+    if secret is not None and policy.kind == "controller":
         _check_hiding(request)
+    tests = None if request.own_tests is None else request.own_tests()
+    if tests is not None and not tests.passed:
+        report = _refused(request, tests)
+    elif secret is None:
+        report = _driven(request, out, judge, watch)
+    else:
+        report = _recorded(request, secret, out, judge, watch)
+    if tests is not None:
+        # They are not in the ledger: others may be given next time.
+        outcomes = report.tests | checks_of(tests).outcomes
+        report = report.model_copy(update={"tests": outcomes})
+    if out is not None and (secret is not None or tests is not None):
+        keep_report(report, out)
+    return report
+
+
+def _recorded(
+    request: Request,
+    secret: str,
+    out: Path | None,
+    judge: WarmJudge | None,
+    watch: Watch | None,
+) -> EpisodeReport:
+    """The report on hidden worlds, from the ledger or driven now."""
+    own = request.episodes
     about = HiddenEvaluation(
         entrant=request.sha256,
         set=own.name,
         set_sha256=own.sha256,
-        worlds=SEQUENTIAL if request.test else len(part.numbers),
+        worlds=SEQUENTIAL if request.test else len(request.part.numbers),
         salt_sha256=secret,
     )
-    report = on_record(
+    return on_record(
         about, request.lineage, lambda: _driven(request, out, judge, watch)
     )
-    if out is not None:
-        keep_report(report, out)
-    return report
+
+
+def _refused(request: Request, tests: Report) -> EpisodeReport:
+    """The report on a controller that failed tests, so that nothing was driven."""
+    tier, limits = tests.provenance.sandbox, request.limits or request.episodes.limits
+    facts = request.episodes.provenance(
+        request.part, Path(), request.sha256, tier, limits
+    )
+    about = EpisodeProvenance.model_validate(facts)
+    return summarise(about, (), None, tests.seconds, checks=checks_of(tests))
 
 
 def _check_hiding(request: Request) -> None:

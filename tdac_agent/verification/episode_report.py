@@ -15,13 +15,17 @@ from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
 from tdac_agent.metrics.rates import rate_of_runs
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.units import Place
-from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores, scores_of
-from tdac_agent.verification.judge.sequential import (
-    Characteristics,
-    Decision,
-    SequentialTest,
+from tdac_agent.tasks.units import Place, Units
+from tdac_agent.verification.decision import SequentialResult, result_of
+from tdac_agent.verification.diagnosis.gap import (
+    TOO_CLOSE,
+    Gap,
+    closest,
+    gap_figure,
+    gap_text,
 )
+from tdac_agent.verification.judge.confirming import EndingTest
+from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores, scores_of
 from tdac_agent.verification.judge.set_checks import Checks
 from tdac_agent.verification.suite.contract import (
     ParseError,
@@ -99,16 +103,6 @@ class Interval(StrictRecord):
     method: Literal["Clopper-Pearson", "bootstrap over worlds"] = "Clopper-Pearson"
 
 
-class SequentialResult(StrictRecord):
-    """The decision of a sequential test, and its error rates."""
-
-    decision: Decision
-    test: SequentialTest
-    refuse_at: float = Field(description="Success rate that the test should reject.")
-    at_refused_rate: Characteristics
-    at_accepted_rate: Characteristics
-
-
 class HiddenCount(StrictRecord):
     """What the ledger says about a hidden evaluation."""
 
@@ -156,6 +150,15 @@ class EpisodeReport(StrictRecord):
         "hidden worlds.",
     )
     episodes: tuple[EpisodeRow, ...] = Field((), description="Empty for hidden worlds.")
+    smallest_gap: Gap | None = Field(
+        None, description="Of all episodes; of hidden worlds without its place."
+    )
+    closest: int | None = Field(
+        None, description="Number of the episode with it; None for hidden worlds."
+    )
+    too_close: int = Field(
+        0, description="Episodes that reached the goal with less than the required gap."
+    )
     sequential: SequentialResult | None = None
     child_cpu_seconds: float
     seconds: float
@@ -209,6 +212,26 @@ class EpisodeReport(StrictRecord):
         """Failures by time-out, which a busy machine may cause."""
         return self.causes.get("time-out", 0)
 
+    def gap_lines(self, units: Units) -> list[str]:
+        """What the episodes say of their gaps; nothing if none is on record.
+
+        The place is told on a task alone: worlds of a set have other coordinates than
+        a controller observes.
+
+        Args:
+            units: Units of the texts.
+        """
+        gap, on_set = self.smallest_gap, self.provenance.split is not None
+        if gap is None:
+            return []
+        text = f"smallest gap: {gap_text(gap, units, placed=not on_set)}"
+        if self.closest is not None:
+            text += f", {'world' if on_set else 'seed'} {self.closest}"
+        if not self.too_close:
+            return [text]
+        what = f"{self.too_close} of the successes came {TOO_CLOSE} to obstacles"
+        return [text, f"{what}: less than {gap_figure(gap.required, units)}"]
+
     @property
     def worst(self) -> tuple[EpisodeRow, ...]:
         """The worst episodes, the worst first."""
@@ -218,7 +241,7 @@ class EpisodeReport(StrictRecord):
 def summarise(
     provenance: EpisodeProvenance,
     episodes: Sequence[EpisodeRow],
-    test: SequentialTest | None,
+    test: EndingTest | None,
     seconds: float,
     *,
     told: bool = True,
@@ -231,7 +254,7 @@ def summarise(
     Args:
         provenance: What they apply to.
         episodes: The episodes, in the order of their numbers.
-        test: The sequential test that may have stopped them.
+        test: The test that may have stopped them.
         seconds: Wall time, s.
         told: Whether single episodes may be reported.
         different: Number of different worlds, if each is driven several times.
@@ -250,6 +273,7 @@ def summarise(
     if not told:
         groups = {name: own for name, own in groups.items() if len(own) >= LEAST_GROUP}
     scored = test is None and bool(episodes)
+    near = closest((each.number, each.smallest_gap) for each in episodes)
     texts = [each.text or f"{named(each)}: {each.error}" for each in failed]
     return EpisodeReport(
         provenance=provenance,
@@ -264,7 +288,10 @@ def summarise(
         causes=dict(Counter(cause_of(episode) for episode in failed).most_common()),
         told=checks.failures or (tuple(texts[:MOST_TOLD]) if told else ()),
         episodes=tuple(episodes) if told else (),
-        sequential=None if test is None else result_of(test, successes, len(failed)),
+        smallest_gap=None if near is None else near[1],
+        closest=near[0] if near is not None and told else None,
+        too_close=sum(each.too_close for each in episodes),
+        sequential=None if test is None else result_of(test, episodes),
         child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),
         seconds=round(seconds, 3),
         clock_dependent=clock_dependent,
@@ -327,31 +354,3 @@ def clock_dependence(
     if over == 0:
         return None
     return f"in {over} of {len(used)} episodes it used over half of its CPU budget"
-
-
-def result_of(test: SequentialTest, successes: int, failures: int) -> SequentialResult:
-    """The decision of a test, with its error rates."""
-    return SequentialResult(
-        decision=test.decide(successes, failures),
-        test=test,
-        refuse_at=test.refuse_at,
-        at_refused_rate=test.characteristics(test.refuse_at),
-        at_accepted_rate=test.characteristics(test.accept_at),
-    )
-
-
-def decision_text(result: SequentialResult) -> str:
-    """What a sequential test decided."""
-    if result.decision == "accepted":
-        return f"accepted at {percent(result.test.accept_at)}"
-    if result.decision == "rejected":
-        return f"rejected at {percent(result.test.accept_at)}"
-    return "undecided, therefore not accepted,"
-
-
-def percent(share: float) -> str:
-    """A percentage with one decimal; with three if it would round to 0 or 100 %."""
-    rounded = f"{100 * share:.1f}"
-    if rounded in ("0.0", "100.0") and 0.0 < share < 1.0:
-        rounded = f"{100 * share:.3f}"
-    return f"{rounded} %"

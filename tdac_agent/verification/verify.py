@@ -8,6 +8,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tdac_agent.episodes.trajectory import Trajectory, nominal_first
 from tdac_agent.errors import ControllerFileError, Fault
@@ -23,6 +24,7 @@ from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.report import (
     OWN,
     SHIPPED,
+    Failure,
     Provenance,
     Report,
     in_units,
@@ -107,13 +109,8 @@ def verify(
             trajectories=None if out is None else folder / "trajectories",
             metres=task.setting.shown != task.setting.units,
         )
-        _prepare(job, task, source, suites)
-        files = _files_in(job.task)
-        output = _run_judge(job, folder, warm, meanwhile)
-        findings = read_findings(job.out, output)
-        if _files_in(job.task) != files:
-            raise Fault("the suite changed the task's files, so there is no verdict")
-        tests, failures = read_outcomes(job.out / "report.jsonl", findings, output)
+        lay_out(task, job.task)
+        findings, tests, failures = judged(job, source, suites, warm, meanwhile)
         report = Report(
             verdict=verdict_of(tests),
             provenance=_provenance(task, source, job, suites, findings),
@@ -124,8 +121,36 @@ def verify(
             seconds=round(time.monotonic() - began, 3),
         )
         if out is not None:
-            _keep(report, task, folder / "trajectories", out)
+            keep(report, folder / "trajectories", out, task)
     return report
+
+
+def judged(
+    job: Job,
+    source: bytes,
+    suites: dict[str, Path],
+    judge: WarmJudge,
+    meanwhile: Callable[[], None] | None = None,
+) -> tuple[Findings, dict[str, str], list[Failure]]:
+    """Runs a job, whose working folder has been filled; returns the outcome of tests.
+
+    Args:
+        job: The job; all of its paths are in one folder.
+        source: Bytes of the controller.
+        suites: The folders of tests.
+        judge: A warm judge.
+        meanwhile: Called repeatedly while the judge works.
+
+    Raises:
+        Fault: The sandbox or the suite is broken; this is neither pass nor fail.
+    """
+    _prepare(job, source, suites)
+    files = _files_in(job.task)
+    output = _run_judge(job, job.out.parent, judge, meanwhile)
+    findings = read_findings(job.out, output)
+    if _files_in(job.task) != files:
+        raise Fault("the suite changed the task's files, so there is no verdict")
+    return findings, *read_outcomes(job.out / "report.jsonl", findings, output)
 
 
 def kept_report(
@@ -138,12 +163,6 @@ def kept_report(
     report from elsewhere never matches.
     """
     raw = source.encode("utf-8", "surrogatepass")
-    try:
-        content = read_file(folder / "report.json", RECORD_BYTES)
-        report = Report.model_validate(parse_json(content))
-    except (OSError, ValueError):
-        return None
-    provenance = report.provenance
     wanted = {
         "controller_sha256": sha256_of(raw),
         "task_sha256": task.sha256(),
@@ -153,7 +172,18 @@ def kept_report(
         "seed": seed_of(raw, task) if seed is None else seed,
         "versions": versions(),
     }
-    same = all(getattr(provenance, name) == value for name, value in wanted.items())
+    return report_in(folder, wanted)
+
+
+def report_in(folder: Path, wanted: dict[str, Any]) -> Report | None:
+    """The report in a folder if its provenance has these values, otherwise None."""
+    try:
+        content = read_file(folder / "report.json", RECORD_BYTES)
+        report = Report.model_validate(parse_json(content))
+    except (OSError, ValueError):
+        return None
+    about = report.provenance
+    same = all(getattr(about, name) == value for name, value in wanted.items())
     return report if same else None
 
 
@@ -171,12 +201,12 @@ def _suites(
     task: Task, suite: Path | None = None, shipped: Path | None = None
 ) -> dict[str, Path]:
     """The folders of tests: the shipped suite and, if there is one, the user's own."""
-    suites = {SHIPPED: _suite_folder(shipped or task.environment.suite)}
+    suites = {SHIPPED: suite_folder(shipped or task.environment.suite)}
     extra = suite or task.suite
     if suite is None:
         allowed(task, None, trust=False)
     if extra is not None:
-        suites[OWN] = _suite_folder(extra)
+        suites[OWN] = suite_folder(extra)
     return suites
 
 
@@ -197,7 +227,7 @@ def read_source(controller: str | bytes | Path) -> bytes:
         raise ControllerFileError(message) from error
 
 
-def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> None:
+def _prepare(job: Job, source: bytes, suites: dict[str, Path]) -> None:
     """Lays out the folder of a job.
 
     The suites are linked into one folder, so that no `conftest.py` or `pytest.ini` of
@@ -206,7 +236,6 @@ def _prepare(job: Job, task: Task, source: bytes, suites: dict[str, Path]) -> No
     job.out.mkdir()
     if job.trajectories is not None:
         job.trajectories.mkdir()
-    lay_out(task, job.task)
     job.controller.write_bytes(source)
     for link, folder in zip(job.suites, suites.values(), strict=True):
         link.parent.mkdir(exist_ok=True)
@@ -221,7 +250,12 @@ def load_trajectories(folder: Path) -> dict[str, Trajectory]:
     }
 
 
-def _suite_folder(path: Path) -> Path:
+def suite_folder(path: Path) -> Path:
+    """The absolute path of a folder of tests.
+
+    Raises:
+        ControllerFileError: There is no such folder, or it has no tests.
+    """
     if not path.is_dir():
         raise ControllerFileError(f"no suite {str(path)!r}: no such folder")
     if not list(path.glob("test_*.py")):
@@ -246,7 +280,7 @@ def _provenance(
     return Provenance(
         **origin(task, source, job.task, findings.tier, job.limits),
         called=display_name(task),
-        own_suite=_hash_of_files(suites[OWN])[:8] if OWN in suites else "",
+        own_suite=tests_sha256(suites[OWN])[:8] if OWN in suites else "",
         suite=" + ".join(_suite_name(task, folder) for folder in suites.values()),
         suite_sha256=_hash_of_suites(suites),
         profile=job.profile,
@@ -255,7 +289,8 @@ def _provenance(
     )
 
 
-def _hash_of_files(folder: Path) -> str:
+def tests_sha256(folder: Path) -> str:
+    """Hash of the tests in a folder."""
     return sha256_of(json.dumps(_file_hashes(folder), sort_keys=True).encode())
 
 
@@ -278,8 +313,11 @@ def _files_in(folder: Path) -> dict[str, bytes]:
     return {path.name: read_file(path, RECORD_BYTES) for path in files}
 
 
-def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
-    """Writes report, trajectories and pictures; replaces those of an earlier one."""
+def keep(report: Report, results: Path, out: Path, task: Task | None = None) -> None:
+    """Writes report and trajectories, and the pictures of failures on a task.
+
+    They replace those of an earlier verification.
+    """
     folder = out / "trajectories"
     folder.mkdir(parents=True, exist_ok=True)
     for pattern in ("nominal.*", "jitter_*.*"):
@@ -288,7 +326,7 @@ def _keep(report: Report, task: Task, results: Path, out: Path) -> None:
     for path in sorted(results.glob("*.npz")):
         # raw read: our temporary folder
         write_atomic(folder / path.name, path.read_bytes(), lasting=False)
-    if not report.passed:
+    if task is not None and not report.passed:
         from tdac_agent.verification.diagnosis.figures import (
             draw_failures,  # slow to import
         )

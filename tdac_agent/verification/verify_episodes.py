@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +22,7 @@ from tdac_agent.verification.drive_episodes import Request, drive
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.sequential import (
+    CLEAN,
     MARGIN,
     MOST_EPISODES,
     SequentialTest,
@@ -41,6 +44,11 @@ MOST_WORLDS = 400
 DEEPEST = 5
 """How many folders above a controller file its run may be."""
 JUDGED = ("dev", "test", "hidden")
+SEED_ON_SETS = (
+    "--seed has no effect on a task set without tests of your own (--suite): all that "
+    "happens in an episode follows from its world; --split NAME, and --first M with "
+    "-n N, choose worlds"
+)
 
 
 def verify_episodes(
@@ -61,13 +69,16 @@ def verify_episodes(
     trajectories: bool | None = None,
     judge: WarmJudge | None = None,
     watch: Watch | None = None,
+    suite: Path | None = None,
+    seed: int | None = None,
 ) -> EpisodeReport:
     """Drives a controller in disturbed episodes of a task, or on worlds of a set.
 
     Each episode depends only on the problem and its number, and has a fresh sandboxed
-    process. On a set, static and contract tests come first: without a pass in them,
-    nothing is driven. An evaluation on hidden worlds is recorded in the user's ledger
-    before its worlds are driven; one that is recorded there is answered from it.
+    process. On a set, static and contract tests come first, and with `suite` the user's
+    own: without a pass in them, nothing is driven. An evaluation on hidden worlds is
+    recorded in the user's ledger before its worlds are driven; one that is recorded
+    there is answered from it.
 
     Args:
         controller: Path of the file, or its source (text of several lines, or bytes).
@@ -96,23 +107,38 @@ def verify_episodes(
         trajectories: Whether trajectories are kept; by default only on sets.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with the numbers of episodes and successes so far.
+        suite: Folder of the user's own tests for a set, which may run (docs/suites.md);
+            `out` then also gets their `report.json`. Those for a task are tests of
+            `verify`.
+        seed: Seed of what these tests draw; by default derived from the controller, the
+            set and a secret of this installation.
 
     Raises:
         ControllerFileError: The file cannot be read.
-        TaskError: An argument is not valid, the environment does not have a part of the
-            disturbance, or the ledger cannot be used.
+        TaskError: An argument is not valid or needs another one, the environment does
+            not have a part of the disturbance, or the ledger cannot be used.
         Fault: The sandbox is broken; the controller neither passes nor fails.
         RunError: A link leads out of `out`, where the results are written.
     """
-    source = read_source(controller)
+    source, own_tests = read_source(controller), None
+    if seed is not None and suite is None:
+        raise TaskError(SEED_ON_SETS)
     if not isinstance(problem, Task):
         if disturbance is not None:
             raise TaskError("a task set has its own disturbances")
         part, test = part_of_set(
             problem, split, episodes, first, salt_file, accept_at, margin
         )
+        if suite is not None:
+            # Task sets need much that a task does not.
+            from tdac_agent.verification.own_tests import run_own_tests
+
+            tests = partial(run_own_tests, source, problem, suite, seed=seed)
+            own_tests = partial(tests, tier=tier, out=out, judge=judge)
     else:
-        problem.disturbed_options(disturbance or Disturbance())
+        if suite is not None:
+            raise TaskError("suite: on a task, verify runs it; leave it out here")
+        problem.disturbed_options(disturbance or problem.own_disturbance())
         count = EPISODES if episodes is None else episodes
         whole_number("episodes", count, 1, MOST_EPISODES)
         if first is not None:
@@ -132,6 +158,7 @@ def verify_episodes(
         tier=tier,
         limits=limits,
         trajectories=keeps,
+        own_tests=own_tests,
     )
     return drive(request, out, judge, watch)
 
@@ -162,6 +189,9 @@ def part_of_set(
     count = most_worlds(tasks, split) if worlds is None else worlds
     bar = tasks.file.bar if accept_at is None and worlds is None else accept_at
     test = None if bar is None else SequentialTest(bar, count, margin)
+    if test is not None and accept_at is None:
+        clean = CLEAN - (1.0 - tasks.file.most_contacts)
+        test = replace(test, contact=SequentialTest(CLEAN, count, clean))
     return Part(range(begin, begin + count), split, salt_file), test
 
 

@@ -50,9 +50,14 @@ def load_params(path: str | Path = "params.json") -> dict[str, Any]:
         (margin proposed for planning), `frame` ("pixels" or "metres"), `resolution`
         (metres per pixel or None), `origin` (pose of the map's lower-left corner, m and
         rad) and `robot`, a dict of `radius`, `axle_length`, `max_wheel_speed` (px/s or
-        m/s), `n_rays`, `field_of_view_deg` and `range_max`; and how the map was made.
+        m/s), `n_rays`, `field_of_view_deg`, `range_max` and `ray_angles` (from the
+        heading, in the order of `ranges`); and how the map was made.
     """
     params: dict[str, Any] = json.loads((HERE / path).read_text(encoding="utf-8"))
+    robot = params.get("robot", {})
+    if "n_rays" in robot and "ray_angles" not in robot:  # from an earlier version
+        angles = _even_fan(robot["n_rays"], robot["field_of_view_deg"])
+        robot["ray_angles"] = (angles if _is_down(params) else -angles).tolist()
     return params
 
 
@@ -87,9 +92,11 @@ def to_point(i: float, j: float) -> tuple[float, float]:
 class Ultrasonic:
     """The robot's range sensor: a fan of exact rays over the occupancy grid.
 
-    `ranges[0]` is the robot's LEFTMOST ray, `ranges[-1]` its rightmost. Ray i points at
-    `heading + angles[i]`: from -fov/2 to +fov/2 in pixels (y points down), from +fov/2
-    to -fov/2 in metres. A single ray points straight ahead.
+    Ray i points at `heading + angles[i]`. With the number of rays and the angle of
+    params.json, these are its `ray_angles`. Otherwise they are even: `ranges[0]` is the
+    robot's LEFTMOST ray, `ranges[-1]` its rightmost, at -fov/2 and +fov/2 in pixels (y
+    points down), at +fov/2 and -fov/2 in metres; the rays of a full circle begin behind
+    the robot and are 360/n degrees apart. A single ray points straight ahead.
 
     Args:
         occ: Shape (height, width), bool, True = occupied.
@@ -108,12 +115,10 @@ class Ultrasonic:
         occ = np.asarray(occ, dtype=np.bool_)
         self.height, self.width = occ.shape
         self.range_max = float(range_max)
-        fov = math.radians(field_of_view_deg) if n_rays > 1 else 0.0
-        first, step = -0.5 * fov, fov / max(n_rays - 1, 1)
-        angles = first + step * np.arange(n_rays)
-        self._ways = [(math.cos(turn), math.sin(turn)) for turn in angles.tolist()]
         frame = _frame()
-        self.angles = angles if frame is None else -angles
+        self.angles = _ray_angles(n_rays, field_of_view_deg)
+        turns = self.angles if frame is None else -self.angles
+        self._ways = [(math.cos(turn), math.sin(turn)) for turn in turns.tolist()]
         self._pixel = 1.0 if frame is None else frame[0]
         self._reach = self.range_max / self._pixel
         # A rim of obstacles stands for the outside; bytes are quick to index.
@@ -214,10 +219,8 @@ class Graphics:
         centre = self._to_screen(x, y)
         self._trail.append(centre)
         screen.blit(self._map, (0, 0))
-        fov = math.radians(self._robot["field_of_view_deg"])
-        for i, distance in enumerate(map(float, ranges)):
-            turn = -fov / 2 + i * fov / (len(ranges) - 1) if len(ranges) > 1 else 0.0
-            turn = turn if _frame() is None else -turn
+        turns = _ray_angles(len(ranges), self._robot["field_of_view_deg"])
+        for turn, distance in zip(turns.tolist(), map(float, ranges), strict=True):
             tip_x = x + distance * math.cos(heading + turn)
             tip_y = y + distance * math.sin(heading + turn)
             tip = self._to_screen(tip_x, tip_y)
@@ -309,9 +312,34 @@ def _frame() -> tuple[float, float, float, float, float] | None:
     if not (HERE / "params.json").exists():
         return None
     params = load_params()
-    if params.get("frame", "pixels") == "pixels":
+    if _is_down(params):
         return None
     return (params["resolution"], params["height"], *params["origin"])
+
+
+def _is_down(params: Mapping[str, Any]) -> bool:
+    """Whether y points down, as it does in pixels."""
+    return bool(params.get("frame", "pixels") != "metres")
+
+
+def _ray_angles(n_rays: int, field_of_view_deg: float) -> NDArray[np.float64]:
+    """Those of params.json for its robot, else an even fan; see `Ultrasonic`."""
+    params = load_params() if (HERE / "params.json").exists() else {}
+    robot = params.get("robot", {})
+    known = robot.get("n_rays"), robot.get("field_of_view_deg")
+    if known == (n_rays, field_of_view_deg):
+        return np.array(robot["ray_angles"])
+    angles = _even_fan(n_rays, field_of_view_deg)
+    return angles if _is_down(params) else -angles
+
+
+def _even_fan(n_rays: int, field_of_view_deg: float) -> NDArray[np.float64]:
+    """Angles of an even fan from the robot's left to its right, y down, rad."""
+    if n_rays <= 1:
+        return np.zeros(n_rays)
+    view = math.radians(field_of_view_deg)
+    gaps = n_rays if field_of_view_deg == 360 else n_rays - 1
+    return np.asarray(-0.5 * view + view / gaps * np.arange(n_rays))
 
 
 def _has_window() -> bool:

@@ -86,22 +86,24 @@ def draw_rays(
     canvas: Canvas,
     pose: tuple[float, float, float],
     ranges: NDArray[np.float64],
-    field_of_view: float,
+    turns: NDArray[np.float64],
     range_max: float,
 ) -> None:
     """Draws the sensor's fan: the robot's left half blue, its right half orange.
 
+    A ray straight behind the robot borders both halves.
+
     Args:
         canvas: Where to draw.
         pose: (x, y, heading).
-        ranges: Shape (n_rays,), px, leftmost first.
-        field_of_view: Whole angle, rad.
+        ranges: Shape (n_rays,), px.
+        turns: Shape (n_rays,): angles of the rays from the heading, rad.
         range_max: Range without a hit, px.
     """
-    n, (x, y, heading) = len(ranges), pose
-    if n == 0:
+    if len(ranges) == 0:
         return
-    turns = np.linspace(-0.5, 0.5, n) * field_of_view if n > 1 else np.zeros(1)
+    x, y, heading = pose
+    turns, ranges = _from_left_to_right(turns, ranges)
     angles = heading + turns
     tips = np.column_stack([np.cos(angles), np.sin(angles)]) * ranges[:, None] + (x, y)
     halves = ((turns < 1e-9, LEFT_RAYS), (turns > -1e-9, RIGHT_RAYS))
@@ -111,6 +113,18 @@ def draw_rays(
     for half, colour in halves:
         for tip in tips[half & (ranges < range_max)]:
             canvas.disc(tip, 2, colour)
+
+
+def _from_left_to_right(
+    turns: NDArray[np.float64], ranges: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rays by their angle from -pi to pi; one at -pi also stands at pi."""
+    turns = np.where(np.abs(turns) > np.pi, np.remainder(turns, 2 * np.pi), turns)
+    turns = np.where(turns > np.pi + 1e-9, turns - 2 * np.pi, turns)
+    behind = turns <= 1e-9 - np.pi
+    turns = np.append(turns, turns[behind] + 2 * np.pi)
+    order = np.argsort(turns, kind="stable")
+    return turns[order], np.append(ranges, ranges[behind])[order]
 
 
 def draw_movers(canvas: Canvas, steps: Sequence[NDArray[np.float64]]) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.drawing.canvas import GREY, INK, MOVER, TRAIL, Canvas, Colour
+from tdac_envs.drawing.canvas import GREEN, GREY, INK, MOVER, TRAIL, Canvas, Colour
 from tdac_envs.drawing.marks import draw_outcome
 
 SMALLEST_BODY = 3.0
@@ -104,6 +104,7 @@ class Legend(NamedTuple):
         path: bool,
         width: int,
         movers: bool = False,
+        goal: str = "",
     ) -> Legend:
         """The legend of some trajectories.
 
@@ -113,8 +114,10 @@ class Legend(NamedTuple):
             path: Whether the shortest path is drawn, too.
             width: Available width, frame px.
             movers: Whether the movers of the first trajectory are drawn.
+            goal: Text on the goal; empty for none.
         """
-        entries = [(GREY, "shortest path")] if path else []
+        entries = [(GREEN, goal)] if goal else []
+        entries += [(GREY, "shortest path")] if path else []
         for k, end in enumerate(outcomes):
             name = labels[k] if k < len(labels) else f"run {k + 1}"
             entries.append((run_colour(k), f"{name}: {end}" if end else name))

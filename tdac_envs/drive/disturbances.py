@@ -149,8 +149,8 @@ def measured(
     """The odometry of one robot, shape (2,), or of many, shape (n, 2).
 
     Args:
-        state: `Robot.state`.
-        constants: `Robot.constants`.
+        state: The `state` of a robot, or of many.
+        constants: Their `constants`.
         noise: Factors of the noise, shape (2,) or (n, 2), or 1.0.
         limits: Of `odometry_limits`, shape (2,) or (n, 2).
     """
@@ -182,7 +182,6 @@ class BatchDisturbances:
     def __init__(self, setups: Sequence[Any]) -> None:
         self._own: list[Disturbances] = [setup.disturbances for setup in setups]
         tasks = [setup.nominal for setup in setups]
-        self._axles = [task.axle_length for task in tasks]
         self.slippery = [i for i, own in enumerate(self._own) if own.wheel_slip]
         self.hidden = any(own.hidden for own in self._own)
         self.odometry = self._own[0].odometry
@@ -204,11 +203,22 @@ class BatchDisturbances:
                 self._own[i].slip(state[i], random(i))
 
     def hide(
-        self, robots: Sequence[int], constants: Array, random: Callable[[int], Random]
+        self,
+        robots: Sequence[int],
+        tasks: Sequence[Any],
+        constants: Array,
+        random: Callable[[int], Random],
     ) -> None:
-        """Draws the hidden errors of the next episodes of these robots."""
+        """Draws the hidden errors of the next episodes of these robots.
+
+        Args:
+            robots: Indices of the robots.
+            tasks: The tasks of all robots.
+            constants: The constants of all robots.
+            random: See the class.
+        """
         for i in robots:
-            self._own[i].hide(constants[i], self._axles[i], random(i))
+            self._own[i].hide(constants[i], tasks[i].axle_length, random(i))
 
     def measure(
         self, robots: Sequence[int], batch: Any, random: Callable[[int], Random]

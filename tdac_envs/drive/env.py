@@ -9,9 +9,11 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.core.addresses import Addresses, Words
 from tdac_envs.core.arguments import one_of
 from tdac_envs.drawing.runs import outcome_of
 from tdac_envs.drive.disturbances import measured
+from tdac_envs.drive.gap_search import GapWatch
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.stepping import (
     HEADING,
@@ -53,6 +55,8 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     nominal: Any
     _scene: Any
     _call_drive: Callable[[], None]
+    _note_gap: Callable[..., None]
+    addresses: Addresses
     _random: np.random.Generator
     _steps: int
     _trail: list[tuple[float, float]]
@@ -128,9 +132,28 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         pose: NDArray[np.float64] = self.robot.state[: HEADING + 1].copy()
         return pose
 
+    def observed_pose(self) -> NDArray[np.float64]:
+        """The pose as it is observed, in the frame of `pose`, shape (3,)."""
+        return self.pose()
+
     def discs(self) -> NDArray[np.float64]:
         """Moving obstacles as they are now, shape (n, 3): x, y, radius (px or m)."""
         return np.zeros((0, 3))
+
+    def watch_gap(self, words: Words | None = None) -> GapWatch:
+        """A watch of the smallest gap in the episode that has just begun.
+
+        Args:
+            words: Addresses of the arrays of another robot; by default the own ones.
+        """
+        own = self.addresses.words[0] if words is None else words
+        return GapWatch(self._note_gap, own)
+
+    @property
+    def required_gap(self) -> float:
+        """The gap to obstacles that the robot should keep, px or m."""
+        required: float = self.setup.required_gap
+        return required
 
     def _draw(self, options: dict[str, Any]) -> Any:
         """Draws the task of an episode, and returns it."""

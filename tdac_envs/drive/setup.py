@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -17,7 +18,8 @@ from tdac_envs.core.arguments import (
 )
 from tdac_envs.drive.disturbances import Disturbances, Random
 from tdac_envs.drive.rewards import RewardWeights
-from tdac_envs.drive.stepping import UNDISTURBED
+from tdac_envs.drive.smallest_gap import required_gap
+from tdac_envs.drive.stepping import UNDISTURBED, UNLIMITED
 from tdac_envs.drive.task import (
     VARIATIONS,
     default_horizon,
@@ -82,17 +84,29 @@ class DriveSetup:
         """Whether the task may differ from episode to episode."""
         return self.variation != "nominal" or self.source is not None
 
+    @property
+    def required_gap(self) -> float:
+        """The gap to obstacles that the robot should keep, px or m."""
+        return required_gap(self.nominal.body_radius)
+
     def constants(self) -> NDArray[np.float64]:
-        """`Robot.constants` of the nominal task."""
+        """The constants of a robot on the nominal task, as in `stepping`."""
         raise NotImplementedError
 
-    def shared_constants(self, speed: float, reach: float, friction: float) -> Any:
+    def shared_constants(
+        self,
+        speed: float,
+        reach: float,
+        friction: float,
+        limits: Sequence[float] = UNLIMITED,
+    ) -> Any:
         """The entries of `constants` that all robots have, of the nominal task.
 
         Args:
             speed: Full speed of a wheel.
             reach: Largest range of the distance sensors.
             friction: Coefficient of friction between body and obstacles.
+            limits: From `MotionLimits.fractions`.
         """
         task = self.nominal
         return [
@@ -111,6 +125,7 @@ class DriveSetup:
             task.horizon,
             friction,
             *UNDISTURBED,
+            *limits,
         ]
 
     def draw(self, options: dict[str, Any], random: Random) -> tuple[Any, Random]:

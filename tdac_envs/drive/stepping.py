@@ -1,7 +1,7 @@
 """Parts of a compiled step shared by all environments: motion, reward, episode end.
 
 A robot's state is kept in a few arrays. The constants below are the indices of the
-entries that all environments have; `Map2DRobot` and `EPuckRobot` document them.
+entries that all environments have; `Map2DArrays` and `EPuckArrays` document them.
 """
 
 from __future__ import annotations
@@ -21,23 +21,27 @@ _TWO_PI = 2.0 * math.pi
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Robot = TypeVar("Robot", bound=tuple[NDArray[Any], ...])
-"""The arrays of a robot: `Map2DRobot` or `EPuckRobot`."""
+"""The arrays of a robot: `Map2DArrays` or `EPuckArrays`."""
 
 # Entries of `constants`.
 AXLE, MAX_SPEED, DT, RADIUS, RANGE_MAX, LAG, DELAY, STOPS, FULL_STEP = range(9)
 PROGRESS, GOAL, COLLISION, TIME, GOAL_X, GOAL_Y, TOLERANCE, HORIZON = range(9, 17)
 FRICTION, GAIN_LEFT, GAIN_RIGHT, DISTANCE_SCALE, TURN_SCALE = range(17, 22)
 WHEEL_LEFT, WHEEL_RIGHT = range(22, 24)
-N_CONSTANTS = 24
+MOST_CHANGE, MOST_SUM, MOST_DIFFERENCE, MOST_TURN_CHANGE = range(24, 28)
+N_CONSTANTS = 28
 # Entries of `state`.
 X, Y, HEADING, LEFT, RIGHT, SLIP_LEFT, SLIP_RIGHT, STEPS, FORWARD, TURN = range(10)
-N_STATE = 10
+RAMP_LEFT, RAMP_RIGHT = range(10, 12)
+N_STATE = 12
 # Entries of `outcome`.
 REWARD, TERMINATED, TRUNCATED, REACHED, TOUCHED, COLLISIONS, CLIPPED = range(7)
 GOAL_DISTANCE, REMAINING, CLEARANCE, CONTACT = range(7, 11)
 N_OUTCOME = 11
 UNDISTURBED = 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
 """Gains, scales and relative wheel radii in `constants` of a robot without errors."""
+UNLIMITED = 2.0, 2.0, 2.0, 4.0
+"""Limits in `constants` of a robot without any: no fraction changes by more than 2."""
 
 
 @subkernel
@@ -48,6 +52,7 @@ def clear(
     state[LEFT] = state[RIGHT] = 0.0
     state[SLIP_LEFT] = state[SLIP_RIGHT] = 1.0
     state[STEPS] = state[FORWARD] = state[TURN] = 0.0
+    state[RAMP_LEFT] = state[RAMP_RIGHT] = 0.0
     queue[:] = 0.0
     wheel_speeds[:] = 0.0
     outcome[:REMAINING] = outcome[CONTACT] = 0.0
@@ -111,6 +116,23 @@ def clip_unit(value: float) -> float:
 
 
 @subkernel
+def _within_limits(constants: Array, left: float, right: float) -> tuple[float, float]:
+    """The wheel speeds, scaled down so that the body is not too fast.
+
+    Both are multiplied by the same factor, so the robot drives the same curve: the body
+    keeps its curvature and is slower. The limits are sum and difference of the speeds.
+    """
+    both, apart = abs(left + right), abs(left - right)
+    if both > constants[MOST_SUM] or apart > constants[MOST_DIFFERENCE]:
+        part = min(
+            constants[MOST_SUM] / max(both, constants[MOST_SUM]),
+            constants[MOST_DIFFERENCE] / max(apart, constants[MOST_DIFFERENCE]),
+        )
+        return part * left, part * right
+    return left, right
+
+
+@subkernel
 def apply_command(
     constants: Array,
     state: Array,
@@ -118,16 +140,30 @@ def apply_command(
     wheel_speeds: NDArray[np.float32],
     outcome: Array,
 ) -> None:
-    """Computes the wheel speeds, as fractions, from the commanded ones."""
+    """Computes the wheel speeds, as fractions, from the commanded ones.
+
+    Clipped to [-1, 1], scaled to the limits of the body's speed and turn, delayed,
+    ramped to the limits of the accelerations, and smoothed by the lag. A limit of the
+    turn's acceleration takes as much from one wheel as it gives to the other.
+    """
     left, right = clip_unit(state[LEFT]), clip_unit(state[RIGHT])
     if left != state[LEFT] or right != state[RIGHT]:
         outcome[CLIPPED] += 1.0
+    left, right = _within_limits(constants, left, right)
     delay = int(constants[DELAY])
     if delay > 0:
         slot = int(state[STEPS]) % delay
         new_left, new_right = left, right
         left, right = queue[slot, 0], queue[slot, 1]
         queue[slot, 0], queue[slot, 1] = new_left, new_right
+    most = constants[MOST_CHANGE]
+    left = min(max(left, state[RAMP_LEFT] - most), state[RAMP_LEFT] + most)
+    right = min(max(right, state[RAMP_RIGHT] - most), state[RAMP_RIGHT] + most)
+    turn = left - right - (state[RAMP_LEFT] - state[RAMP_RIGHT])
+    if abs(turn) > constants[MOST_TURN_CHANGE]:
+        beyond = 0.5 * (turn - math.copysign(constants[MOST_TURN_CHANGE], turn))
+        left, right = left - beyond, right + beyond
+    state[RAMP_LEFT], state[RAMP_RIGHT] = left, right
     lag = constants[LAG]
     wheel_speeds[0] = left + lag * (wheel_speeds[0] - left)
     wheel_speeds[1] = right + lag * (wheel_speeds[1] - right)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -21,6 +21,9 @@ MAX_DRAWS = 1000
 AT_START = ("world_index", "generator", "difficulty")
 """Entries of the `info` of `reset` on a task set, in the splits `train` and `dev`, for
 the user alone: no controller sees them."""
+FAR_OFF = 2.0
+"""A goal tolerance above this many body radii is pointed out."""
+_TOLERANCE = "the tolerance"
 
 
 class Pose(NamedTuple):
@@ -112,6 +115,32 @@ def check_full_step(dt: float, speed: float, unit: str) -> None:
             f"a step of {dt:g} s at {speed:g} {unit}/s is {dt * speed:g} {unit} long; "
             f"the limit is {MAX_FULL_STEP:g}: use a shorter dt or slower wheels"
         )
+
+
+def radii_text(length: float, radius: float) -> str:
+    """Formats a length as a multiple of the body radius: `1.0 radii`."""
+    return f"{length / radius:.1f} radii"
+
+
+def with_tolerance_note(
+    notes: Sequence[str], task: Any, text: Callable[[float], str]
+) -> tuple[str, ...]:
+    """Notes on a task, with one on a tolerance above `FAR_OFF` radii.
+
+    Args:
+        notes: The other notes; they may have the note of an earlier tolerance.
+        task: The task.
+        text: Formats a length of the task.
+    """
+    others = tuple(note for note in notes if not note.startswith(_TOLERANCE))
+    if task.goal_tolerance <= FAR_OFF * task.body_radius:
+        return others
+    many = radii_text(task.goal_tolerance, task.body_radius)
+    note = (
+        f"{_TOLERANCE} of {text(task.goal_tolerance)} is {many}: the robot may stop "
+        "far from the goal; give a smaller one (--tolerance, goal_tolerance)"
+    )
+    return (*others, note)
 
 
 def wrap_heading(heading: float) -> float:

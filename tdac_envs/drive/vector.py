@@ -33,6 +33,7 @@ from tdac_envs.drive.batching import (
 )
 from tdac_envs.drive.disturbances import BatchDisturbances
 from tdac_envs.drive.frames import frames_of
+from tdac_envs.drive.gap_search import GapWatch
 
 Observations = dict[str, NDArray[np.float32]]
 Actions = NDArray[np.float32]
@@ -64,6 +65,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         infos_of: The infos of a step; see `tdac_envs.drive.batching.infos_of`.
         last_poses: True poses of all robots before the last `SAME_STEP` autoreset,
             shape (num_envs, 3).
+        last_observed_poses: The same as they were observed.
     """
 
     make: Callable[..., Any]
@@ -103,7 +105,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         )
         for constants, setup in zip(self.robots.constants, self.setups, strict=True):
             constants[:] = setup.constants()
-        self.last_poses = self.pose()
+        self.last_poses = self.last_observed_poses = self.pose()
         self.render_mode = render_mode
         self._frames = frames_of(render_mode, envs, self.robots, num_envs)
         self._slices = Slices(self.threads)
@@ -230,6 +232,10 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         poses: Array = self.robots.state[:, : stepping.HEADING + 1].copy()
         return poses
 
+    def observed_poses(self) -> Array:
+        """The poses as they are observed, shape (num_envs, 3)."""
+        return self.pose()
+
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """Random number generator of each robot."""
@@ -265,6 +271,11 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
     def _complete(self, observations: Observations, robots: Sequence[int]) -> None:
         """Adds observations that no kernel computes, and new noise for these robots."""
         raise NotImplementedError
+
+    def watch_gap(self, robot: int) -> GapWatch:
+        """A watch of a robot's smallest gap in the episode that has just begun."""
+        watch: GapWatch = self._first.watch_gap(self._addresses.words[robot])
+        return watch
 
     def _bind(self) -> None:
         """Collects the addresses of all arrays that the kernels read and write."""
@@ -319,8 +330,8 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
             self._assign(i, task)
             self._noises[i] = None if noise is self._randoms[i] else noise
         if self._disturbances.hidden:
-            constants = self.robots.constants
-            self._disturbances.hide(robots.tolist(), constants, self._noise)
+            constants, chosen = self.robots.constants, robots.tolist()
+            self._disturbances.hide(chosen, self.tasks, constants, self._noise)
 
     def _assign(self, i: int, task: Any) -> None:
         self._tasks_change = True
@@ -355,7 +366,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
         for i in over.tolist():
             final[i] = {key: value[i].copy() for key, value in observations.items()}
         last = self._infos(ended)
-        self.last_poses = self.pose()
+        self.last_poses, self.last_observed_poses = self.pose(), self.observed_poses()
         self._begin(ended, {})
         for key, seen in self._seen().items():
             observations[key][over] = seen[over]

@@ -24,6 +24,7 @@ from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.movables import Movables
 from tdac_envs.epuck.robot import EPuckArrays
 from tdac_envs.epuck.setup import EPuckSetup
+from tdac_envs.epuck.smallest_gap import note_gap
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
 
@@ -37,11 +38,14 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     ## Description
     The world is a Webots `.wbt` file. Coordinates are metres: x and y lie in the ground
     plane, and headings are measured counter-clockwise from +x. The robot is a disc of
-    37 mm radius with two wheels of 20 mm radius, 52 mm apart. It moves along the exact
-    arc of its wheel speeds, which are constant during a step. The disc swept along this
-    arc is tested exactly against the shapes of all solid objects, so no step can jump
-    through a thin wall. The world is surrounded by a fence, invisible to the sensors
-    (0.5 m from the outermost objects if there are no walls).
+    37 mm radius with two wheels of 20 mm radius and an effective axle of 57 mm: Webots'
+    wheels are cylinders of 5 mm width whose joints are 52 mm apart, and they stand on
+    their outer rims. (An e-puck with `kinematic TRUE` has an axle of 52 mm, as Webots
+    then moves it.) The robot moves along the exact arc of its wheel speeds, which are
+    constant during a step. The disc swept along this arc is tested exactly against the
+    shapes of all solid objects, so no step can jump through a thin wall. The world is
+    surrounded by a fence, invisible to the sensors (0.5 m from the outermost objects if
+    there are no walls).
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a
@@ -158,7 +162,11 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: Initial version. `on_collision="block"` changed before the first release.
+    * v0: Initial version. Changed before the first release: `on_collision="block"`;
+      the axle is the effective one, 57 mm instead of 52 mm, so that the robot turns
+      as in Webots; objects that are pushed have the ground friction of the world's
+      `contactProperties`, 1 by default instead of 0.5, and the robot the mass of its
+      version, 0.16 or 0.14 kg.
     """
 
     title = "TDAC-EPuck-v0"
@@ -167,6 +175,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         "render_fps": 31,
     }
     readings = "ps"
+    _note_gap = staticmethod(note_gap)
 
     def __init__(
         self,

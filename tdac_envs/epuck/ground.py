@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.epuck.gaps import clear_grid, nearest_gap
 from tdac_envs.epuck.prisms import FIXED, Owned, Prisms
-from tdac_envs.worlds.bodies import at_body_height, bodies, floor_under
+from tdac_envs.worlds.bodies import (
+    at_body_height,
+    bodies,
+    floor_under,
+    material_under,
+)
 from tdac_envs.worlds.footprint import Rectangle, frame
+from tdac_envs.worlds.materials import MATERIAL, friction_between
 from tdac_envs.worlds.world import Obstacle, Part, World
 
 Point = tuple[float, float]
@@ -27,6 +34,30 @@ _OPEN = 0.5
 _FENCE = 0.1
 _WIDEST = 0.1
 """Clearances are capped at this distance, m."""
+
+
+class Frictions(NamedTuple):
+    """Coulomb friction coefficients of a world whose objects can be pushed.
+
+    Attributes:
+        tyres: Of the robot's tyres on the ground.
+        sliding: Shape (k,): of each object on the ground.
+        touching: Shape (k + 1, k + 1): between objects; the last row and column are
+            the robot's body and everything fixed.
+    """
+
+    tyres: float
+    sliding: NDArray[np.float64]
+    touching: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, world: World, pushable: Iterable[Obstacle]) -> Frictions:
+        """The frictions of the objects that can be pushed in a world."""
+        names = [*(thing.material for thing in pushable), MATERIAL]
+        between = partial(friction_between, world.contacts)
+        ground = [between(name, material_under(world)) for name in names]
+        touching = [[between(one, other) for other in names] for one in names]
+        return cls(ground[-1], np.array(ground[:-1]), np.array(touching))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +75,7 @@ class Ground:
             part, at most 0.1 m; `clear[v, u]` is at left + u spacing, low + v spacing.
         centres: Shape (k, 2): initial centres of the objects that can be pushed, m.
         masses: Shape (k,): masses of these objects, kg.
+        frictions: Friction of these objects and of the robot.
     """
 
     world: World
@@ -55,6 +87,7 @@ class Ground:
     clear: NDArray[np.float64]
     centres: NDArray[np.float64]
     masses: NDArray[np.float64]
+    frictions: Frictions
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Ground.of, (self.world,)
@@ -114,7 +147,10 @@ def _ground(world: World) -> Ground:
     pushable = [thing for thing in things if id(thing) in owners]
     centres = np.array([_middle(thing) for thing in pushable]).reshape(-1, 2)
     masses = np.array([thing.mass for thing in pushable], np.float64)
-    return Ground(world, floor, things, solid, bounds, spacing, clear, centres, masses)
+    frictions = Frictions.of(world, pushable)
+    return Ground(
+        world, floor, things, solid, bounds, spacing, clear, centres, masses, frictions
+    )
 
 
 def _owners(things: tuple[Obstacle, ...]) -> dict[int, int]:

@@ -52,8 +52,8 @@ from tdac_envs.epuck.gaps import listed_at, nearest_of, remaining_path
 from tdac_envs.epuck.infrared import in_sight, sense
 from tdac_envs.epuck.prisms import Array, Index
 
-WHEEL_RADIUS, AXLE_LENGTH = 0.02, 0.052
-"""Wheel radius of an e-puck and distance between its wheels, m."""
+WHEEL_RADIUS = 0.02
+"""Wheel radius of an e-puck, m."""
 MOST_TURNED = 1e4
 """Limit of the observed wheel angles, rad."""
 
@@ -62,7 +62,7 @@ N_CONSTANTS = stepping.N_CONSTANTS + 5
 FLOOR, LEFT_END, LOW_END, SPACING, CELL = range(stepping.N_CONSTANTS, N_CONSTANTS)
 N_STATE = stepping.N_STATE + 2
 LEFT_TURNED, RIGHT_TURNED = range(stepping.N_STATE, N_STATE)
-# Indices of some of the arrays of `_arrays_at`.
+# Indices of some of the arrays of `arrays_at`.
 CONSTANTS, STATE, QUEUE, POSE, WHEEL_SPEEDS, TURNED, READINGS = range(11, 18)
 OUTCOME = 19
 
@@ -273,7 +273,7 @@ _drive = driving(stop_or_slide)
 
 
 @subkernel
-def _arrays_at(words: Words) -> Any:
+def arrays_at(words: Words) -> Any:
     """The arrays of a robot and its world, in the order of `_drive`'s arguments."""
     return (
         frozen(plane(words[0], np.float64)),
@@ -307,7 +307,7 @@ def begin(words: Words) -> None:
         words: Shape (20, 4), from `tdac_envs.core.addresses.Addresses`: the arrays of
             `Setup.world`, then those of the robot.
     """
-    _begin(*_arrays_at(words))
+    _begin(*arrays_at(words))
 
 
 @kernel
@@ -317,13 +317,13 @@ def drive(words: Words) -> None:
     Args:
         words: As for `begin`.
     """
-    _drive_to_contact(*_arrays_at(words))
+    _drive_to_contact(*arrays_at(words))
 
 
 @kernel
 def drive_or_slide(words: Words) -> None:
     """Runs one step of any robot without pushing; `words` as for `begin`."""
-    _drive(*_arrays_at(words))
+    _drive(*arrays_at(words))
 
 
 @kernel
@@ -341,7 +341,7 @@ def turn_wheels(words: Words) -> None:
 @kernel
 def finish(words: Words) -> None:
     """Completes the step after `turn_wheels`, once `outcome[TOUCHED]` is set."""
-    _finish(*_arrays_at(words))
+    _finish(*arrays_at(words))
 
 
 @kernel
@@ -363,7 +363,7 @@ def step_rows(batch: Words, rows: Words) -> None:
     poses, speeds = plane(batch[5], np.float32), plane(batch[6], np.float32)
     turned, readings = plane(batch[7], np.float32), plane(batch[8], np.float32)
     for row in rows:
-        own = _arrays_at(words[row])
+        own = arrays_at(words[row])
         give_command(over[row], commands[row], starts[row], own[STATE], own[OUTCOME])
         if over[row]:
             _begin(*own)

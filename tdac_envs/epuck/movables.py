@@ -67,12 +67,10 @@ class Movables:
             return
         kernels.turn_wheels(words)
         forward, turn = state[FORWARD : TURN + 1].tolist()
-        ground = task.ground
+        drive_arc = CommandedArc(forward, turn, task.dt)
         outcome[TOUCHED] = push(
-            self.solid, ground.solid, ground.centres, ground.masses,
-            state, self._speed, self.things, CommandedArc(forward, turn, task.dt),
-            ground.world.friction,
-        )  # fmt: skip
+            self.solid, task.ground, state, self._speed, self.things, drive_arc
+        )
         self._carry()
         kernels.finish(words)
 

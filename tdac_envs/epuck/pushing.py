@@ -12,24 +12,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pymunk
-from numpy.typing import NDArray
 
-from tdac_envs.epuck.kernels import AXLE_LENGTH
+from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.prisms import FIXED, MID_X, MID_Y, REACH, Array, Prisms
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
-ROBOT_MASS = 0.16
-"""Mass of an e-puck with its two wheels, kg."""
-GRIP, SLIDE = 1.0, 0.5
-"""Coulomb friction coefficients on the ground: of the robot's tyres (Webots' default)
-and of objects."""
 _SUBSTEP = 0.002
 _GRAVITY = 9.81
 _STILL = 1e-5
 _LEAST = 0.05
 # Bound on how far anything moves in a step, m.
 _NEAR = 0.05
-_ROBOT = 1
+# Collision types: everything fixed, the robot's hull, the first object.
+_FIXED, _ROBOT, _FIRST = range(3)
 
 
 class CommandedArc(NamedTuple):
@@ -83,28 +78,22 @@ def is_near(solid: Prisms, state: Array, things: Array, reach: float) -> bool:
 
 def push(
     solid: Prisms,
-    origin: Prisms,
-    centres: Array,
-    masses: Array,
+    ground: Ground,
     state: Array,
     speed: Array,
     things: Array,
     drive: CommandedArc,
-    friction: float,
 ) -> bool:
     """Simulates one step with physics.
 
     Args:
         solid: Solid parts at their current positions.
-        origin: Solid parts at their initial positions.
-        centres: Shape (k, 2): initial centres of the objects, m.
-        masses: Shape (k,): masses of the objects, kg.
+        ground: The world, with the objects at their initial positions.
         state: Begins with the robot's x, y and heading; overwritten.
         speed: Shape (3,): the robot's velocity (m/s) and turn rate (rad/s);
             overwritten.
         things: Shape (k, 6), as for `is_near`; overwritten.
         drive: Commanded motion of the robot.
-        friction: Coulomb friction coefficient of contacts.
 
     Returns:
         Whether the robot's body touched anything.
@@ -113,16 +102,11 @@ def push(
     space.iterations = 30
     # pymunk's defaults assume pixels, not metres.
     space.collision_slop, space.collision_bias = 1e-6, 0.0
-    movables = [
-        _add_movable(space, origin, k, centres[k], float(masses[k]), things[k])
-        for k in range(len(things))
-    ]
+    movables = [_add_movable(space, ground, k, row) for k, row in enumerate(things)]
     _add_fixed(space, solid, state)
-    robot, wheels = _add_robot(space, state, speed)
+    robot, wheels = _add_robot(space, ground, state, speed)
     touched: list[bool] = []
-    # The engine multiplies the coefficients of two shapes.
-    for shape in space.shapes:
-        shape.friction = math.sqrt(friction)
+    _set_frictions(space, ground.frictions.touching)
     space.on_collision(_ROBOT, None, post_solve=lambda *_: touched.append(True))
     count = max(math.ceil(drive.dt / _SUBSTEP), 1)
     for _ in range(count):
@@ -155,10 +139,28 @@ def _set_wheel_velocity(
     wheels.angular_velocity = turn / dt
 
 
-def _add_robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
+def _set_frictions(space: Any, touching: Array) -> None:
+    """Sets the friction of each pair of bodies; see `Frictions.touching`."""
+    first = float(touching[0, 0])
+    if (touching == first).all():  # faster than a call for each contact
+        for shape in space.shapes:  # the engine multiplies those of two shapes
+            shape.friction = math.sqrt(first)
+        return
+
+    def rub(arbiter: Any, *_: Any) -> None:
+        # Everything fixed and the robot are the last entry.
+        one, other = (max(s.collision_type - _FIRST, -1) for s in arbiter.shapes)
+        arbiter.friction = touching[one, other]
+
+    space.on_collision(None, None, pre_solve=rub)
+
+
+def _add_robot(
+    space: Any, ground: Ground, state: Array, speed: Array
+) -> tuple[Any, Any]:
     """Adds the robot, and a kinematic body that models its wheels by friction."""
-    moment = pymunk.moment_for_circle(ROBOT_MASS, 0.0, BODY_RADIUS)
-    robot = pymunk.Body(ROBOT_MASS, moment)
+    mass, axle = ground.world.robot.mass, ground.world.robot.axle_length
+    robot = pymunk.Body(mass, pymunk.moment_for_circle(mass, 0.0, BODY_RADIUS))
     robot.position, robot.angle = (float(state[0]), float(state[1])), float(state[2])
     robot.velocity, robot.angular_velocity = (
         (float(speed[0]), float(speed[1])),
@@ -168,17 +170,15 @@ def _add_robot(space: Any, state: Array, speed: Array) -> tuple[Any, Any]:
     hull.collision_type = _ROBOT
     wheels = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
     wheels.position, wheels.angle = robot.position, robot.angle
-    pull = GRIP * ROBOT_MASS * _GRAVITY
-    space.add(
-        robot, hull, wheels, *_friction(wheels, robot, pull, pull * AXLE_LENGTH / 2)
-    )
+    pull = ground.frictions.tyres * mass * _GRAVITY
+    space.add(robot, hull, wheels, *_friction(wheels, robot, pull, pull * axle / 2))
     return robot, wheels
 
 
-def _add_movable(
-    space: Any, origin: Prisms, number: int, centre: Array, mass: float, row: Array
-) -> PushedObject:
+def _add_movable(space: Any, ground: Ground, number: int, row: Array) -> PushedObject:
     """Adds an object that can be pushed, with friction on the ground."""
+    origin, centre = ground.solid, ground.centres[number]
+    mass = float(ground.masses[number])
     outlines: list[tuple[Array, float]] = []
     for part in np.flatnonzero(origin.owner == number).tolist():
         radius = float(origin.extent[part, 3])
@@ -194,8 +194,8 @@ def _add_movable(
     body.angular_velocity = float(row[5])
     space.add(body)
     for at, radius in outlines:
-        _add_shape(space, body, at, radius)
-    force = SLIDE * mass * _GRAVITY
+        _add_shape(space, body, at, radius, _FIRST + number)
+    force = float(ground.frictions.sliding[number]) * mass * _GRAVITY
     slide, spin = _friction(space.static_body, body, force, force * spread)
     space.add(slide, spin)
     return PushedObject(body, slide, spin, force, spread)
@@ -232,13 +232,15 @@ def _add_fixed(space: Any, solid: Prisms, state: Array) -> None:
         off = np.hypot(movers[:, 0] - x, movers[:, 1] - y)
         if (off - movers[:, 2] - reach < _NEAR).any():
             radius = float(solid.extent[part, 3])
-            _add_shape(space, space.static_body, solid.outline(part), radius)
+            outline = solid.outline(part)
+            _add_shape(space, space.static_body, outline, radius, _FIXED)
 
 
-def _add_shape(space: Any, body: Any, at: NDArray[np.float64], radius: float) -> None:
+def _add_shape(space: Any, body: Any, at: Array, radius: float, kind: int) -> None:
     if len(at) == 1:
         x, y = at[0].tolist()
         shape: Any = pymunk.Circle(body, radius, (x, y))
     else:
         shape = pymunk.Poly(body, [(x, y) for x, y in at.tolist()])
+    shape.collision_type = kind
     space.add(shape)

@@ -18,23 +18,24 @@ Observed = NDArray[np.float32]
 class EPuckArrays(NamedTuple):
     """Arrays of one robot, or of many robots with an additional first axis.
 
-    `kernels._arrays_at` and the indices beside it follow the order of the fields.
+    `kernels.arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (29,), float64: axle length (m), full wheel speed (rad/s), dt
-            (s), body radius, sensor range (m), fraction of a wheel's speed that remains
-            after one step, delay (steps), whether a contact ends the
-            episode, distance of a step at full speed (m); reward weights: progress,
+        constants: Shape (33,), float64: effective axle (m), full wheel speed (rad/s),
+            dt (s), body radius, sensor range (m), fraction of a wheel's speed that
+            remains after one step, delay (steps), whether a contact ends the episode,
+            distance of a step at full speed (m); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (m), horizon (steps);
             coefficient of friction between body and solids; gains of the left and
             right wheel; scales of the measured distance and turn; relative radii of the
-            left and right wheel; height of the floor, x and y of the lower left corner
-            of the path field and of the cells, spacing of the field, width of the cells
-            (m).
-        state: Shape (12,), float64: x, y (m), heading (rad); unclipped commands of the
+            left and right wheel; limits of the fractions, not used; height of the
+            floor, x and y of the lower left corner of the path field and of the cells,
+            spacing of the field, width of the cells (m).
+        state: Shape (14,), float64: x, y (m), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
             over ground to wheel speed; steps so far; length (m) and turn (rad) of the
-            last step's arc, as driven by the wheels; wheel angles (rad).
+            last step's arc, as driven by the wheels; fractions of the left and right
+            wheel before the lag; wheel angles (rad).
         queue: Shape (delay, 2), float64: delayed commands, a ring buffer.
         pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from tdac_envs.drawing.backdrop import CLOSE_UP, CloseUpWindow
 from tdac_envs.drawing.canvas import Canvas, Image
 from tdac_envs.drawing.runs import Legend, draw_runs
+from tdac_envs.drive.task import radii_text
 from tdac_envs.epuck.ground import Bounds
 from tdac_envs.epuck.picture import SMALLEST_BODY, draw_task
 from tdac_envs.epuck.task import EPuckTask
@@ -40,7 +41,9 @@ def trajectory_picture(
     """
     ends = [*outcomes, *[""] * (len(trajectories) - len(outcomes))]
     width = _columns(task.ground.bounds) - _SCALE
-    legend = Legend.of(ends, labels, path=True, width=width)
+    near = task.goal_tolerance
+    goal = f"goal within {1e3 * near:g} mm ({radii_text(near, BODY_RADIUS)})"
+    legend = Legend.of(ends, labels, path=True, width=width, goal=goal)
     view = task_view(task, task.ground.bounds, strip=max(legend.height, 46))
     view.scale_bar()
     chart = WorldChart(view)

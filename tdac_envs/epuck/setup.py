@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.drive.setup import DriveSetup
-from tdac_envs.drive.stepping import FRICTION
+from tdac_envs.drive.stepping import AXLE, FRICTION
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import FLOOR, N_CONSTANTS
 from tdac_envs.epuck.nearby import NearbyParts, surroundings
@@ -42,7 +42,7 @@ class EPuckSetup(DriveSetup):
         return surroundings(task.ground, self.webots, self.goal_visible, reach)
 
     def constants(self) -> NDArray[np.float64]:
-        """`EPuckRobot.constants` of the nominal task."""
+        """`EPuckArrays.constants` of the nominal task."""
         task = self.nominal
         friction = task.ground.world.friction
         shared = self.shared_constants(task.max_wheel_speed, RANGE, friction)
@@ -51,8 +51,9 @@ class EPuckSetup(DriveSetup):
         return constants
 
     def enter(self, constants: NDArray[np.float64], task: EPuckTask) -> None:
-        """Sets what `EPuckRobot.constants` tells of the world of a task."""
+        """Sets what `EPuckArrays.constants` tells of the world of a task."""
         ground = task.ground
+        constants[AXLE] = task.axle_length
         constants[FRICTION] = ground.world.friction
         constants[FLOOR:] = (
             ground.floor,

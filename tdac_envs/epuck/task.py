@@ -27,7 +27,7 @@ from tdac_envs.drive.task import (
 )
 from tdac_envs.epuck.contact import first_touch
 from tdac_envs.epuck.ground import Ground, Point
-from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.epuck.paths import (
     at_goal,
     check_body_fits,
@@ -87,8 +87,8 @@ class EPuckTask:
 
     @property
     def axle_length(self) -> float:
-        """Distance between the wheels, m."""
-        return AXLE_LENGTH
+        """Effective axle of the robot in this world, m; see `EPuck.axle_length`."""
+        return self.ground.world.robot.axle_length
 
     @property
     def full_step(self) -> float:

@@ -12,7 +12,7 @@ from tdac_envs.core.compiled import kernel, read_only, subkernel
 from tdac_envs.grid.grid import BoolGrid, body_free, clearance
 from tdac_envs.grid.plan import Path, plan_path
 from tdac_envs.ladder.worlds import LadderWorld
-from tdac_envs.map2d.rays import LeapGrid, cast_ray, fan
+from tdac_envs.map2d.rays import LeapGrid, cast_ray, directions_of
 
 Pixel = tuple[int, int]
 
@@ -34,13 +34,11 @@ class RangeSensor(NamedTuple):
     """Range rays.
 
     Attributes:
-        n_rays: Their number.
-        field_of_view: Angle between the first and the last ray, rad.
+        angles: Their angles from the heading, rad.
         range_max: Their range, px.
     """
 
-    n_rays: int
-    field_of_view: float
+    angles: NDArray[np.float64]
     range_max: float
 
 
@@ -56,7 +54,7 @@ def dead_ends(world: LadderWorld, radius: float, sensor: RangeSensor) -> DeadEnd
         radius: Radius of the disc, px.
         sensor: Its sensor.
     """
-    rays = read_only(fan(sensor.field_of_view, sensor.n_rays))
+    rays = read_only(directions_of(sensor.angles))
     known = np.zeros_like(world.cells)
     fits = body_free(world.terrain.clear, radius)
     goal = (round(world.goal[0]), round(world.goal[1]))

@@ -88,7 +88,8 @@ class TaskSetEnv(DrivenEnv):
         return task
 
     def _observation(self) -> Observation:
-        return self.view.seen(super()._observation(), self.pose(), self._anchor)
+        whole = super()._observation()
+        return self.view.seen(whole, self.observed_pose(), self._anchor)
 
 
 class LadderEnv(TaskSetEnv, Map2DEnv):
@@ -186,6 +187,9 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
             **_shared(task_set, source, reward_weights),
             range_noise=file.disturbances.range_noise,
             range_dropout=file.disturbances.range_dropout,
+            range_min=file.disturbances.range_min,
+            reception=file.disturbances.reception,
+            max_acceleration=file.disturbances.max_acceleration,
         )
         self._prepare(setup, render_mode)
         self._look(task_set, bool(privileged))

@@ -76,7 +76,7 @@ class SetView:
 
         Args:
             whole: What the environment of one world observes.
-            poses: True poses, shape (..., 3).
+            poses: The poses as they are observed, in the world, shape (..., 3).
             anchors: See `anchor`, shape (..., 7).
         """
         own = {**whole, **self.placed(poses, anchors)}

@@ -162,7 +162,7 @@ def _choose(
         clear: `Terrain.padded_clear`.
         traits: `Movers.traits`.
         now: `Movers.now`.
-        constants: `Robot.constants`.
+        constants: `Map2DArrays.constants`.
         pose: Pose of the robot, px and rad.
         velocity: Its velocity in the last step, px/s.
         goal: px.

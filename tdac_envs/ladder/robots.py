@@ -9,8 +9,9 @@ from pydantic import Field
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.drive.disturbances import MOST_HIDDEN
 from tdac_envs.epuck.infrared import RANGE
-from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.world import AXLE_LENGTH
 
 
 class EPuckRobotParams(StrictModel):

@@ -20,7 +20,7 @@ from tdac_envs.core.errors import TaskError, first_problem, hint, one_line_reaso
 from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.core.strict_model import StrictModel
-from tdac_envs.drive.disturbances import MOST_HIDDEN, Disturbances
+from tdac_envs.drive.disturbances import Disturbances
 from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.ladder.files.spec import FilesSpec
 from tdac_envs.ladder.generators.plates import Plates
@@ -28,6 +28,7 @@ from tdac_envs.ladder.generators.registry import AnyParameters
 from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.plate_worlds import PlatesSpec
 from tdac_envs.ladder.robots import EPuckRobotParams
+from tdac_envs.ladder.set_disturbances import ONLY_ON_MAPS, DisturbanceSpec
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
 
@@ -36,8 +37,12 @@ Observed = Literal[
 ]
 """Observation keys that a set may have."""
 _ALL_ROBOTS = {"pose", "goal", "wheel_speeds", "odometry"}
+_CERTAIN = {
+    *("motor_lag", "delay", "pose_delay", "scan_delay"),
+    *("max_acceleration", "range_min", "pose_correlation"),
+}
+"""Disturbances that draw no numbers."""
 Split = Literal["train", "dev", "test", "hidden"]
-Share = Annotated[float, Field(ge=0, le=1)]
 LEVEL_ROBOT = RobotParams(
     radius=8.0,
     axle_length=11.0,
@@ -89,20 +94,7 @@ class AdmissionSpec(StrictModel):
     tries: int = Field(200, ge=1, le=100_000, description="Most drafts of a world.")
 
 
-class DisturbanceSpec(StrictModel):
-    """The disturbances of the set; `docs/disturbances.md` defines them."""
-
-    wheel_gains: float = Field(0.0, ge=0, le=MOST_HIDDEN, description="Bound.")
-    wheel_slip: Share = Field(
-        0.0, description="Relative SD for a step of 0.1 s; SD · √(0.1 s / dt) for dt."
-    )
-    axle_error: float = Field(0.0, ge=0, le=MOST_HIDDEN, description="Bound.")
-    range_noise: Share = Field(0.0, description="Relative SD.")
-    range_dropout: Share = Field(0.0, description="Probability of each ray.")
-    odometry_scale: Share = Field(0.0, description="SD of both scale errors.")
-    odometry_noise: Share = Field(0.0, description="Relative SD.")
-    motor_lag: float = Field(0.0, ge=0, le=60, description="Time constant, s.")
-    delay: int = Field(0, ge=0, le=100, description="Steps until an action acts.")
+MOST_CONTACTS = 0.05
 
 
 class CpuSpec(StrictModel):
@@ -161,6 +153,12 @@ class SetFile(StrictModel):
     bar: float = Field(
         0.95, gt=0.05, lt=1, description="Success rate of a verified controller."
     )
+    most_contacts: float = Field(
+        MOST_CONTACTS,
+        gt=0.01,
+        lt=1,
+        description="Share of episodes with a contact at which none is verified.",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -177,6 +175,12 @@ class SetFile(StrictModel):
             raise ValueError("worlds: expected generators, or a folder of maps")
         if self.files is not None and self.admission != AdmissionSpec():
             raise ValueError("`admission` is for generators, not for worlds of files")
+        try:
+            reception = own.reception
+        except TaskError as error:
+            raise ValueError(str(error)) from None
+        if reception.has_errors and "pose" not in self.observed:
+            raise ValueError("errors of the pose need `pose` in `observed`")
         if "odometry" not in self.observed and (
             own.odometry_scale or own.odometry_noise
         ):
@@ -196,7 +200,7 @@ class SetFile(StrictModel):
     @property
     def _is_random(self) -> bool:
         """Whether two episodes in a world differ."""
-        values = self.disturbances.model_dump(exclude={"motor_lag", "delay"})
+        values = self.disturbances.model_dump(exclude=_CERTAIN)
         return any(values.values()) or bool(self.movers)
 
     def _check_robot(self) -> None:
@@ -211,11 +215,14 @@ class SetFile(StrictModel):
         for key in self.observed:
             if key not in _ALL_ROBOTS | own:
                 raise ValueError(f"{whose} does not observe `{key}`")
-        rays = self.disturbances.range_noise or self.disturbances.range_dropout
         if epuck and self.movers:
             raise ValueError("`movers` are for robots on maps")
-        if epuck and rays:
-            raise ValueError("an e-puck has no ranges; expected `robot.sensor_noise`")
+        for name in ONLY_ON_MAPS:
+            if epuck and getattr(self.disturbances, name):
+                raise ValueError(
+                    f"disturbances.{name}: for robots on maps; an e-puck has "
+                    "`robot.sensor_noise` and `robot.wheel_radius_error`"
+                )
 
     @property
     def unit(self) -> Literal["px", "m"]:
@@ -253,7 +260,9 @@ class SetFile(StrictModel):
             odometry_scale=own.odometry_scale,
             odometry_noise=own.odometry_noise,
             wheel_radius_error=(
-                robot.wheel_radius_error if isinstance(robot, EPuckRobotParams) else 0.0
+                robot.wheel_radius_error
+                if isinstance(robot, EPuckRobotParams)
+                else own.wheel_radius_error
             ),
         )
 
@@ -291,9 +300,13 @@ class SetFile(StrictModel):
                 the place of the files.
         """
         out = {"description", "files"}
+        # Such sets keep the hash that they had before.
         if not self.movers:
-            out.add("movers")  # Such sets keep the hash that they had before.
+            out.add("movers")
+        if self.most_contacts == MOST_CONTACTS:
+            out.add("most_contacts")
         values = self.model_dump(mode="json", by_alias=True, exclude=out)
+        values["disturbances"] = self.disturbances.written()
         if self.files is not None:
             splits = list(self.files.splits)
             values["files"] = {"sha256": files_sha256, "splits": splits}

@@ -40,7 +40,7 @@ class TaskSetVectorEnv(DrivenVectorEnv):
         """Starts episodes, as `DrivenVectorEnv.reset` does."""
         whole, infos = super().reset(seed=seed, options=options)
         poses, none = self.pose(), np.zeros(self.num_envs, np.bool_)
-        seen = self.view.seen(whole, poses, self._anchors)
+        seen = self.view.seen(whole, self.observed_poses(), self._anchors)
         begun = infos[f"_{ALWAYS[0]}"]
         return seen, self.view.infos(infos, poses, none) | self._world_facts(begun)
 
@@ -49,12 +49,12 @@ class TaskSetVectorEnv(DrivenVectorEnv):
         before, begun = self._anchors.copy(), self._over.copy()
         whole, rewards, terminated, truncated, infos = super().step(actions)
         ended, view, poses = terminated | truncated, self.view, self.pose()
-        seen = view.seen(whole, poses, self._anchors)
+        seen = view.seen(whole, self.observed_poses(), self._anchors)
         if "final_obs" not in infos:
             infos = view.infos(infos, poses, ended) | self._world_facts(begun)
             return seen, rewards, terminated, truncated, infos
         final = infos.pop("final_obs")
-        placed = view.placed(self.last_poses, before)
+        placed = view.placed(self.last_observed_poses, before)
         for i in np.flatnonzero(ended).tolist():
             own = {key: values[i].copy() for key, values in placed.items()}
             final[i] = view.chosen({**final[i], **own})

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
 
 Array = NDArray[np.float64]
 
@@ -59,11 +59,13 @@ class WheelReckoning(DeadReckoning):
     """Adds up the angles of an e-puck's wheels; poses in m and rad.
 
     Args:
+        axle: Effective axle of the robot, or of each robot of a batch, m.
         robots: See `DeadReckoning`.
     """
 
-    def __init__(self, robots: int | None = None) -> None:
+    def __init__(self, axle: ArrayLike, robots: int | None = None) -> None:
         super().__init__(robots)
+        self._axle = np.asarray(axle, np.float64)
         self._angles = np.zeros((2,) if robots is None else (robots, 2))
 
     def follow(self, odometry: ArrayLike, steps: ArrayLike) -> Array:
@@ -76,12 +78,25 @@ class WheelReckoning(DeadReckoning):
         """The poses one step further, which are not kept; see `follow`."""
         turned = np.asarray(odometry, np.float64) - self._angles
         left, right = np.moveaxis(WHEEL_RADIUS * turned, -1, 0)
-        distance, turn = (left + right) / 2.0, (right - left) / AXLE_LENGTH
+        distance, turn = (left + right) / 2.0, (right - left) / self._axle
         return super().ahead(np.stack([distance, turn], axis=-1))
 
 
-SOURCES = {"odometry": DeadReckoning, "encoders": WheelReckoning}
-"""What adds up to a pose, by the key of the observation; the first one is used."""
+SOURCES = ("odometry", "encoders")
+"""Keys of observations that add up to a pose; the first one is used."""
+
+
+def reckoning(source: str, axle: ArrayLike, robots: int | None = None) -> DeadReckoning:
+    """Returns the object that adds up the observations of one of `SOURCES`.
+
+    Args:
+        source: The key.
+        axle: See `WheelReckoning`.
+        robots: See `DeadReckoning`.
+    """
+    if source == "encoders":
+        return WheelReckoning(axle, robots)
+    return DeadReckoning(robots)
 
 
 def source_of(own: spaces.Space[object]) -> str | None:

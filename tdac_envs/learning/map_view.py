@@ -146,4 +146,7 @@ class MapView(
         """See the class."""
         plain: Any = self.unwrapped
         self._views.refresh([plain.task])
-        return {**observation, "map": self._views.around(plain.pose()[None])[0]}
+        return {
+            **observation,
+            "map": self._views.around(plain.observed_pose()[None])[0],
+        }

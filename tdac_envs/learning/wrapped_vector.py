@@ -17,7 +17,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.slices import Slices
 from tdac_envs.drive.stepping import STEPS
 from tdac_envs.drive.vector import DrivenVectorEnv, Observations
-from tdac_envs.learning.dead_reckoning import SOURCES, DeadReckoning, source_of
+from tdac_envs.learning.dead_reckoning import DeadReckoning, reckoning, source_of
 from tdac_envs.learning.guidance import GuidedRoute, look_ahead, route_to_goal
 from tdac_envs.learning.map_view import MapViews, check_map_view, viewed_space
 from tdac_envs.learning.wrappers import (
@@ -165,7 +165,8 @@ class WrappedVectorEnv(VectorWrapper):
             self._space = frame.relative_space(own)
             if lacks_pose(own):
                 self._source = str(source_of(own))
-                made = SOURCES[self._source](self.num_envs)
+                axles = [setup.nominal.axle_length for setup in setups]
+                made = reckoning(self._source, axles, self.num_envs)
                 self._reckoned = self._reckoned or made
             return lambda seen, _: frame.goal_relative(seen)
         if name == "closeness":
@@ -202,7 +203,7 @@ class WrappedVectorEnv(VectorWrapper):
             steps = self.batch.robots.state[:, STEPS]
             pose: Any = self._reckoned.follow(observations[self._source], steps)
             observations = {**observations, "pose": pose}
-        return self._wrapped(observations, self.batch.pose())
+        return self._wrapped(observations, self.batch.observed_poses())
 
     def _wrapped(self, observations: Observations, poses: Array) -> Seen:
         seen: Any = observations
@@ -221,7 +222,7 @@ class WrappedVectorEnv(VectorWrapper):
         if self._reckoned is not None:
             final_pose: Any = self._reckoned.ahead(last[self._source])
             last["pose"] = final_pose
-        seen = self._wrapped(last, self.batch.last_poses)
+        seen = self._wrapped(last, self.batch.last_observed_poses)
         for i in over:
             single = not isinstance(seen, dict)
             final[i] = seen[i] if single else {key: v[i] for key, v in seen.items()}

@@ -27,7 +27,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.stepping import STEPS
 from tdac_envs.epuck.infrared import LARGEST
-from tdac_envs.learning.dead_reckoning import SOURCES, source_of
+from tdac_envs.learning.dead_reckoning import SOURCES, reckoning, source_of
 from tdac_envs.learning.guidance import REACH, GuidedRoute, route_to_goal
 from tdac_envs.learning.map_view import MapView
 from tdac_envs.map2d.task import Map2DTask
@@ -239,7 +239,9 @@ class GoalRelativeObservation(
         self.observation_space = space  # type: ignore[assignment]
         self._source = source_of(env.observation_space)
         lacks = self._source is not None and lacks_pose(env.observation_space)
-        self._reckoned = SOURCES[str(self._source)]() if lacks else None
+        plain: Any = env.unwrapped
+        axle = plain.nominal.axle_length
+        self._reckoned = reckoning(str(self._source), axle) if lacks else None
 
     def observation(self, observation: Observation) -> Observation:
         """See the class."""
@@ -318,7 +320,7 @@ class Guidance(
         plain: Any = self.unwrapped
         if self._route is None or plain.task is not self._task:
             self._task, self._route = plain.task, route_to_goal(plain.task, self.reach)
-        poses = plain.pose()[None]
+        poses = plain.observed_pose()[None]
         return {**observation, "guidance": self.frame.guidance(self._route, poses)[0]}
 
     def __getstate__(self) -> dict[str, Any]:

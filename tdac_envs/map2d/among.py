@@ -68,6 +68,7 @@ from tdac_envs.map2d.kernels import (
     drive_step,
     ground_speeds,
     observe,
+    scanner_at,
 )
 from tdac_envs.map2d.rays import LeapGrid
 from tdac_envs.movers.state import (
@@ -92,7 +93,7 @@ _slide = sliding(arc_contact_on, near_normals_on, note_arc)
 
 
 @subkernel
-def _movers_at(words: Words) -> Any:
+def movers_at(words: Words) -> Any:
     """The arrays of the movers, in the order of `Movers`."""
     return (
         plane(words[N_ROBOT], np.float64),
@@ -256,9 +257,10 @@ def _drive_among(
     observe(
         leaps, clear, field, directions, constants, state, pose, ranges, outcome
     )  # fmt: skip
+    at_x, at_y = scanner_at(constants, state[X], state[Y], state[HEADING])
     end_ranges_at_discs(
-        directions, traits, now, state[X], state[Y], state[HEADING],
-        constants[RANGE_MAX], ranges,
+        directions, traits, now, at_x, at_y, state[HEADING], constants[RANGE_MAX],
+        ranges,
     )  # fmt: skip
     finish_step(constants, state, outcome, before)
 
@@ -286,9 +288,10 @@ def _begin_among(
         ranges, outcome,
     )  # fmt: skip
     past[:, 0], past[:, 1] = state[X], state[Y]
+    at_x, at_y = scanner_at(constants, state[X], state[Y], state[HEADING])
     end_ranges_at_discs(
-        directions, traits, now, state[X], state[Y], state[HEADING],
-        constants[RANGE_MAX], ranges,
+        directions, traits, now, at_x, at_y, state[HEADING], constants[RANGE_MAX],
+        ranges,
     )  # fmt: skip
 
 
@@ -316,13 +319,13 @@ def begin_among(words: Words) -> None:
     Args:
         words: Shape (24, 4): those of `kernels.begin`, then those of `Movers`.
     """
-    _begin(arrays_at(words), _movers_at(words))
+    _begin(arrays_at(words), movers_at(words))
 
 
 @kernel
 def drive_among(words: Words) -> None:
     """Runs one step of a robot among movers; `words` as for `begin_among`."""
-    _drive(arrays_at(words), _movers_at(words))
+    _drive(arrays_at(words), movers_at(words))
 
 
 @kernel
@@ -345,7 +348,7 @@ def step_rows_among(batch: Words, rows: Words) -> None:
     pieces = np.empty((most, MOST_PIECES + 2, N_PIECE))
     path = np.empty((MOST_ARCS, N_PIECE))
     for row in rows:
-        own, all_movers = arrays_at(words[row]), _movers_at(words[row])
+        own, all_movers = arrays_at(words[row]), movers_at(words[row])
         movers: Any = all_movers[:3] + (pieces, path) + all_movers[5:]  # noqa: RUF005
         give_command(over[row], commands[row], starts[row], own[STATE], own[OUTCOME])
         if over[row]:

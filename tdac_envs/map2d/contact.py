@@ -22,7 +22,7 @@ DEEPEST = 1e-7
 # The search for a contact stops at this distance, px.
 _CLOSE = 1e-9
 # Margin for the float32 rounding of the clearance field, px.
-_ROUNDING = 1e-3
+ROUNDING = 1e-3
 
 
 @kernel
@@ -72,8 +72,8 @@ def contact_before(
     if length == 0.0:
         return 2.0
     # The arc is free within the clearance of each end.
-    open_at_start = max(_room(clear, x, y) - radius, 0.0)
-    open_at_end = max(_room(clear, end_x, end_y) - radius, 0.0)
+    open_at_start = max(least_room(clear, x, y) - radius, 0.0)
+    open_at_end = max(least_room(clear, end_x, end_y) - radius, 0.0)
     if open_at_start + open_at_end > length:
         return 2.0
     best, gap = _scan(clear, x, y, heading, forward, turn, radius, 0.0)
@@ -104,7 +104,7 @@ def _scan(
     best = abs(forward)
     # Bound on how far the arc leaves the bounding box of its two ends.
     swing = 0.5 * best * min(1.0, 0.25 * abs(turn))
-    reach = radius + swing + _ROUNDING
+    reach = radius + swing + ROUNDING
     left, right = min(x, end_x), max(x, end_x)
     top, bottom = min(y, end_y), max(y, end_y)
     first_row = max(math.ceil(top - reach - 0.5), -1)
@@ -119,10 +119,10 @@ def _scan(
             room = clear[j + 1, i + 1]
             if room > 0.0:
                 # No square in this row can be nearer than the clearance.
-                i += max(math.ceil(room + 0.5 - _ROUNDING), 1)
+                i += max(math.ceil(room + 0.5 - ROUNDING), 1)
                 continue
-            if _is_edge(clear, i + 1, j + 1):
-                gap = math.sqrt(_square_distance2(x, y, i, j)) - radius
+            if is_edge(clear, i + 1, j + 1):
+                gap = math.sqrt(square_distance2(x, y, i, j)) - radius
                 nearest = min(nearest, gap)
                 if gap < best:
                     best = _travel(
@@ -169,7 +169,7 @@ def near_normals(
             inside = -1 <= i < clear.shape[1] - 1 and -1 <= j < clear.shape[0] - 1
             if not inside or clear[j + 1, i + 1] > 0.0 or count == normals.shape[0]:
                 continue
-            distance = math.sqrt(_square_distance2(x, y, i, j))
+            distance = math.sqrt(square_distance2(x, y, i, j))
             if 0.0 < distance <= reach:
                 normals[count, 0] = (x - max(i - 0.5, min(x, i + 0.5))) / distance
                 normals[count, 1] = (y - max(j - 0.5, min(y, j + 0.5))) / distance
@@ -209,7 +209,8 @@ def opposing_normal(
 
 
 @subkernel
-def _square_distance2(x: float, y: float, i: int, j: int) -> float:
+def square_distance2(x: float, y: float, i: int, j: int) -> float:
+    """Square of the distance from a point to pixel (i, j)."""
     dx = max(abs(x - i) - 0.5, 0.0)
     dy = max(abs(y - j) - 0.5, 0.0)
     return dx * dx + dy * dy
@@ -222,24 +223,35 @@ def has_room(clear: FloatGrid, x: float, y: float, radius: float) -> bool:
         for i in range(math.ceil(x - radius - 0.5), math.floor(x + radius + 0.5) + 1):
             inside = -1 <= i < clear.shape[1] - 1 and -1 <= j < clear.shape[0] - 1
             occupied = not inside or clear[j + 1, i + 1] == 0.0
-            if occupied and _square_distance2(x, y, i, j) < radius * radius:
+            if occupied and square_distance2(x, y, i, j) < radius * radius:
                 return False
     return True
 
 
 @subkernel
-def _room(clear: FloatGrid, x: float, y: float) -> float:
+def least_room(clear: FloatGrid, x: float, y: float) -> float:
     """Lower bound of the distance from a point to the nearest occupied square."""
     i, j = math.floor(x + 0.5), math.floor(y + 0.5)
     if i < 0 or j < 0 or j >= clear.shape[0] - 2 or i >= clear.shape[1] - 2:
         return 0.0
     off_x, off_y = x - i, y - j
     off = math.sqrt(off_x * off_x + off_y * off_y)
-    return float(clear[j + 1, i + 1]) - off - _ROUNDING
+    return float(clear[j + 1, i + 1]) - off - ROUNDING
 
 
 @subkernel
-def _is_edge(clear: FloatGrid, i: int, j: int) -> bool:
+def most_room(clear: FloatGrid, x: float, y: float) -> float:
+    """Upper bound of the distance from a point to the nearest occupied square."""
+    i, j = math.floor(x + 0.5), math.floor(y + 0.5)
+    if i < 0 or j < 0 or j >= clear.shape[0] - 2 or i >= clear.shape[1] - 2:
+        return float(clear.shape[0] + clear.shape[1])
+    off_x, off_y = x - i, y - j
+    off = math.sqrt(off_x * off_x + off_y * off_y)
+    return float(clear[j + 1, i + 1]) + off + ROUNDING
+
+
+@subkernel
+def is_edge(clear: FloatGrid, i: int, j: int) -> bool:
     """Whether pixel (i, j) of the padded map has a free 4-neighbour.
 
     The first contact with a union of squares is always with such a square.

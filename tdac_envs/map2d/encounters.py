@@ -259,7 +259,7 @@ def end_ranges_at_discs(
     """Shortens the ranges of rays that hit a mover before the first wall.
 
     Args:
-        directions: From `rays.fan`.
+        directions: From `rays.directions_of`.
         traits: `Movers.traits`.
         now: `Movers.now`.
         x: Column of the robot's centre, px.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,8 +18,8 @@ from tdac_envs.drawing.runs import Status
 from tdac_envs.drive.disturbances import Disturbances, with_odometry
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
-from tdac_envs.drive.stepping import place
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.stepping import STEPS, place
+from tdac_envs.drive.task import Pose, with_tolerance_note
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.among import begin_among, drive_among
 from tdac_envs.map2d.kernels import begin, drive, drive_or_slide
@@ -27,10 +27,13 @@ from tdac_envs.map2d.metric_input import in_pixels, options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.observed import info_of, noisy, observation_space
 from tdac_envs.map2d.picture import MapScene
+from tdac_envs.map2d.reception import RECEIVED, Receiver, Reception
 from tdac_envs.map2d.robot import Map2DArrays
-from tdac_envs.map2d.setup import Map2DSetup, override
+from tdac_envs.map2d.robot_options import RobotSource, with_robot
+from tdac_envs.map2d.setup import OVERRIDDEN, Map2DSetup, override
+from tdac_envs.map2d.smallest_gap import note_gap, note_gap_among
 from tdac_envs.map2d.sonar import NOISE
-from tdac_envs.map2d.source import MapSource, prepare, units_of
+from tdac_envs.map2d.source import MapSource, metric_units, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
 from tdac_envs.movers.spec import MoversOption, read_specs
@@ -68,19 +71,24 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
     | `odometry` | (2,) | px, rad | motion in the last step, with `odometry=True` |
 
-    Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
-    heading: `ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost.
-    Rays start at the centre; no hit gives `range_max`.
+    Ray i points at `ray_angles[i]` from the heading (rad; also in `params.json`). An
+    even fan goes from the robot's left to its right: ray i at
+    `-field_of_view/2 + i * field_of_view/(n_rays - 1)`, and of a full circle, which
+    begins behind the robot, at `-180° + i * 360°/n_rays`. Rays start at the centre; no
+    hit gives `range_max`.
 
     ## In metres
     With `frame="metres"`, for maps with a resolution (ROS `map.yaml`), all places,
     lengths and speeds of arguments, options, observations, `info` and pictures are in
     metres, in the frame of the map: the outer corner of the lower-left pixel is at the
     `origin` of the map, and without a rotation of this origin, x points right and y
-    points up. Headings and turns, also that of `odometry`, are counter-clockwise. The
-    simulation is the same to the bit. `ranges[0]` still is the robot's leftmost ray:
-    ray i points at `field_of_view/2 - i * field_of_view/(n_rays - 1)`.
-    `pose()` and `discs()` stay in px.
+    points up. Headings, `ray_angles` and turns, also that of `odometry`, are
+    counter-clockwise. The simulation is the same to the bit, and the rays keep their
+    order. `pose()` and `discs()` stay in px.
+
+    Maps with a resolution have defaults in metres, also with `frame="pixels"`: 0.5 m/s,
+    ranges up to 3.5 m, and a goal tolerance of a body radius. Their `robot_radius` has
+    no default.
 
     ## Movers
     With `movers`, discs move about: they follow routes, bounce off walls, or walk in a
@@ -156,18 +164,21 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         start: (x, y) or (x, y, heading), px and rad. Default: the map's own.
         goal: (x, y), px. Default: the map's own.
         heading: Nominal start heading, rad; overrides that of `start`.
-        robot_radius: Radius of the body, px.
+        robot_radius: Radius of the body, px. Default: the map's own, else 15; a map
+            with a resolution needs one.
         axle_length: Distance between the wheels, px. Default: twice the radius.
         max_wheel_speed: Wheel speed at action 1, px/s. The default of images, 75.59,
-            is the paper's 0.02 m/s at 3779.52 px/m.
+            is the paper's 0.02 m/s at 3779.52 px/m; with a resolution it is 0.5 m/s.
         n_rays: Number of range rays.
-        field_of_view: Angle between the first and the last ray, degrees.
-        range_max: Largest range, px; observed if a ray hits nothing.
-        dt: Duration of a step, s.
+        field_of_view: Angle between the first and the last ray, degrees; 360 for a
+            full circle of rays that are 360°/n_rays apart.
+        range_max: Largest range, px; observed if a ray hits nothing. The default of
+            images is 220; with a resolution it is 3.5 m.
+        dt: Duration of a step, s. Default: 0.05, or that of the robot.
         horizon: Steps before truncation. Default: max(2500, 6 * d0 / (max_wheel_speed *
             dt)), where d0 is the length of the shortest grid path, px.
         goal_tolerance: Distance at which the goal is reached, px. Default:
-            min(20, d0 / 4).
+            min(20, d0 / 4), on a map with a resolution min(robot_radius, d0 / 4).
         on_collision: `"terminate"` or `"block"`; see Episode End.
         variation: `"nominal"`, `"jitter"`, `"mixed"` or `"random"`; see Starting State.
         sensor: `"rays"`, which are exact, or `"sonar"`: a range is the nearest echo in
@@ -184,8 +195,35 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             after a reset; `docs/disturbances.md` defines them.
         odometry_scale: Standard deviation of the hidden scale errors of `odometry`.
         odometry_noise: Relative standard deviation of each measurement of `odometry`.
+        wheel_radius_error: Bound of each wheel's hidden relative error of its radius,
+            uniform, drawn at each reset.
         motor_lag: Time constant of the wheel speeds, s.
         delay: Number of steps until an action takes effect.
+        max_acceleration: Largest acceleration of a wheel, px/s².
+        max_speed: Largest speed of the body, px/s. A faster command is scaled down,
+            both wheels by the same factor, so that the robot drives the same curve.
+        max_turn_rate: Largest turn of the body, rad/s; commands are scaled likewise.
+        max_turn_acceleration: Largest acceleration of its turn, rad/s².
+        pose_noise: Standard deviation of the error of the observed x and y, px.
+            `info`, reward and the end of an episode always use the true pose.
+        heading_noise: Standard deviation of the error of the observed heading, rad.
+        pose_correlation: Time constant of both errors, s; 0 for new ones in each step.
+        pose_jumps: Mean number of jumps of the observed pose in a minute: the errors
+            are drawn anew, three times as large.
+        pose_delay: Number of steps by which `pose` is late.
+        scan_delay: Number of steps by which `ranges` are late.
+        message_drop: Probability that the pose and the scan of a step are lost: the
+            last ones are observed again.
+        range_min, below_min: Smallest range, px, and what a ray reads below it:
+            `"range_max"` (the default), `"range_min"` or `"zero"`.
+        scanner_offset: Where the rays start, from the centre: ahead and, in pixels, to
+            the right; in metres, to the left.
+        robot: Bundled name (`tdac_envs.bundled_robots()`) or path of a robot file: its
+            body, limits, scanner and control rate, where no other argument says
+            otherwise. `ranges` are in the order of its scanner. A robot in metres needs
+            a map with a resolution.
+        disturbed: Whether the noise, latency and other errors of this robot are on,
+            too, where no other argument says otherwise. Its limits always hold.
         reward_weights: Reward weights by name, where they differ from the defaults.
             Keep the defaults when comparing rewards.
         snap: Whether to move start and goal to the nearest place where the body fits.
@@ -198,10 +236,14 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             the defaults, half as fast as the robot and as large.
             `tdac_envs.movers.spec` has all keys.
         frame: `"pixels"` or `"metres"`; see In metres.
+        ray_angles: Directions of the rays from the heading, rad, in the order of
+            `ranges`, instead of `n_rays` and `field_of_view`. Default: an even fan.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
-    * v0: Initial version. `on_collision="block"` changed before the first release.
+    * v0: Initial version. Before the first release, `on_collision="block"` changed,
+      rays of a full circle became 360°/n apart, and maps with a resolution got
+      defaults in metres.
     """
 
     title = "TDAC-Map2D-v0"
@@ -225,7 +267,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         n_rays: int | None = None,
         field_of_view: float | None = None,
         range_max: float | None = None,
-        dt: float = 0.05,
+        dt: float | None = None,
         horizon: int | None = None,
         goal_tolerance: float | None = None,
         on_collision: str = "terminate",
@@ -233,34 +275,74 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         sensor: str = "rays",
         range_noise: float | None = None,
         range_dropout: float = 0.0,
-        wheel_slip: float = 0.0,
+        wheel_slip: float | None = None,
         wheel_gains: float = 0.0,
         axle_error: float = 0.0,
         odometry: bool = False,
         odometry_scale: float = 0.0,
         odometry_noise: float = 0.0,
+        wheel_radius_error: float | None = None,
         motor_lag: float = 0.0,
         delay: int = 0,
+        max_acceleration: float | None = None,
+        max_turn_acceleration: float | None = None,
+        max_speed: float | None = None,
+        max_turn_rate: float | None = None,
+        pose_noise: float | None = None,
+        heading_noise: float | None = None,
+        pose_correlation: float | None = None,
+        pose_jumps: float | None = None,
+        pose_delay: int | None = None,
+        scan_delay: int | None = None,
+        message_drop: float = 0.0,
+        range_min: float | None = None,
+        below_min: str | None = None,
+        scanner_offset: tuple[float, float] | None = None,
+        robot: RobotSource = None,
+        disturbed: bool = False,
         reward_weights: Mapping[str, float] | None = None,
         snap: bool = False,
         polarity: Shade | None = None,
         movers: MoversOption = None,
         frame: FrameName = "pixels",
+        ray_angles: Sequence[float] | None = None,
         render_mode: str | None = None,
     ) -> None:
         units = units_of(map, frame)
-        given = in_pixels(
-            units,
-            start=start,
-            goal=goal,
-            heading=heading,
-            robot_radius=robot_radius,
-            axle_length=axle_length,
-            max_wheel_speed=max_wheel_speed,
-            range_max=range_max,
-            goal_tolerance=goal_tolerance,
-            movers=read_specs(movers),
-        )
+        typed = {
+            "start": start,
+            "goal": goal,
+            "heading": heading,
+            "robot_radius": robot_radius,
+            "axle_length": axle_length,
+            "max_wheel_speed": max_wheel_speed,
+            "n_rays": n_rays,
+            "field_of_view": field_of_view,
+            "range_max": range_max,
+            "goal_tolerance": goal_tolerance,
+            "movers": read_specs(movers),
+            "ray_angles": ray_angles,
+            "range_min": range_min,
+            "below_min": below_min,
+            "scanner_offset": scanner_offset,
+            "max_acceleration": max_acceleration,
+            "max_turn_acceleration": max_turn_acceleration,
+            "max_speed": max_speed,
+            "max_turn_rate": max_turn_rate,
+            "dt": dt,
+            "range_noise": range_noise,
+            "wheel_slip": wheel_slip,
+            "wheel_radius_error": wheel_radius_error,
+            "pose_noise": pose_noise,
+            "heading_noise": heading_noise,
+            "pose_correlation": pose_correlation,
+            "pose_jumps": pose_jumps,
+            "pose_delay": pose_delay,
+            "scan_delay": scan_delay,
+        }
+        metric = None if robot is None else metric_units(map)
+        own = with_robot(robot, disturbed, metric, units.frame is not None, typed)
+        given = in_pixels(units, **own)
         prepared = prepare(
             map,
             given["start"],
@@ -272,22 +354,15 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             units=units,
         )
         params = prepared.params
-        robot = override(
-            params.robot,
-            axle_length=given["axle_length"],
-            max_wheel_speed=given["max_wheel_speed"],
-            n_rays=n_rays,
-            field_of_view=field_of_view,
-            range_max=given["range_max"],
-        )
+        body = override(params.robot, **{name: given[name] for name in OVERRIDDEN})
         assert params.start is not None
         assert params.goal is not None
         nominal = make_task(
             Terrain.of(prepared.grid),
             Pose(*params.start, params.heading),
             params.goal,
-            robot,
-            dt=dt,
+            body,
+            dt=0.05 if given["dt"] is None else given["dt"],
             goal_tolerance=given["goal_tolerance"],
             horizon=horizon,
             units=units,
@@ -300,22 +375,28 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             motor_lag=motor_lag,
             delay=delay,
             disturbances=Disturbances(
-                wheel_slip,
+                given["wheel_slip"] or 0.0,
                 wheel_gains,
                 axle_error,
                 odometry,
                 odometry_scale,
                 odometry_noise,
+                given["wheel_radius_error"] or 0.0,
             ),
             weights=weights_of(reward_weights),
             source=None,
-            range_noise=_noise_of(sensor, range_noise),
+            range_noise=_noise_of(sensor, given["range_noise"]),
             range_dropout=range_dropout,
             movers=given["movers"],
             metric=units.frame,
             sensor=sensor,
+            reception=Reception(
+                **{name: given[name] or 0 for name in RECEIVED},
+                message_drop=message_drop,
+            ),
         )
-        self.params = params
+        notes = with_tolerance_note(params.notes, nominal, units.length)
+        self.params = params.model_copy(update={"notes": notes})
         self._prepare(setup, render_mode)
 
     @classmethod
@@ -333,6 +414,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.disturbances.odometry:
             space = with_odometry(space, self._limits)
             self._is_inexact = True
+        self._receiver = setup.receiver()
+        self._is_inexact |= self._receiver is not None
         self._units = MapUnits(setup.metric)
         self._view = None if setup.metric is None else MetricView(setup.metric)
         if self._view is not None:
@@ -372,6 +455,10 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             self.render()
         return self._observation(), self.info_of(robot.outcome.tolist())
 
+    def observed_pose(self) -> NDArray[np.float64]:
+        """The pose as it is observed, shape (3,): x, y (px), heading (rad)."""
+        return self.pose() if self._receiver is None else self._receiver.pose.copy()
+
     def discs(self) -> NDArray[np.float64]:
         """The movers as they are now, shape (n, 3): x, y, radius, px."""
         return self.movers.discs()
@@ -399,6 +486,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.setup.sonar is not None:
             calls = [partial(self._then_listen, call) for call in calls]
         self._call_begin, self._call_drive = calls
+        self._note_gap = note_gap_among if among else note_gap
         robot = self.robot
         seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
         self._copies = [array.copy for array in seen]
@@ -423,7 +511,16 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 seen["ranges"][:] = noisy(seen["ranges"], self.setup, self._random)
             if self.disturbances.odometry:
                 seen["odometry"] = self._odometry()
+            if self._receiver is not None:
+                self._receive(self._receiver, seen)
         return seen if self._view is None else self._view.seen(seen)
+
+    def _receive(self, receiver: Receiver, seen: Observation) -> None:
+        """Replaces pose and ranges by those that have reached the robot."""
+        begins = bool(self.robot.state[STEPS] == 0.0)
+        receiver.receive(self.pose(), seen["ranges"], begins, self._random)
+        seen["pose"][:] = receiver.pose
+        seen["ranges"] = receiver.ranges.copy()
 
     def _begin_trail(self) -> None:
         super()._begin_trail()

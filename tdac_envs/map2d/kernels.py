@@ -38,6 +38,8 @@ from tdac_envs.drive.stepping import (
     TOLERANCE,
     TOUCHED,
     TURN,
+    WHEEL_LEFT,
+    WHEEL_RIGHT,
     Array,
     X,
     Y,
@@ -51,6 +53,7 @@ from tdac_envs.drive.stepping import (
     turned_wheels,
     wrap_angle,
 )
+from tdac_envs.drive.stepping import N_CONSTANTS as N_SHARED
 from tdac_envs.drive.stepping import clear as clear_state
 from tdac_envs.grid.grid import FloatGrid
 from tdac_envs.map2d.contact import arc_contact, contact_before, near_normals
@@ -59,6 +62,9 @@ from tdac_envs.map2d.rays import LeapGrid, cast_rays, in_sight
 # A stopped body is moved back along its arc by this distance, px, so that the next
 # step starts outside the obstacle.
 CONTACT_GAP = 1e-6
+# Entries of `constants` that only these robots have.
+SCAN_AHEAD, SCAN_ASIDE = range(N_SHARED, N_SHARED + 2)
+N_CONSTANTS = N_SHARED + 2
 # Indices of some of the arrays of `arrays_at`.
 STATE, POSE, WHEEL_SPEEDS, RANGES, OUTCOME = 5, 7, 8, 9, 10
 
@@ -153,6 +159,18 @@ def path_distance(
 
 
 @subkernel
+def scanner_at(
+    constants: Array, x: float, y: float, heading: float
+) -> tuple[float, float]:
+    """Where the rays of a robot at a pose start, px."""
+    ahead, aside = constants[SCAN_AHEAD], constants[SCAN_ASIDE]
+    if ahead == 0.0 and aside == 0.0:
+        return x, y
+    cos, sin = math.cos(heading), math.sin(heading)
+    return x + ahead * cos - aside * sin, y + ahead * sin + aside * cos
+
+
+@subkernel
 def observe(
     leaps: LeapGrid,
     clear: FloatGrid,
@@ -167,7 +185,8 @@ def observe(
     """Updates the observation and `outcome` for the current pose."""
     x, y, heading = state[X], state[Y], state[HEADING]
     pose[0], pose[1], pose[2] = x, y, heading
-    cast_rays(leaps, directions, x, y, heading, constants[RANGE_MAX], ranges)
+    at_x, at_y = scanner_at(constants, x, y, heading)
+    cast_rays(leaps, directions, at_x, at_y, heading, constants[RANGE_MAX], ranges)
     goal_x, goal_y = constants[GOAL_X], constants[GOAL_Y]
     gap = math.hypot(goal_x - x, goal_y - y)
     near = gap <= constants[TOLERANCE]
@@ -211,8 +230,8 @@ def ground_speeds(
     limit = constants[MAX_SPEED]
     left, right = turned_wheels(constants, wheel_speeds)
     return (
-        limit * clip_unit(left * state[SLIP_LEFT]),
-        limit * clip_unit(right * state[SLIP_RIGHT]),
+        limit * clip_unit(left * (state[SLIP_LEFT] * constants[WHEEL_LEFT])),
+        limit * clip_unit(right * (state[SLIP_RIGHT] * constants[WHEEL_RIGHT])),
     )
 
 
@@ -278,9 +297,9 @@ def driving(move_body: Any) -> Any:
         """Runs one step of the environment; `state` already contains the wheel slip.
 
         `field`, shape (height, width), is the path length to the goal from each pixel,
-        px; `directions` are from `rays.fan`. `constants` and the arrays after it are
-        those of `Map2DArrays`. All of them are overwritten except `constants` and, in
-        `state`, the commands and the slip.
+        px; `directions` are from `rays.directions_of`. `constants` and the arrays after
+        it are those of `Map2DArrays`. All of them are overwritten except `constants`
+        and, in `state`, the commands and the slip.
         """
         before = outcome[REMAINING]
         apply_command(constants, state, queue, wheel_speeds, outcome)

@@ -7,7 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from tdac_envs.core.arguments import finite, finite_numbers, finite_point, positive
+from tdac_envs.core.arguments import (
+    finite,
+    finite_numbers,
+    finite_point,
+    non_negative,
+    positive,
+)
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.grid.metric import Point
 from tdac_envs.movers.spec import AnySpec
@@ -17,6 +23,8 @@ LENGTHS = (
     "goal_tolerance",
 )
 """Arguments of `Map2DEnv` that are lengths, or lengths per second."""
+LENGTHS_OR_ZERO = "max_speed", "pose_noise", "range_min", "max_acceleration"
+"""Those that may be 0, lengths per second squared among them."""
 
 
 def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
@@ -24,7 +32,8 @@ def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
 
     Args:
         units: Units of the arguments.
-        **given: Lengths by name, `start`, `goal`, `heading` and `movers` (specs).
+        **given: Lengths by name, `start`, `goal`, `heading`, `ray_angles` and `movers`
+            (specs).
 
     Raises:
         TaskError: A value is not valid.
@@ -37,6 +46,17 @@ def in_pixels(units: MapUnits, **given: Any) -> dict[str, Any]:
     for name in LENGTHS:
         if given[name] is not None:
             own[name] = units.length_in_pixels(positive(name, given[name]))
+    if given["ray_angles"] is not None:
+        turns = given["ray_angles"]
+        angles = finite_numbers("ray_angles", turns, np.size(turns))
+        own["ray_angles"] = tuple(0.0 - angle for angle in angles)
+    if given.get("scanner_offset") is not None:
+        ahead, left = finite_point("scanner_offset", given["scanner_offset"])
+        scale = 1.0 / units.per_pixel
+        own["scanner_offset"] = (ahead * scale, 0.0 - left * scale)
+    for name in LENGTHS_OR_ZERO:
+        if given.get(name):
+            own[name] = units.length_in_pixels(non_negative(name, given[name]))
     own["movers"] = movers_in_pixels(given["movers"], units)
     return own
 

@@ -50,11 +50,16 @@ def infos_of(outcome: NDArray[np.float64], mask: NDArray[np.bool_]) -> dict[str,
 def noisy(
     ranges: NDArray[np.float32], setup: Map2DSetup, random: np.random.Generator
 ) -> NDArray[np.float64]:
-    """The ranges of one robot with relative noise and dropouts, in [0, range_max]."""
+    """The ranges of one robot with noise, `range_min` and dropouts.
+
+    They are in [0, range_max].
+    """
     seen, most = ranges.astype(np.float64), setup.nominal.robot.range_max
     if setup.range_noise:
         noise = random.normal(1.0, setup.range_noise, ranges.size)
         np.clip(ranges * noise, 0.0, most, out=seen)
+    if setup.range_min:
+        seen[seen < setup.range_min] = setup.blind
     if setup.range_dropout:
         seen[random.random(ranges.size) < setup.range_dropout] = most
     return seen

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from math import radians
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +59,7 @@ class MapScene:
     ) -> None:
         self._units = units
         self._canvas = Canvas(cells)
-        self._robot = robot
+        self._robot, self._turns = robot, robot.angles()
         self._radius = max(robot.radius * self._canvas.scale, SMALLEST_BODY)
         self._sprite = load_sprite(robot_image, self._radius)
         draw_task(self._canvas, start, goal, goal_tolerance, path)
@@ -83,8 +83,11 @@ class MapScene:
         """
         canvas, robot = self._canvas.copy(), self._robot
         x, y, heading = (float(value) for value in pose)
-        fan, fov = np.asarray(ranges, np.float64), radians(robot.field_of_view_deg)
-        draw_rays(canvas, (x, y, heading), fan, fov, robot.range_max)
+        seen, turns = np.asarray(ranges, np.float64), self._turns
+        ahead, aside = robot.scanner_offset or (0.0, 0.0)
+        cos, sin = math.cos(heading), math.sin(heading)
+        at = x + ahead * cos - aside * sin, y + ahead * sin + aside * cos
+        draw_rays(canvas, (*at, heading), seen, turns, robot.range_max)
         draw_movers(canvas, movers)
         canvas.line(trail, TRAIL, 2)
         if self._radius < SMALLEST_PICTURE:

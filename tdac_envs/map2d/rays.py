@@ -128,21 +128,15 @@ def _is_on(leaps: LeapGrid, u: float, v: float) -> bool:
     return bool(0.0 <= u < leaps.shape[2] and 0.0 <= v < leaps.shape[1])
 
 
-def fan(field_of_view: float, n_rays: int) -> NDArray[np.float64]:
-    """Directions of the rays in the robot's frame, shape (2, n_rays): cosines, sines.
-
-    Ray i is `-field_of_view / 2 + i * field_of_view / (n_rays - 1)` off the heading;
-    a single ray points ahead.
+def directions_of(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Directions of rays in the robot's frame, shape (2, n_rays): cosines, sines.
 
     Args:
-        field_of_view: Angle between the first and the last ray, rad.
-        n_rays: Number of rays.
+        angles: Angles of the rays from the heading, rad; `RobotParams.angles`.
     """
-    step = field_of_view / (n_rays - 1) if n_rays > 1 else 0.0
-    first = -0.5 * field_of_view if n_rays > 1 else 0.0
-    offsets = (first + step * np.arange(n_rays)).tolist()
     # Bit for bit as in `tdac_envs.controller_kit.sensors`.
-    return np.array([[math.cos(v) for v in offsets], [math.sin(v) for v in offsets]])
+    turns = angles.tolist()
+    return np.array([[math.cos(v) for v in turns], [math.sin(v) for v in turns]])
 
 
 @subkernel
@@ -155,11 +149,11 @@ def cast_rays(
     range_max: float,
     out: NDArray[np.float32],
 ) -> None:
-    """Fills `out` with the ranges of all rays; `out[0]` is the leftmost ray.
+    """Fills `out` with the ranges of all rays; in their order.
 
     Args:
         leaps: From `leaps_of`.
-        directions: From `fan`.
+        directions: From `directions_of`.
         x: Column in map pixels.
         y: Row in map pixels.
         heading: rad, from +x towards +y.

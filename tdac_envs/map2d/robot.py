@@ -22,18 +22,21 @@ class Map2DArrays(NamedTuple):
     `kernels.arrays_at` and the indices beside it follow the order of the fields.
 
     Attributes:
-        constants: Shape (24,), float64: axle length (px), full wheel speed (px/s), dt
+        constants: Shape (30,), float64: axle length (px), full wheel speed (px/s), dt
             (s), body radius, largest range (px), fraction of a wheel's speed that
             remains after one step, delay (steps), whether a contact ends the
             episode, distance of a step at full speed (px); reward weights: progress,
             goal, collision, time; goal x and y, goal tolerance (px), horizon (steps);
             coefficient of friction between body and obstacles; gains of the left and
             right wheel; scales of the measured distance and turn; relative radii of the
-            left and right wheel, always 1 here.
-        state: Shape (10,), float64: x, y (px), heading (rad); unclipped commands of the
+            left and right wheel; limits of the wheels' fractions: change in a step,
+            sum and difference of both, change of the difference in a step; where the
+            rays start, ahead of the centre and to its right (px).
+        state: Shape (12,), float64: x, y (px), heading (rad); unclipped commands of the
             left and right wheel; slip of the left and right wheel, the ratio of speed
             over ground to wheel speed; steps so far; length (px) and turn (rad) of the
-            last step's arc, as driven by the wheels.
+            last step's arc, as driven by the wheels; fractions of the left and right
+            wheel after the limit of the acceleration.
         queue: Shape (delay, 2), float64: delayed commands, a ring buffer.
         pose: Shape (3,), float32: observed x, y, heading.
         wheel_speeds: Shape (2,), float32: fractions as last applied.
@@ -57,7 +60,7 @@ class Map2DArrays(NamedTuple):
     def blank(cls, n_rays: int, delay: int, *count: int) -> Map2DArrays:
         """One robot, or `count` of them, all zeros."""
         return cls(
-            np.zeros((*count, stepping.N_CONSTANTS)),
+            np.zeros((*count, stepping.N_CONSTANTS + 2)),
             np.zeros((*count, stepping.N_STATE)),
             np.zeros((*count, delay, 2)),
             np.zeros((*count, 3), np.float32),

@@ -13,7 +13,9 @@ from tdac_envs.drawing.backdrop import CLOSE_UP, CloseUpWindow, Points
 from tdac_envs.drawing.canvas import Canvas, Image
 from tdac_envs.drawing.marks import draw_movers, draw_task
 from tdac_envs.drawing.runs import SMALLEST_BODY, Legend, draw_runs
+from tdac_envs.drive.task import radii_text
 from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.map2d.task import Map2DTask
 
 
@@ -108,6 +110,7 @@ def trajectory_picture(
     outcomes: Sequence[str] = (),
     labels: Sequence[str] = (),
     movers: Sequence[Points] = (),
+    units: MapUnits = PIXELS,
 ) -> Image:
     """The map with one or more trajectories and a legend, uint8 RGB.
 
@@ -124,6 +127,7 @@ def trajectory_picture(
         labels: Name of each trajectory.
         movers: Movers in the last steps of the first trajectory, each of shape (m, 3):
             x, y, radius, px. Those of the others are not drawn.
+        units: Units of the legend.
     """
     runs = [np.asarray(run, np.float64).reshape(-1, 3) for run in trajectories]
     ends = [*outcomes, *[""] * (len(runs) - len(outcomes))]
@@ -133,6 +137,8 @@ def trajectory_picture(
         path=len(np.asarray(path)) > 1,
         movers=len(movers) > 0,
         width=Canvas.frame_width(cells),
+        goal=f"goal within {units.length(goal_tolerance)} "
+        f"({radii_text(goal_tolerance, radius)})",
     )
     canvas = Canvas(cells, strip=legend.height)
     draw_task(canvas, start, goal, goal_tolerance, path)

@@ -37,14 +37,12 @@ class Sonar:
     """The sonars of a robot.
 
     Args:
-        field_of_view: Angle between the axes of the first and the last sonar, rad.
-        count: Number of sonars.
+        angles: Angles of their axes from the heading, rad.
         range_max: Reading without an echo, px.
     """
 
-    def __init__(self, field_of_view: float, count: int, range_max: float) -> None:
-        half = field_of_view / 2 if count > 1 else 0.0
-        self._axes = read_only(np.linspace(-half, half, count))
+    def __init__(self, angles: Array, range_max: float) -> None:
+        self._axes = read_only(angles)
         self._range_max = float(range_max)
 
     def read(

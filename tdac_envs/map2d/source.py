@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args
@@ -63,6 +63,7 @@ def prepare(
     *,
     heading: float | None = None,
     robot_radius: float | None = None,
+    robot: RobotParams | None = None,
     snap: bool = False,
     options: ReadingOptions = DEFAULT_OPTIONS,
     resolution: float | None = None,
@@ -77,7 +78,9 @@ def prepare(
         start: (x, y) or (x, y, heading), px and rad; from the params if None.
         goal: (x, y), px; from the params if None.
         heading: Start heading, rad; overrides `start[2]`.
-        robot_radius: Body radius, px; from the params if None, else 15.
+        robot_radius: Body radius, px; from the robot or the params if None. An image
+            without a resolution has a default of 15, one with a resolution has none.
+        robot: The robot, px, instead of that of the params or the default.
         snap: Whether to move start and goal to the nearest place where the body fits.
         options: Polarity and threshold of an image, where the user gave them.
         resolution: Metres per pixel of an image that gives none.
@@ -90,7 +93,7 @@ def prepare(
     if robot_radius is not None:
         robot_radius = positive("robot_radius", robot_radius)
     given = _TaskOptions.of(
-        start, goal, heading, robot_radius, snap, options, resolution, units
+        start, goal, heading, robot_radius, robot, snap, options, resolution, units
     )
     if not isinstance(source, str | Path):
         _refuse(given, "a grid")
@@ -119,6 +122,7 @@ class _TaskOptions:
     goal: Point | None
     heading: float | None
     robot_radius: float | None
+    robot: RobotParams | None
     snap: bool
     options: ReadingOptions
     resolution: float | None
@@ -131,6 +135,7 @@ class _TaskOptions:
         goal: Sequence[float] | None,
         heading: float | None,
         robot_radius: float | None,
+        robot: RobotParams | None,
         snap: bool,
         options: ReadingOptions,
         resolution: float | None,
@@ -146,19 +151,24 @@ class _TaskOptions:
             end = finite_point("goal", goal)
         if heading is not None:
             heading = finite("heading", heading)
-        return cls(at, end, heading, robot_radius, snap, options, resolution, units)
+        body = robot_radius, robot
+        return cls(at, end, heading, *body, snap, options, resolution, units)
+
+    @property
+    def radius(self) -> float | None:
+        """The body radius: that of the robot, if there is no other, px."""
+        if self.robot_radius is None and self.robot is not None:
+            return self.robot.radius
+        return self.robot_radius
 
     def or_else(self, bundled: BundledMap) -> _TaskOptions:
         """These options, with the values of a bundled map instead of None."""
-        return _TaskOptions(
-            self.start or bundled.start,
-            self.goal or bundled.goal,
-            bundled.heading if self.heading is None else self.heading,
-            self.robot_radius or bundled.robot_radius,
-            self.snap,
-            self.options,
-            self.resolution,
-            self.units,
+        return replace(
+            self,
+            start=self.start or bundled.start,
+            goal=self.goal or bundled.goal,
+            heading=bundled.heading if self.heading is None else self.heading,
+            robot_radius=self.radius or bundled.robot_radius,
         )
 
 
@@ -169,10 +179,10 @@ def _with_task(prepared: Prepared, given: _TaskOptions) -> Prepared:
         for name in ("start", "goal", "heading")
         if (value := getattr(given, name)) is not None
     }
-    robot, radius = prepared.params.robot, given.robot_radius
+    robot, radius = given.robot or prepared.params.robot, given.robot_radius
     if radius is not None and radius != robot.radius:
-        body = {"radius": radius, "axle_length": 2 * radius}
-        changes["robot"] = RobotParams(**{**robot.model_dump(), **body})
+        robot = robot.changed(radius=radius, axle_length=2 * radius)
+    changes["robot"] = robot
     params = prepared.params.model_copy(update=changes)
     missing = [name for name in ("start", "goal") if getattr(params, name) is None]
     if missing:
@@ -226,17 +236,39 @@ def units_of(
     return MapUnits.metres(load_image(path, resolution))
 
 
+def has_resolution(source: str, resolution: float | None = None) -> bool:
+    """Whether metres are known on a map file: ROS maps have a resolution.
+
+    Args:
+        source: Path of the file.
+        resolution: Metres per pixel of an image that gives none, as for `prepare`.
+    """
+    return resolution is not None or Path(source).suffix in _YAML
+
+
+def metric_units(source: MapSource, resolution: float | None = None) -> MapUnits | None:
+    """Metres in the frame of a map; None if it has no resolution.
+
+    Raises:
+        MapError: There is no such map.
+    """
+    try:
+        return units_of(source, "metres", resolution)
+    except (TaskError, MapError):
+        if isinstance(source, str | Path) and str(source) not in bundled_maps():
+            check_exists(Path(source))
+        return None
+
+
 def _from_image(image: Path, given: _TaskOptions) -> Prepared:
     # Not cached for a ROS map.yaml: the digest does not cover the image that it names.
     read = _read_image.__wrapped__ if image.suffix in _YAML else _read_image
-    radius = given.robot_radius or RobotParams().radius
     ends = given.start, given.goal
     how = given.snap, given.options, given.resolution, given.units
-    prepared = read(image, sha256_of(read_bytes(image)), *ends, radius, *how)
-    # Preprocessing has already snapped the points.
-    start, goal = (None, None) if given.snap else (given.start, given.goal)
-    rest = (given.heading, radius, False, DEFAULT_OPTIONS, None, given.units)
-    return _with_task(prepared, _TaskOptions(start, goal, *rest))
+    prepared = read(image, sha256_of(read_bytes(image)), *ends, given.radius, *how)
+    if given.snap:  # preprocessing has already moved the points
+        given = replace(given, start=None, goal=None, snap=False)
+    return _with_task(prepared, given)
 
 
 # Preprocessing takes most of the time of `gym.make`; a grid takes one byte per pixel.
@@ -246,7 +278,7 @@ def _read_image(
     digest: str,  # noqa: ARG001 - part of the cache key, as the file may change
     start: Point | None,
     goal: Point | None,
-    radius: float,
+    radius: float | None,
     snap: bool,
     options: ReadingOptions,
     resolution: float | None,

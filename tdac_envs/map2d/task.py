@@ -221,7 +221,7 @@ def make_task(
         robot: Body, wheels and sensor of the robot.
         dt: Duration of a step, s.
         goal_tolerance: Distance at which the goal is reached, px; by default
-            min(20, d0 / 4).
+            min(20, d0 / 4), and on a map with a resolution min(body radius, d0 / 4).
         horizon: Number of steps; by default max(2500, 6 * d0 / (v_max * dt)).
         units: Units of messages.
 
@@ -239,7 +239,8 @@ def make_task(
     field = route(terrain, begin[:2], end, robot.radius, units)
     shortest = path_length_from(terrain, field, begin.x, begin.y)
     if goal_tolerance is None:
-        tolerance = min(MAX_TOLERANCE, 0.25 * shortest)
+        paper = terrain.grid.resolution is None
+        tolerance = min(MAX_TOLERANCE if paper else robot.radius, 0.25 * shortest)
     else:
         tolerance = positive("goal_tolerance", goal_tolerance)
     if at_goal(terrain, end, tolerance, begin.x, begin.y):

@@ -10,7 +10,8 @@ from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from tdac_envs.core.errors import TaskError
-from tdac_envs.drive.stepping import row_of
+from tdac_envs.drive.gap_search import GapWatch
+from tdac_envs.drive.stepping import HEADING, STEPS, row_of
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
 from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.among import step_rows_among
@@ -59,6 +60,9 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         self._noisy = np.flatnonzero(noisy)
         sonar = [setup.sonar is not None for setup in self.setups]
         self._listening = np.flatnonzero(sonar)
+        self._receivers = [setup.receiver() for setup in self.setups]
+        inexact = [each is not None for each in self._receivers]
+        self._receiving = np.flatnonzero(inexact)
         # Last observation: robots that are not reset keep their noise.
         self._ranges = self.robots.ranges.copy()
 
@@ -92,6 +96,16 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     def step_rows(self) -> Callable[..., None]:  # type: ignore[override]
         """The compiled loop over robots."""
         return step_rows_among if self._among else step_rows
+
+    def watch_gap(self, robot: int) -> GapWatch:
+        """A watch of a robot's smallest gap in the episode that has just begun.
+
+        Raises:
+            ValueError: There are movers, whose motion in a step a batch does not keep.
+        """
+        if self.setups[robot].has_movers:
+            raise ValueError("the gap to movers needs a single environment")
+        return super().watch_gap(robot)
 
     def movers(self, i: int) -> Movers:
         """The movers of robot i in the current step; only to be read."""
@@ -130,6 +144,26 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         if self._disturbances.odometry:
             seen = self._disturbances.measure(robots, self.robots, self._noise)
             observations["odometry"] = seen
+        if self._receiving.size:
+            for i in np.intersect1d(self._receiving, robots).tolist():
+                self._receive(i, observations["ranges"][i].copy())
+            for i in self._receiving.tolist():
+                receiver = self._receivers[i]
+                observations["pose"][i] = receiver.pose
+                observations["ranges"][i] = receiver.ranges
+
+    def observed_poses(self) -> NDArray[np.float64]:
+        """The poses as they are observed, shape (num_envs, 3)."""
+        poses = self.pose()
+        for i in self._receiving.tolist():
+            poses[i] = self._receivers[i].pose
+        return poses
+
+    def _receive(self, i: int, ranges: NDArray[np.float32]) -> None:
+        """Gives robot i its pose and these ranges, in its own way."""
+        state, random = self.robots.state[i], self._noise(i)
+        pose = state[: HEADING + 1].copy()
+        self._receivers[i].receive(pose, ranges, bool(state[STEPS] == 0.0), random)
 
     def _listen(self, i: int, ranges: NDArray[np.float32]) -> None:
         """Replaces the ranges of robot i by those of its sonars."""

@@ -113,6 +113,7 @@ def preview_of(
     units: MapUnits = PIXELS,
     reason: str = "",
     path: NDArray[np.float64] | None = None,
+    tolerance: float | None = None,
 ) -> Image:
     """A picture of a map with its obstacles, task and path, uint8 RGB.
 
@@ -124,6 +125,7 @@ def preview_of(
         reason: Why the task is refused; the picture then shows where it fails.
         path: The shortest path, from `Map2DTask.shortest_path`, shape (n, 2), px; None
             for the grid path with the planner's margin.
+        tolerance: Distance at which the goal is reached, px, for the legend.
     """
     from tdac_envs.mapping.fault import fault_of
     from tdac_envs.mapping.preview import draw_preview
@@ -135,7 +137,8 @@ def preview_of(
         path = np.empty((0, 2))
     elif path is None:
         path = planned_path(grid, params)
-    return draw_preview(image, cells, params, (name, path), units, fault, reason)
+    how = units, fault, reason, tolerance
+    return draw_preview(image, cells, params, (name, path), *how)
 
 
 def png(picture: Image) -> bytes:

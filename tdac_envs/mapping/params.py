@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import (
     Field,
+    SerializerFunctionWrapHandler,
     ValidationError,
+    model_serializer,
     model_validator,
 )
 
@@ -18,15 +23,25 @@ from tdac_envs.core.errors import MapError, TaskError, first_problem
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.mapping.ray_angles import fan
 
 PIXELS_PER_METRE = 3779.52
 """Pixels per metre of the paper's 2-D setting (96 dpi)."""
+
+METRIC_RADIUS = 0.2
+"""Body radius for which a map with a resolution is read without a task, m."""
+METRIC_SPEED = 0.5
+"""Default wheel speed limit where metres are known, m/s."""
+METRIC_RANGE = 3.5
+"""Default largest range where metres are known, m."""
 
 Place = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 """A coordinate."""
 Length = Annotated[float, Field(gt=0, ge=SMALLEST, le=LARGEST)]
 """A length above 0."""
 MOST_RAYS = 4096
+Turn = Annotated[float, Field(ge=-math.tau, le=math.tau)]
+"""An angle from the heading, rad."""
 Shade = Literal["dark", "light"]
 FrameName = Literal["pixels", "metres"]
 """Units and frame of what a user gives and reads, and of what a robot observes."""
@@ -59,6 +74,9 @@ class ReadingOptions:
 DEFAULT_OPTIONS = ReadingOptions()
 
 
+_FAN = "n_rays", "field_of_view_deg"
+
+
 class RobotParams(StrictModel):
     """The differential-drive robot: a disc with a fan of ultrasonic rays."""
 
@@ -76,16 +94,89 @@ class RobotParams(StrictModel):
         110.0, gt=0, le=360, description="Whole angle of the fan, degrees."
     )
     range_max: Length = Field(220.0, description="Reading without a hit, px.")
+    ray_angles: tuple[Turn, ...] | None = Field(
+        None,
+        description="Directions of the rays from the heading, rad, in the order of the "
+        "ranges; by default an even fan over the field of view.",
+    )
+    range_min: Length | None = Field(None, description="Smallest range, px.")
+    below_min: Literal["range_max", "range_min", "zero"] | None = Field(
+        None, description="What a ray reads below range_min; by default range_max."
+    )
+    scanner_offset: tuple[Place, Place] | None = Field(
+        None,
+        description="Where the rays start, from the centre, px: ahead and to the right "
+        "(in metres to the left).",
+    )
+    max_speed: Length | None = Field(None, description="Limit of the body, px/s.")
+    max_turn_rate: Length | None = Field(None, description="Its turn, rad/s.")
+    max_acceleration: Length | None = Field(None, description="Of a wheel, px/s².")
+    max_turn_acceleration: Length | None = Field(None, description="rad/s²")
+
+    @model_validator(mode="after")
+    def _has_an_angle_for_each_ray(self) -> Self:
+        own = self.ray_angles
+        if own is not None and len(own) != self.n_rays:
+            raise ValueError(
+                f"expected n_rays = {self.n_rays} numbers in ray_angles, got {len(own)}"
+                "; leave them out for an even fan"
+            )
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_defaults_of_later_versions(
+        self, handler: SerializerFunctionWrapHandler
+    ) -> dict[str, Any]:
+        """The fields; what is None is left out, so that hashes of sets stay."""
+        return {key: own for key, own in handler(self).items() if own is not None}
+
+    def angles(self) -> NDArray[np.float64]:
+        """Directions of the rays from the heading, rad, in the order of the ranges.
+
+        A positive angle is clockwise, as y points down.
+        """
+        if self.ray_angles is None:
+            return fan(self.field_of_view_deg, self.n_rays)
+        return np.array(self.ray_angles)
+
+    def written(self) -> dict[str, Any]:
+        """The robot as `params.json` describes it: with the angles of its rays."""
+        return {**self.model_dump(mode="json"), "ray_angles": self.angles().tolist()}
+
+    def changed(self, **changes: Any) -> RobotParams:
+        """This robot with other values.
+
+        Another number of rays or field of view stands for an even fan.
+
+        Raises:
+            ValidationError: A value is not valid.
+        """
+        own = self.model_dump()
+        if any(changes.get(key, own[key]) != own[key] for key in _FAN):
+            own.pop("ray_angles", None)
+        return RobotParams.model_validate({**own, **changes})
 
     @classmethod
-    def disc(cls, radius: float) -> RobotParams:
+    def disc(cls, radius: float, resolution: float | None = None) -> RobotParams:
         """The default robot with another body radius and an axle of 2 x radius.
+
+        Args:
+            radius: Body radius, px.
+            resolution: Metres per pixel, if known: speed and range then are
+                `METRIC_SPEED` and `METRIC_RANGE`, and not those of the paper.
 
         Raises:
             TaskError: The radius is not positive, or too large.
         """
         radius = positive("robot_radius", radius)
-        return cls(radius=radius, axle_length=2 * radius)
+        if resolution is None:
+            return cls(radius=radius, axle_length=2 * radius)
+        return cls(
+            radius=radius,
+            axle_length=2 * radius,
+            max_wheel_speed=METRIC_SPEED / resolution,
+            range_max=METRIC_RANGE / resolution,
+        )
 
 
 class ScoreTerms(StrictModel):
@@ -142,7 +233,7 @@ class MapParams(StrictModel):
 
         What tells how the map was made stays in px.
         """
-        own = self.model_dump(mode="json")
+        own = {**self.model_dump(mode="json"), "robot": self.robot.written()}
         if self.frame == "metres":
             own.update(_converted(own, MapUnits.metres(self), inwards=False))
         return own
@@ -159,11 +250,11 @@ class MapParams(StrictModel):
             ValidationError: A field is missing, wrong or unknown.
         """
         own = cls.model_validate(written)
-        if own.frame == "pixels":
-            return own
-        units = MapUnits.metres(own)
-        changes = _converted(own.model_dump(), units, inwards=True)
-        return cls.model_validate({**own.model_dump(), **changes})
+        if own.frame == "metres":
+            units = MapUnits.metres(own)
+            changes = _converted(own.model_dump(), units, inwards=True)
+            own = cls.model_validate({**own.model_dump(), **changes})
+        return own.model_copy(update={"robot": _without_even_fan(own.robot)})
 
     @classmethod
     def load(cls, path: Path) -> MapParams:
@@ -182,7 +273,10 @@ class MapParams(StrictModel):
             raise MapError(f"{path}: {error}") from error
 
 
-_ROBOT_LENGTHS = ("radius", "axle_length", "max_wheel_speed", "range_max")
+_ROBOT_LENGTHS = (
+    *("radius", "axle_length", "max_wheel_speed", "range_max"),
+    *("range_min", "max_speed", "max_acceleration"),
+)
 
 
 def _converted(
@@ -194,12 +288,26 @@ def _converted(
     def place(point: Any) -> tuple[float, float]:
         return units.pixels(tuple(point)) if inwards else units.written_place(*point)
 
-    robot = own["robot"]
-    lengths = {name: length(robot[name]) for name in _ROBOT_LENGTHS}
+    robot = dict(own["robot"])
+    robot.update({key: length(robot[key]) for key in _ROBOT_LENGTHS if key in robot})
+    if "scanner_offset" in robot:
+        ahead, aside = robot["scanner_offset"]
+        # To the right in pixels, to the left in metres.
+        robot["scanner_offset"] = [length(ahead), 0.0 - length(aside)]
+    if "ray_angles" in robot:
+        # y points up in the frame of a map; 0.0 - 0.0 is not -0.0.
+        robot["ray_angles"] = [0.0 - angle for angle in robot["ray_angles"]]
     places = {key: place(own[key]) for key in ("start", "goal") if own[key] is not None}
     return {
         **places,
         "heading": units.heading_in_pixels(own["heading"]),
         "inflation": length(own["inflation"]),
-        "robot": {**robot, **lengths},
+        "robot": robot,
     }
+
+
+def _without_even_fan(robot: RobotParams) -> RobotParams:
+    """The robot of a file; the angles of an even fan are no choice of their own."""
+    even = fan(robot.field_of_view_deg, robot.n_rays).tolist()
+    is_even = robot.ray_angles is not None and list(robot.ray_angles) == even
+    return robot.model_copy(update={"ray_angles": None}) if is_even else robot

@@ -17,6 +17,7 @@ from tdac_envs.mapping.image import MapImage, from_array
 from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.params import (
     DEFAULT_OPTIONS,
+    METRIC_RADIUS,
     MapParams,
     ReadingOptions,
     RobotParams,
@@ -42,7 +43,7 @@ def preprocess(
     image: Source,
     start: tuple[float, float] | None = None,
     goal: tuple[float, float] | None = None,
-    robot_radius: float = 15.0,
+    robot_radius: float | None = None,
     *,
     preset: Preset = "default",
     snap: bool = False,
@@ -58,7 +59,8 @@ def preprocess(
             bool (True = occupied), or uint8 grey, RGB or RGBA.
         start: Pixel (x, y), or None to use the picture alone.
         goal: Pixel (x, y), or None.
-        robot_radius: Body radius, px.
+        robot_radius: Body radius, px. Default: 15 px; if the picture has a resolution,
+            0.2 m without a task, and a task needs it.
         preset: "default" tries readings from the plain one to bolder ones and takes the
             first feasible one; "paper" is the literal grid of Algorithm 1.
         snap: Move start and goal to the nearest connected pixels that are free for the
@@ -88,7 +90,7 @@ def preprocess_with_candidates(
     image: Source,
     start: tuple[float, float] | None,
     goal: tuple[float, float] | None,
-    robot_radius: float,
+    robot_radius: float | None,
     *,
     preset: Preset,
     snap: bool,
@@ -117,7 +119,7 @@ def _scene(
     source: MapImage,
     start: tuple[float, float] | None,
     goal: tuple[float, float] | None,
-    robot_radius: float,
+    robot_radius: float | None,
     snapping: bool,
     options: ReadingOptions,
     units: MapUnits,
@@ -128,7 +130,8 @@ def _scene(
             f"{source.name} itself defines which cells are obstacles; leave out "
             "polarity and threshold"
         )
-    alone = MapProblem.of(source, None, None, robot_radius, options, units)
+    radius = _radius(source, robot_radius, start is not None or goal is not None, units)
+    alone = MapProblem.of(source, None, None, radius, options, units)
     for name, point in (("start", start), ("goal", goal)):
         if point is not None and not np.isfinite(point).all():
             raise TaskError(f"expected {name} to be two finite numbers, got {point}")
@@ -139,6 +142,33 @@ def _scene(
         return alone.with_ends(ends[0], ends[1]), []
     light_free = source.occupied is None and decide_light_free(alone)
     return _snapped(alone.with_ends(ends[0], ends[1]), light_free)
+
+
+def _radius(
+    source: MapImage, given: float | None, has_task: bool, units: MapUnits
+) -> float:
+    """The body radius, px: the given one, else a default for this picture.
+
+    Raises:
+        TaskError: A task on a map with a resolution needs one. The paper's pixels say
+            nothing about the size of a robot in metres.
+    """
+    resolution = source.resolution
+    if given is not None:
+        return given
+    if resolution is None:
+        return RobotParams().radius
+    if not has_task:
+        return METRIC_RADIUS / resolution
+    if units == PIXELS:
+        size = METRIC_RADIUS / resolution
+        which = f"in px (--radius {size:g}, robot_radius={size:g}: {METRIC_RADIUS} m)"
+    else:
+        which = f"in metres (--radius {METRIC_RADIUS}, robot_radius={METRIC_RADIUS})"
+    raise TaskError(
+        f"{source.name}: the map has a resolution: give the body's radius {which} or a "
+        "robot (--robot NAME)"
+    )
 
 
 def _result(
@@ -339,7 +369,7 @@ def _params(
         start=scene.start,
         heading=heading,
         goal=scene.goal,
-        robot=RobotParams.disc(scene.radius),
+        robot=RobotParams.disc(scene.radius, image.resolution),
         polarity=reading.polarity,
         method=reading.method,
         threshold=reading.threshold,

@@ -55,6 +55,7 @@ def draw_preview(
     units: MapUnits = PIXELS,
     fault: MapFault | None = None,
     reason: str = "",
+    tolerance: float | None = None,
 ) -> Picture:
     """The tinted source image with task, legend and rulers, uint8 RGB.
 
@@ -66,6 +67,7 @@ def draw_preview(
         units: Units of rulers and legend.
         fault: Where the task fails, if it does.
         reason: Why it fails.
+        tolerance: Distance at which the goal is reached, px.
     """
     classes = _classes(image, cells, params, fault)
     rulers = Rulers(cells.shape, units)
@@ -75,7 +77,9 @@ def draw_preview(
         for kind in range(len(_NAMES))
         if kind in (_OPEN, _SOLID) or (classes == kind).any()
     ]
-    legend = _in_rows(kinds, room) + _in_rows(_places(params, path, units, fault), room)
+    legend = _in_rows(kinds, room) + _in_rows(
+        _places(params, path, units, fault, tolerance), room
+    )
     lines = [
         row for text in _texts(params, units, reason) for row in _folded(text, room)
     ]
@@ -189,14 +193,22 @@ def _shade(source: ColourImage, chosen: BoolGrid, tint: Colour) -> Colour:
 
 
 def _places(
-    params: MapParams, path: tuple[str, Path], units: MapUnits, fault: MapFault | None
+    params: MapParams,
+    path: tuple[str, Path],
+    units: MapUnits,
+    fault: MapFault | None,
+    tolerance: float | None,
 ) -> list[Entry]:
     """Legend entries of start, goal, path and fault, each if there is one."""
     entries: list[Entry] = []
     if params.start is not None:
         entries.append((TRAIL, f"start {units.point(*params.start)}"))
     if params.goal is not None:
-        entries.append((GREEN, f"goal {units.point(*params.goal)}"))
+        text = f"goal {units.point(*params.goal)}"
+        if tolerance is not None:
+            many = tolerance / params.robot.radius
+            text += f" within {units.length(tolerance)} ({many:.1f} radii)"
+        entries.append((GREEN, text))
     name, points = path
     if len(points) > 1:
         length = units.length(path_length(points), 0)

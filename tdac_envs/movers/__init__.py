@@ -30,7 +30,7 @@ A further kind needs
   its velocity up to the first contact with a wall;
 - `traits[m, SPEED]` as the largest speed that such a mover ever has: it bounds what is
   in reach;
-- arrays of its own as further fields of `Movers`: `map2d.among._movers_at` follows the
+- arrays of its own as further fields of `Movers`: `map2d.among.movers_at` follows the
   order of the fields.
 Pieces of movers of other kinds are already planned at that time. `now` has the
 velocities of all movers at the end of the last step. `stop` updates `now` for every

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from tdac_envs.worlds.footprint import Disc
+from tdac_envs.worlds.materials import MATERIAL
 from tdac_envs.worlds.world import EPuck, Obstacle, Part, World
 
 BODY_RADIUS = 0.037
@@ -35,13 +36,24 @@ def floor_under(world: World) -> float:
 
     The robot stands on an obstacle (a table, a plank), on an arena, or at 0.
     """
+    return _under(world)[0]
+
+
+def material_under(world: World) -> str:
+    """Material of the ground under the driven robot."""
+    return _under(world)[1]
+
+
+def _under(world: World) -> tuple[float, str]:
+    ground = 0.0, MATERIAL
     if not world.robots:
-        return 0.0
+        return ground
     x, y, reach = world.robot.x, world.robot.y, world.robot.z + _MAX_RISE
-    under = [part for thing in world.obstacles for part in thing.solid]
-    tops = [part.top for part in under if part.shape.contains(x, y)]
-    tops += [arena.z for arena in world.arenas if arena.inside.contains(x, y)]
-    return max((top for top in tops if top <= reach), default=0.0)
+    under = [(part, thing) for thing in world.obstacles for part in thing.solid]
+    tops = [(p.top, thing.material) for p, thing in under if p.shape.contains(x, y)]
+    tops += [(a.z, a.material) for a in world.arenas if a.inside.contains(x, y)]
+    below = [top for top in tops if top[0] <= reach]
+    return max(below, key=lambda top: top[0], default=ground)
 
 
 def at_body_height(parts: Iterable[Part], floor: float) -> tuple[Part, ...]:

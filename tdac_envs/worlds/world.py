@@ -29,10 +29,21 @@ from tdac_envs.worlds.footprint import (
     wrap_angle,
 )
 from tdac_envs.worlds.looks import ALUMINIUM, Look, chequered
+from tdac_envs.worlds.materials import MATERIAL, Contact, friction_between
 
 MAX_WHEEL_SPEED = {"1": 6.28, "2": 7.536}
-INFINITE_FRICTION = 1e3
-"""Coefficient for Webots' infinite friction, and the largest."""
+ROBOT_MASS = {"1": 0.16, "2": 0.14}
+"""Mass of an e-puck with its two wheels of 5 g, kg, by version."""
+JOINT_DISTANCE = 0.052
+"""Distance between the wheel joints of an e-puck, m; source: Webots' E-puck.proto."""
+AXLE_LENGTH = 0.057
+"""Effective axle of an e-puck, m: `JOINT_DISTANCE` plus the width of a wheel, 5 mm.
+
+The wheels of E-puck.proto are cylinders. They carry the robot on their outer rims, so
+that it turns about 9 % slower than the distance of the joints suggests. Cyberbotics'
+ROS 2 driver corrects this, too: `ros2_control.yml` of webots_ros2_epuck multiplies a
+`wheel_separation` of 0.052 m by 1.095.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +87,7 @@ class Obstacle:
         is_goal: Whether the object marks the goal.
         looks: How cameras see each of the visible parts; empty if the file does not
             tell.
+        material: The `contactMaterial`, which determines its friction.
     """
 
     name: str
@@ -88,6 +100,7 @@ class Obstacle:
     reflectance: float = 1.0
     is_goal: bool = False
     looks: tuple[Look, ...] = field(default=(), compare=False, repr=False)
+    material: str = MATERIAL
 
     def __post_init__(self) -> None:
         keep_digits(self, "x", "y", "reflectance")
@@ -113,6 +126,7 @@ class EPuck:
         z: Height at which the wheels touch the ground, m.
         version: "1" or "2".
         controller: Name of the controller in the file.
+        kinematic: Whether Webots moves it without physics, by its wheel speeds.
     """
 
     name: str
@@ -122,6 +136,7 @@ class EPuck:
     z: float = 0.0
     version: Literal["1", "2"] = "1"
     controller: str = ""
+    kinematic: bool = False
 
     def __post_init__(self) -> None:
         keep_digits(self, "x", "y", "z")
@@ -139,6 +154,20 @@ class EPuck:
         """Maximum wheel speed, rad/s."""
         return MAX_WHEEL_SPEED[self.version]
 
+    @property
+    def axle_length(self) -> float:
+        """Effective axle, m; see `AXLE_LENGTH`.
+
+        Without physics there are no rims on a floor: Webots then moves the robot by the
+        distance of the joints.
+        """
+        return JOINT_DISTANCE if self.kinematic else AXLE_LENGTH
+
+    @property
+    def mass(self) -> float:
+        """Mass with wheels, kg."""
+        return ROBOT_MASS[self.version]
+
 
 @dataclass(frozen=True, slots=True)
 class Arena:
@@ -152,6 +181,7 @@ class Arena:
         facets: Number of flat segments of a round wall; each touches the disc.
         floor_look: How cameras see the floor.
         wall_look: How cameras see the wall.
+        material: The `contactMaterial`, which determines its friction.
     """
 
     inside: Disc | Rectangle
@@ -161,6 +191,7 @@ class Arena:
     facets: int = 48
     floor_look: Look = field(default=chequered(0.5, 0.5), compare=False, repr=False)
     wall_look: Look = field(default=ALUMINIUM, compare=False, repr=False)
+    material: str = MATERIAL
 
     def __post_init__(self) -> None:
         keep_digits(self, "wall_thickness", "wall_height", "z")
@@ -196,7 +227,10 @@ class Arena:
             pieces = frame(shape, thickness)
         parts = tuple(Part(p, self.z, self.z + self.wall_height) for p in pieces)
         looks = (self.wall_look,) * len(parts)
-        return Obstacle("", self.kind, shape.x, shape.y, parts, parts, looks=looks)
+        return Obstacle(
+            "", self.kind, shape.x, shape.y, parts, parts, looks=looks,
+            material=self.material,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +270,7 @@ class World:
         arenas: Floors, with or without walls.
         obstacles: Everything else, without the walls of the arenas.
         time_step: Physics time step, ms.
-        friction: Coulomb friction coefficient of contacts.
+        contacts: Friction of pairs of materials; the first one of a pair counts.
         unmodelled: Nodes of the file that are not in the model.
         source: File name.
         version: Webots version in the file's header.
@@ -248,7 +282,7 @@ class World:
     arenas: tuple[Arena, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     time_step: float = 32.0
-    friction: float = 1.0
+    contacts: tuple[Contact, ...] = ()
     unmodelled: tuple[Unmodelled, ...] = ()
     source: str = field(default="", compare=False)
     version: str = field(default="", compare=False)
@@ -258,10 +292,6 @@ class World:
         keep_digits(self, "time_step")
         if self.time_step <= 0.0:
             raise WorldError(f"expected a time step above 0, got {self.time_step}")
-        if not 0.0 <= self.friction <= INFINITE_FRICTION:
-            wanted = f"expected a friction from 0 to {INFINITE_FRICTION:g}"
-            raise WorldError(f"{wanted}, got {self.friction}")
-        keep_digits(self, "friction")
         if self.goal is not None:
             point = (metres("x", self.goal[0]), metres("y", self.goal[1]))
             object.__setattr__(self, "goal", point)
@@ -278,6 +308,11 @@ class World:
         if not self.robots:
             raise WorldError(f"{self.source or 'the world'}: there is no e-puck in it")
         return self.robots[0]
+
+    @property
+    def friction(self) -> float:
+        """Coulomb friction coefficient of two default materials."""
+        return friction_between(self.contacts, MATERIAL, MATERIAL)
 
     @property
     def arena(self) -> Arena | None:

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from few_worlds import KNOWN, write_set, write_short_set
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from small import QUICK, write_small_task
@@ -18,12 +19,20 @@ from tdac_agent.cli.main import main
 from tdac_agent.environments.epuck import builtin as epuck
 from tdac_agent.environments.map2d.builtin import MapParameters, template_for
 from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs import load_set
 
 
 @pytest.fixture(scope="session")
 def small_task(tmp_path_factory):
     """A task that a verification needs little time for."""
     return load_task(write_small_task(tmp_path_factory.mktemp("small")))
+
+
+@pytest.fixture(scope="session")
+def policy_task(tmp_path_factory):
+    """The small task in the profile `policy`."""
+    folder = tmp_path_factory.mktemp("policy")
+    return load_task(write_small_task(folder, profile="policy"))
 
 
 @pytest.fixture(scope="session")
@@ -50,6 +59,30 @@ def warm():
     """A judge that is ready, for tests that need nothing special of it."""
     with WarmJudge() as judge:
         yield judge
+
+
+@pytest.fixture
+def few(tmp_path):
+    """A set that `known.py` solves."""
+    return load_set(write_set(tmp_path / "few.yaml"))
+
+
+@pytest.fixture(scope="session")
+def solver():
+    """The source of a controller that reaches all goals of `few`."""
+    return KNOWN.read_text()
+
+
+@pytest.fixture
+def level(tmp_path):
+    """The file of a set of short episodes, in which nothing arrives."""
+    return write_short_set(tmp_path / "few.yaml")
+
+
+@pytest.fixture
+def out(tmp_path):
+    """The folder of a run that is not there yet."""
+    return tmp_path / "run"
 
 
 @pytest.fixture
@@ -124,6 +157,18 @@ def done(tdac):
     def run(*words):
         code, out, err = tdac(*words)
         assert code == 0, err
+        return out
+
+    return run
+
+
+@pytest.fixture
+def rejected(tdac):
+    """Runs a command whose verdict is no, which is exit code 1; gives its stdout."""
+
+    def run(*words):
+        code, out, err = tdac(*words)
+        assert code == 1, err
         return out
 
     return run

@@ -13,12 +13,13 @@ import sys
 import threading
 from pathlib import Path
 
+from unconfirmed import synthesize
+
 from tdac_agent import load_task
 from tdac_agent.models.budget import Budget
 from tdac_agent.models.openai_api import OpenAIModel
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import JOURNAL
-from tdac_agent.synthesis.synthesize import synthesize
 
 
 def killing_write(write, kill_at, share):

@@ -66,6 +66,8 @@ def drive(env, act, start=None, steps=None, name="nominal", held_out=False) -> R
         radius=task.body_radius,
         tolerance=task.goal_tolerance,
         contact=record.contact,
+        smallest_gap=record.smallest_gap(),
+        required_gap=env.required_gap,
     )
 
 

@@ -11,6 +11,27 @@ KNOWN = Path(tdac_agent.__file__).parent / "builtin" / "levels" / "known.py"
 STILL_ANSWER = "```python\ndef policy(obs):\n    return 0.0, 0.0\n```\n"
 
 
+def half_of(solver):
+    """A controller that reaches some goals."""
+    return f"""{solver}
+
+drive = policy
+
+
+def policy(obs):
+    return drive(obs) if int(obs["goal"][0]) % 2 else (0.0, 0.0)
+"""
+
+
+def write_short_set(path, steps=40, **values):
+    """Writes a set of small worlds with episodes of so many steps; returns its path."""
+    short = {"factor": 1.0, "least": steps, "most": steps}
+    size = {"width": 220, "height": 180}
+    worlds = [{"name": name, **size} for name in ("aisles", "clutter")]
+    path.write_text(yaml.safe_dump({"worlds": worlds, "horizon": short, **values}))
+    return path
+
+
 def write_set(path, **values):
     """Writes a set whose level is that of `known`, with small worlds; returns its path.
 

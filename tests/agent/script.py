@@ -3,6 +3,7 @@
 from tdac_agent.models.provider import Reply
 
 STILL = "def policy(obs):\n    return 0.0, 0.0\n"
+AHEAD = "def policy(obs):\n    return 1.0, 1.0\n"
 NO_RULES = Reply("```json\n[]\n```")
 
 
@@ -30,3 +31,9 @@ class Script:
 
     def asked(self):
         return [(r.kind, *r.sample[1:]) for r in self.requests]
+
+
+class Paid(Script):
+    """A script whose answers cost tokens, as many as are reserved."""
+
+    paid = True

@@ -1,5 +1,7 @@
 """Actions for batched environments, and whether two of these agree."""
 
+import pickle
+
 import numpy as np
 
 
@@ -38,3 +40,15 @@ def actions(count, steps, seed=0):
         drawn[k : k + 2, k % count] = 1.0
     drawn[steps // 2 :, : count // 2] = 1.0
     return drawn
+
+
+def assert_goes_on(batch, count):
+    """A pickle of a batch goes on where the batch is after some steps."""
+    batch.reset(seed=2)
+    script = actions(count, 40)
+    for action in script[:20]:
+        batch.step(action)
+    twin = pickle.loads(pickle.dumps(batch))
+    for action in script[20:]:
+        for one, two in zip(batch.step(action), twin.step(action), strict=True):
+            assert_same(one, two)

@@ -1,4 +1,4 @@
-"""Policies that no bundled map may be solved by, and a driver that knows the way."""
+"""One action, policies that no bundled map may be solved by, and a driver of paths."""
 
 import itertools
 import math
@@ -8,6 +8,15 @@ import numpy as np
 
 LEFT, RIGHT = -1, 1
 DT = 0.05
+
+
+def drive(env, action, steps=10_000):
+    """The last step of some with one action, up to the end of the episode."""
+    for _ in range(steps):
+        result = env.step(action)
+        if result[2] or result[3]:
+            break
+    return result
 
 
 def steer(pose, bearing: float, robot) -> tuple[float, float]:
@@ -34,8 +43,7 @@ def wall_follower(hand: int, robot) -> Callable:
     to its hand in which the body keeps clear of all points that its rays have hit
     so far.
     """
-    fan = math.radians(robot.field_of_view_deg) / 2
-    angles = np.linspace(-fan, fan, robot.n_rays)
+    angles = robot.angles()
     sweep = -hand * np.radians(np.arange(0, 360, 10))
     body = robot.radius + 2.5
     seen = np.zeros((1024, 1024), bool)

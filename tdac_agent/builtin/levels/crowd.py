@@ -21,7 +21,7 @@ RADIUS, AXLE, RANGE = ROBOT["radius"], ROBOT["axle_length"], ROBOT["range_max"]
 DT = PARAMS["dt"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
 TOLERANCE = 0.95 * PARAMS["goal_tolerance"]
-FAN = math.radians(ROBOT["field_of_view_deg"]) * np.linspace(-0.5, 0.5, ROBOT["n_rays"])
+FAN = np.array(ROBOT["ray_angles"])  # rad from the heading
 
 EDGE = 36  # occupied pixels that are added around the map
 REACH = 40  # px up to which clearances are known

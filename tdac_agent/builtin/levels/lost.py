@@ -20,9 +20,11 @@ ROBOT, NOISES = PARAMS["robot"], PARAMS.get("disturbances", {})
 RADIUS, AXLE, RANGE = ROBOT["radius"], ROBOT["axle_length"], ROBOT["range_max"]
 DT, TOLERANCE = PARAMS["dt"], PARAMS["goal_tolerance"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
-RAYS = ROBOT["n_rays"]
-VIEW = math.radians(ROBOT["field_of_view_deg"])
-FAN = VIEW * (np.arange(RAYS) / max(RAYS - 1, 1) - 0.5)
+FAN = np.array(ROBOT["ray_angles"])  # rad from the heading, an even fan
+FAN = np.where(np.abs(FAN) > math.pi, FAN - np.copysign(2.0 * math.pi, FAN), FAN)
+ORDER = np.argsort(FAN)  # of the rays, from the left to the right
+FAN = FAN[ORDER]
+RAYS, VIEW = FAN.size, max(float(FAN[-1] - FAN[0]), 1e-9)
 SLIP = max(NOISES.get("wheel_slip", 0.0) * math.sqrt(0.1 / DT), 0.01)
 GAINS = max(NOISES.get("wheel_gains", 0.0), 0.01)
 SCALE = max(NOISES.get("odometry_scale", 0.0), 0.005)
@@ -332,7 +334,7 @@ class Maps:
         part |= distance <= RADIUS
         seen = np.nonzero((ahead > -0.1 * distance) & (distance <= RANGE))
         ahead, aside, distance = ahead[seen], aside[seen], distance[seen]
-        place = (np.arctan2(aside, ahead) + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
+        place = (np.arctan2(aside, ahead) - FAN[0]) * ((RAYS - 1) / VIEW)
         place = np.clip(place, 0.0, RAYS - 1)
         k = np.minimum(place.astype(int), RAYS - 2)
         least = np.minimum(ranges[:-1], ranges[1:])
@@ -354,7 +356,7 @@ class Maps:
         dx, dy = px - x, py - y
         distance = np.hypot(dx, dy)
         bearing = np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi)
-        place = (bearing - math.pi + 0.5 * VIEW) * ((RAYS - 1) / VIEW)
+        place = (bearing - math.pi - FAN[0]) * ((RAYS - 1) / VIEW)
         nearest = np.clip(np.rint(place).astype(int), 0, RAYS - 1)
         beside = np.abs(place - nearest) * distance * (VIEW / (RAYS - 1))
         reading = ranges[nearest]
@@ -770,7 +772,7 @@ def commands(pair, gains, best):
 def policy(obs):
     """Commands of the wheels (left, right)."""
     maps, filter_ = STATE["maps"], STATE["filter"]
-    ranges = np.asarray(obs["ranges"], float)
+    ranges = np.asarray(obs["ranges"], float)[ORDER]
     hit = ranges < FAR
     filter_.moved(np.asarray(obs["wheel_speeds"], float), obs["odometry"])
     filter_.align(ranges, hit)

@@ -22,7 +22,7 @@ RADIUS, AXLE, RANGE = ROBOT["radius"], ROBOT["axle_length"], ROBOT["range_max"]
 DT = PARAMS["dt"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
 TOLERANCE = 0.95 * PARAMS["goal_tolerance"]
-FAN = math.radians(ROBOT["field_of_view_deg"]) * np.linspace(-0.5, 0.5, ROBOT["n_rays"])
+FAN = np.array(ROBOT["ray_angles"])  # rad from the heading
 
 HALF = 330  # px from the start to the border of the map
 SIDE = 2 * HALF + 1

@@ -24,10 +24,12 @@ NOISE = PARAMS["disturbances"]["range_noise"]
 SHARP = min(RANGE, 0.6 / NOISE) if NOISE else RANGE  # px up to which rays are trusted
 DT, TOLERANCE = PARAMS["dt"], PARAMS["goal_tolerance"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
-RAYS = ROBOT["n_rays"]
-VIEW = math.radians(ROBOT["field_of_view_deg"])
-GAP = VIEW / max(RAYS - 1, 1)  # rad between two rays
-FAN = GAP * np.arange(RAYS) - 0.5 * VIEW
+FAN = np.array(ROBOT["ray_angles"])  # rad from the heading, an even fan
+FAN = np.where(np.abs(FAN) > math.pi, FAN - np.copysign(2.0 * math.pi, FAN), FAN)
+ORDER = np.argsort(FAN)  # of the rays, from the left to the right
+FAN = FAN[ORDER]
+VIEW = float(FAN[-1] - FAN[0])
+GAP = VIEW / max(FAN.size - 1, 1)  # rad between two rays
 ROUND = 2.0 * math.pi - VIEW < 1.01 * GAP  # whether the robot sees behind itself
 MARGIN = 0.06  # px that are kept from walls
 WISH, FEAR = 0.5, 1.0  # px that are kept where there is room; price of a px less
@@ -152,7 +154,7 @@ class Maps:
         square = dx * dx + (dy * dy)[:, None]
         filled = self.filled[rows, columns]
         j, i = np.nonzero(~filled & (square <= far * far))
-        place = np.arctan2(dy[j], dx[i]) - (heading - 0.5 * VIEW)
+        place = np.arctan2(dy[j], dx[i]) - (heading + FAN[0])
         place = np.remainder(place, 2.0 * math.pi) * (1.0 / GAP)
         k = np.minimum(place.astype(int), least.size - 1)
         new = square[j, i] <= least[k] ** 2
@@ -782,7 +784,7 @@ def best_course(near, x, y, heading, slack):
 def policy(obs):
     """Wheel speeds (left, right)."""
     x, y, heading = (float(value) for value in obs["pose"])
-    ranges = np.asarray(obs["ranges"], float)
+    ranges = np.asarray(obs["ranges"], float)[ORDER]
     goal = [float(value) for value in obs["goal"]]
     maps, new, (x, y, heading) = observe(x, y, heading, ranges, goal)
     maps.watch(x, y)

@@ -11,8 +11,12 @@ from typing import ClassVar
 from tdac_agent.builtin.template import Remedy, Template, Tuned, tunable
 from tdac_agent.verification.diagnosis.report import Cause
 from tdac_agent.verification.suite.contract import time_step
-from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
+from tdac_envs.drive.smallest_gap import required_gap
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.epuck.task import EPuckTask
+
+RESERVE = 0.0025
+"""Margin beyond the kept gap, m."""
 
 # An e-puck with a plan gets stuck if its sensors falsely report an obstacle.
 _DISTRUSTED = Remedy(
@@ -81,12 +85,22 @@ class EPuckParameters(Tuned):
     )
 
 
-def template_for(task: EPuckTask) -> Template[EPuckParameters]:
-    """Returns the template with a task's wheel limit, time step and tolerance."""
+def template_for(
+    task: EPuckTask, kept_gap: float | None = None
+) -> Template[EPuckParameters]:
+    """Returns the template with a task's wheel limit, time step and tolerance.
+
+    Args:
+        task: The task.
+        kept_gap: Gap to obstacles that it keeps where the world allows it, m; by
+            default the least that is required.
+    """
     facts = {
+        "kept_gap": required_gap(task.body_radius) if kept_gap is None else kept_gap,
+        "reserve": RESERVE,
         "time_step": time_step(task.dt),
         "wheel_radius": WHEEL_RADIUS,
-        "axle_length": AXLE_LENGTH,
+        "axle_length": task.axle_length,
         "max_wheel_speed": task.max_wheel_speed,
         "goal_tolerance": task.goal_tolerance,
     }

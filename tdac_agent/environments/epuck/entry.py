@@ -127,7 +127,8 @@ class EPuckEnvironment(Environment):
         from tdac_agent.environments.epuck.builtin import template_for
         from tdac_agent.environments.epuck.setting import world_setting
 
-        return template_for(world_setting(setting).nominal)
+        kept = setting.make_env().required_gap
+        return template_for(world_setting(setting).nominal, kept)
 
 
 def _own(task: Nominal) -> EPuckTask:

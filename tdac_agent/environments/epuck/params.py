@@ -8,9 +8,10 @@ from pydantic import Field
 
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.epuck.infrared import PLACES, RANGE
-from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.world import AXLE_LENGTH
 
 _AZIMUTHS: tuple[float, ...] = tuple(PLACES[:, 2].tolist())
 
@@ -20,7 +21,9 @@ class EPuckRobot(StrictModel):
 
     radius: float = Field(BODY_RADIUS, description="Radius of the body, m.")
     wheel_radius: float = Field(WHEEL_RADIUS, description="m")
-    axle_length: float = Field(AXLE_LENGTH, description="m")
+    axle_length: float = Field(
+        AXLE_LENGTH, description="Effective distance between the wheels, m."
+    )
     max_wheel_speed: float = Field(description="rad/s")
     sensor_range: float = Field(RANGE, description="Range of ps0 to ps7, m.")
     sensor_azimuths: tuple[float, ...] = Field(
@@ -73,6 +76,8 @@ def params_of(
         goal_tolerance=task.goal_tolerance,
         dt=task.dt,
         horizon=task.horizon,
-        robot=EPuckRobot(max_wheel_speed=task.max_wheel_speed),
+        robot=EPuckRobot(
+            axle_length=task.axle_length, max_wheel_speed=task.max_wheel_speed
+        ),
         notes=notes,
     )

@@ -8,9 +8,11 @@ from typing import Any
 from tdac_agent.environments.epuck.setting import world_setting
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.suite.contract import time_step
+from tdac_envs.drive.task import radii_text
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.paths import widest_body
 from tdac_envs.worlds.bodies import BODY_BOTTOM, BODY_TOP
+from tdac_envs.worlds.world import JOINT_DISTANCE
 
 LONGEST_WORLD = 16_000
 """Maximum number of characters of a world file in a prompt."""
@@ -39,10 +41,12 @@ def facts_of(task: Task) -> dict[str, Any]:
         "full_speed": f"{robot.max_wheel_speed * robot.wheel_radius:g}",
         "wheel_limit": f"{robot.max_wheel_speed:g}",
         "axle": f"{robot.axle_length:g}",
+        "joints": f"{JOINT_DISTANCE:g}",
         "time_step": time_step(nominal.dt),
         "sensor_range": f"{robot.sensor_range:g}",
         "tolerance_m": f"{nominal.goal_tolerance:g}",
         "tolerance_mm": f"{1e3 * nominal.goal_tolerance:g}",
+        "tolerance_radii": radii_text(nominal.goal_tolerance, nominal.body_radius),
         "radius_mm": f"{1e3 * nominal.body_radius:g}",
         "body_bottom": f"{1e3 * BODY_BOTTOM:g}",
         "body_top": f"{1e3 * BODY_TOP:g}",

@@ -17,6 +17,7 @@ from tdac_agent.tasks.units import METRES, Units
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
+from tdac_envs.drive.task import with_tolerance_note
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import TABLE
@@ -118,6 +119,15 @@ class EPuckSetting:
         """False: infra-red sensors have no largest range."""
         return False
 
+    @property
+    def disturbances(self) -> dict[str, Any]:
+        """Empty: worlds name no robot file."""
+        return {}
+
+    def length_of(self, length: float) -> float:
+        """Returns the length: both are in metres."""
+        return length
+
     def facts(self) -> dict[str, Any]:
         """Returns the environment's arguments, with the world's hash and `left_out`."""
         own = {"world": self.world_sha256(), "left_out": self.left_out}
@@ -211,7 +221,8 @@ def _setting(
     )
     text = write_world(flat)
     digest = sha256_of(text)
-    params = params_of(nominal, file.name, digest, world.notes)
+    notes = with_tolerance_note(world.notes, nominal, METRES.length_text)
+    params = params_of(nominal, file.name, digest, notes)
     return EPuckSetting(params, nominal, text, file, left_out)
 
 

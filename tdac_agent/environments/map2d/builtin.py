@@ -10,7 +10,11 @@ from typing import ClassVar
 
 from tdac_agent.builtin.template import Remedy, Template, Tuned, tunable
 from tdac_agent.verification.diagnosis.report import Cause
+from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.mapping.params import RobotParams
+
+RESERVE = 0.02
+"""Margin beyond the kept gap, as a share of the radius: it does not drive exactly."""
 
 _HELD_UP = Remedy(
     scale={"unstick_after": 0.5, "lookahead": 0.5}, switch_on={"unstick_after": 100.0}
@@ -90,7 +94,10 @@ class MapParameters(Tuned):
 
 
 def template_for(
-    robot: RobotParams, dt: float, resolution: float | None = None
+    robot: RobotParams,
+    dt: float,
+    resolution: float | None = None,
+    kept_gap: float | None = None,
 ) -> Template[MapParameters]:
     """Returns the template for a robot.
 
@@ -98,8 +105,15 @@ def template_for(
         robot: Values of the robot's constants.
         dt: Duration of a step, s.
         resolution: Metres per pixel, if it observes metres.
+        kept_gap: Gap to obstacles that it keeps where the map allows it, px; by
+            default the least that is required.
     """
     file = Path(__file__).with_name("controller.py.j2")
-    return Template(
-        MapParameters, file, {"robot": robot, "dt": dt, "resolution": resolution}
-    )
+    facts = {
+        "robot": robot,
+        "dt": dt,
+        "resolution": resolution,
+        "kept_gap": required_gap(robot.radius) if kept_gap is None else kept_gap,
+        "reserve": RESERVE,
+    }
+    return Template(MapParameters, file, facts)

@@ -126,7 +126,8 @@ class Map2DEnvironment(Environment):
         own = map_setting(setting)
         params = own.params
         resolution = params.resolution if params.frame == "metres" else None
-        return template_for(params.robot, own.nominal.dt, resolution)
+        kept = setting.make_env().required_gap
+        return template_for(params.robot, own.nominal.dt, resolution, kept)
 
 
 def _own(task: Nominal) -> Map2DTask:

@@ -46,12 +46,14 @@ def _make_worlds() -> None:
     from tdac_envs.ladder.generators.clutter import Clutter, draw
     from tdac_envs.ladder.random_stream import RandomStream
     from tdac_envs.ladder.worlds import WorldSpec, make_world
+    from tdac_envs.mapping.ray_angles import fan
 
     clutter = Clutter.model_validate({"name": "clutter", "width": 60, "height": 60})
     draw(RandomStream(bytes(32)), clutter, 8.0)
     maze = {"name": "mazes", "width": 60, "height": 60, "loops": 0.0}
     spec = WorldSpec.model_validate({"generator": maze, "radius": 4, "min_steps": 10})
-    dead_ends(make_world(spec, bytes(32)), spec.radius, RangeSensor(18, 2.0, 40.0))
+    sensor = RangeSensor(fan(110.0, 18), 40.0)
+    dead_ends(make_world(spec, bytes(32)), spec.radius, sensor)
 
 
 def _plan_among_movers() -> None:

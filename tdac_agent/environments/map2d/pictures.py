@@ -54,6 +54,7 @@ class MapPictures:
             outcomes=outcomes,
             labels=labels,
             movers=movers,
+            units=self.units,
         )
 
     def frames(self, rollout: Rollout, stride: int) -> Iterator[Image]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 from tdac_agent.environments.map2d.moving import sentence_on
 from tdac_agent.environments.map2d.setting import Map2DSetting, map_setting
 from tdac_agent.prompting.manual import interface_of, needed_part
+from tdac_agent.prompting.params_text import params_text
 from tdac_agent.tasks.task import SENSORS_FILE, Task
+from tdac_envs.drive.task import radii_text
 from tdac_envs.map2d.terrain import widest_connected_radius
 
 HOW_THE_MAP_WAS_MADE = {
@@ -29,9 +30,8 @@ moves along the exact arc of its wheel speeds, which are constant during a step.
 disc swept along this arc is tested exactly against the occupied squares, so no step can
 jump through a thin wall."""
 RAYS = """\
-Ray i points at `field_of_view/2 - i * field_of_view/(n_rays - 1)` from the heading:
-`ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost. Rays start at the
-centre; no hit gives `range_max`."""
+Ray i points at `ray_angles[i]` from the heading (rad, counter-clockwise; see
+params.json). Rays start at the centre; no hit gives `range_max`."""
 
 
 def facts_of(task: Task) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def facts_of(task: Task) -> dict[str, Any]:
         "loaders_text": (
             "`load_params() -> dict`, `load_occupancy() -> bool array [y, x]`"
         ),
-        "params_text": json.dumps(params, indent=2),
+        "params_text": params_text(params),
         "widest": widest_connected_radius(terrain.clear, start, nominal.goal),
         "movers_text": sentence_on(setting.movers),
         "number": 6,
@@ -57,6 +57,7 @@ def facts_of(task: Task) -> dict[str, Any]:
         "width": grid.width,
         "height": grid.height,
         "tolerance": nominal.goal_tolerance,
+        "tolerance_radii": radii_text(nominal.goal_tolerance, nominal.body_radius),
         "radius": nominal.body_radius,
         "sensors_text": needed_part(
             SENSORS_FILE.read_text(encoding="utf-8"),  # raw read: shipped

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
-
 from tdac_agent.environments.map2d.moving import as_option, check_movers
+from tdac_agent.environments.map2d.task_robot import (
+    check_robot_image,
+    further,
+    further_written,
+    robot_in_pixels,
+    robot_text,
+    with_robot,
+    with_robot_file,
+)
 from tdac_agent.tasks.setting import Original, Setting
-from tdac_agent.tasks.task_file import RobotSpec, TaskFile, check_frame
+from tdac_agent.tasks.task_file import TaskFile, check_frame
 from tdac_agent.tasks.units import PIXELS, Units
-from tdac_envs.core.errors import MapError, RefusedError, TaskError
+from tdac_envs.core.errors import RefusedError, TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
-from tdac_envs.drive.task import Pose
+from tdac_envs.drive.task import Pose, with_tolerance_note
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS as MAP_PIXELS
 from tdac_envs.grid.map_units import MapUnits
@@ -27,16 +34,14 @@ from tdac_envs.map2d.source import prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.fault import fault_of
-from tdac_envs.mapping.image import picture_size, read_bytes
+from tdac_envs.mapping.image import read_bytes
 from tdac_envs.mapping.map_folder import preview_of, write_grid
-from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
+from tdac_envs.mapping.params import MapParams, ReadingOptions
 from tdac_envs.mapping.preprocessing import as_image
 from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
 from tdac_envs.movers.spec import AnySpec
 
 DT = 0.05
-ROBOT_IMAGE_BYTES = 16_000_000
-ROBOT_IMAGE_PIXELS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +55,7 @@ class Map2DSetting:
         robot_image: Picture of the robot.
         movers: Moving obstacles, px.
         view: What a controller observes, if it is told metres.
+        disturbances: What its file says of the robot's, in units of the task.
         shown_in: Units of what the user reads; the environment's units are pixels.
     """
 
@@ -60,6 +66,7 @@ class Map2DSetting:
     movers: tuple[AnySpec, ...] = ()
     shown_in: MapUnits = MAP_PIXELS
     view: MetricView | None = None
+    disturbances: dict[str, Any] = field(default_factory=dict)
 
     @property
     def original(self) -> Original | None:
@@ -131,6 +138,7 @@ class Map2DSetting:
         nominal, robot = self.nominal, self.nominal.robot
         return {
             **as_option(self.movers),
+            **further(robot),
             "map": nominal.terrain.grid.cells,
             "start": tuple(nominal.start),
             "goal": nominal.goal,
@@ -158,6 +166,10 @@ class Map2DSetting:
         """True: rays may read the largest range."""
         return True
 
+    def length_of(self, length: float) -> float:
+        """See `Setting`."""
+        return self.task_units.length_in_pixels(length)
+
     def facts(self) -> dict[str, Any]:
         """Returns the environment's arguments, with the map's hash."""
         frame = {} if self.view is None else {"frame": self.params.frame}
@@ -178,7 +190,10 @@ class Map2DSetting:
         shown = grid.cells if self.image is None else self.image
         path = self.nominal.shortest_path(self.nominal.start)
         image = as_image(shown)
-        return preview_of(image, grid, self.params, self.shown_in, path=path)
+        near = self.nominal.goal_tolerance
+        return preview_of(
+            image, grid, self.params, self.shown_in, path=path, tolerance=near
+        )
 
     def portable(self) -> dict[str, Any]:
         """Returns the keys for the grid and robot picture in the folder."""
@@ -189,6 +204,7 @@ class Map2DSetting:
             **({} if self.view is None else {"frame": self.params.frame}),
             "map": ".",
             "robot": {
+                **further_written(robot, units),
                 "radius": length(robot.radius),
                 "axle": length(robot.axle_length),
                 "max_wheel_speed": length(robot.max_wheel_speed),
@@ -239,6 +255,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     typed = None if spec.start is None else (spec.start[0], spec.start[1])
     units = units_of(source, spec.frame, spec.resolution).with_typed(typed, spec.goal)
     spec = _in_pixels(spec, units)
+    spec, disturbances = with_robot_file(spec, source, base, units)
     prepared = prepare(
         source,
         spec.start,
@@ -249,7 +266,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         resolution=spec.resolution,
         units=units,
     )
-    params = _with_robot(prepared.params, spec.robot)
+    params = with_robot(prepared.params, spec.robot)
     params = params.model_copy(update={"frame": spec.frame})
     try:
         nominal = _feasible(prepared.grid, params, spec, units)
@@ -264,11 +281,13 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         pictures = {"refused": picture}
         raise RefusedError(message, params.source, pictures) from error
     check_movers(spec.movers, nominal)
+    notes = with_tolerance_note(params.notes, nominal, units.length)
+    params = params.model_copy(update={"notes": notes})
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
     if spec.robot.image is not None:
-        _check_robot_image(robot_image)
+        check_robot_image(robot_image)
     name = spec.map if bundled else Path(spec.map).stem
     setting = Map2DSetting(
         params,
@@ -278,17 +297,9 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         spec.movers,
         units,
         None if units.frame is None else MetricView(units.frame),
+        disturbances,
     )
     return name, setting
-
-
-def robot_text(robot: RobotParams, units: MapUnits) -> str:
-    """The robot's size and speed on a map, and how to change them."""
-    return (
-        f"robot: radius {units.length(robot.radius)}, full speed "
-        f"{units.length(robot.max_wheel_speed, 0)}/s (to change them: --robot-radius, "
-        "--max-speed)"
-    )
 
 
 def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
@@ -304,38 +315,9 @@ def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
         changes["goal"] = units.pixels(spec.goal)
     if spec.tolerance is not None:
         changes["tolerance"] = units.length_in_pixels(spec.tolerance)
-    names = ("radius", "axle", "max_wheel_speed", "range_max")
-    lengths = {name: getattr(spec.robot, name) for name in names}
-    robot = {
-        name: units.length_in_pixels(length)
-        for name, length in lengths.items()
-        if length is not None
-    }
-    changes["robot"] = spec.robot.model_copy(update=robot)
+    changes["robot"] = robot_in_pixels(spec.robot, units)
     changes["movers"] = movers_in_pixels(spec.movers, units)
     return spec.model_copy(update=changes)
-
-
-def _check_robot_image(file: Path) -> None:
-    try:
-        width, height = picture_size(read_bytes(file, ROBOT_IMAGE_BYTES), file.name)
-    except MapError as error:
-        raise TaskError(f"the robot image: {error}") from error
-    if not cv2.haveImageReader(str(file)):
-        raise TaskError(f"the robot image {str(file)!r} is not a PNG or JPEG")
-    if width * height > ROBOT_IMAGE_PIXELS:
-        raise TaskError(
-            f"the robot image {str(file)!r} has {width} x {height} pixels; the limit "
-            f"is {ROBOT_IMAGE_PIXELS / 1e6:g} megapixels: scale it down"
-        )
-
-
-def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
-    values = spec.model_dump(exclude={"radius", "image"}, exclude_none=True)
-    fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
-    changes = {fields.get(key, key): value for key, value in values.items()}
-    robot = RobotParams(**{**params.robot.model_dump(), **changes})
-    return params.model_copy(update={"robot": robot})
 
 
 def _feasible(

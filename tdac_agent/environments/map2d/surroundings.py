@@ -21,6 +21,7 @@ from tdac_envs.grid.plan import Path, descend, first_beyond
 from tdac_envs.map2d.rays import sees
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import path_entry
+from tdac_envs.mapping.ray_angles import faces
 
 _PARTS = 0.0, -0.95, 0.95, -0.5, 0.5
 
@@ -57,13 +58,13 @@ class MapSurroundings:
 
     def seen(self, touch: Touch, trajectory: Trajectory) -> str:
         """Describes whether a ray points at the touched wall."""
-        half = self.task.robot.field_of_view_deg / 2.0
-        off = abs(math.degrees(touch.bearing))
-        if off > half:
+        angles = self.task.robot.angles()
+        if not faces(angles, touch.bearing):
+            off, half = (math.degrees(abs(a)) for a in (touch.bearing, angles[-1]))
             digits = 1 if off < half + 1.0 else 0
             return (
                 f"No ray points there: it is {off:.{digits}f}° off the heading; the "
-                f"fan covers ±{half:g}°."
+                f"fan covers {_covered(angles)}."
             )
         earlier = min(trajectory.steps, 10)
         shortest = float(trajectory.ranges[trajectory.steps - earlier].min())
@@ -75,6 +76,7 @@ class MapSurroundings:
     def in_sight(self, pose: Pose, place: Point, radius: float) -> bool:
         """See `Surroundings`: whether a ray of a dense fan would end at the disc."""
         robot, (x, y) = self.task.robot, place
+        angles = robot.angles()
         far, towards = math.dist(pose[:2], place), math.atan2(y - pose.y, x - pose.x)
         if far <= radius:
             return True
@@ -83,11 +85,10 @@ class MapSurroundings:
             aside = part * radius
             angle = towards + math.asin(aside / far)
             reach = math.sqrt(far**2 - aside**2) - math.sqrt(radius**2 - aside**2)
-            off = abs(math.remainder(angle - pose.heading, math.tau))
             end = pose.x + reach * math.cos(angle), pose.y + reach * math.sin(angle)
             if (
                 reach <= robot.range_max
-                and off <= math.radians(robot.field_of_view_deg) / 2.0
+                and faces(angles, angle - pose.heading)
                 and sees(self.task.terrain.leaps, pose.x, pose.y, *end)
             ):
                 return True
@@ -138,6 +139,12 @@ _ROUND = 0.83
 _SHARPEST_STRAIGHT = math.radians(135.0)
 # Below this angle, the outline turns back at the end of a thin wall.
 _WALL_END = math.radians(20.0)
+
+
+def _covered(angles: NDArray[np.float64]) -> str:
+    """Formats the angles that rays cover: `±55°`, `-10° to 90°`."""
+    first, last = (round(math.degrees(a), 6) for a in (angles.min(), angles.max()))
+    return f"±{last:g}°" if first == -last else f"{first:g}° to {last:g}°"
 
 
 def nearest_touch(task: Map2DTask, pose: Pose, reach: float) -> Touch | None:

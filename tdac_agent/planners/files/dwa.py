@@ -111,7 +111,7 @@ def policy(obs):
     pose, grid, commands = STATE["pose"], STATE["grid"], STATE["commands"]
     pose.update(obs)
     STATE["time"] += DT
-    ranges = np.asarray(obs["ranges"], float)
+    ranges = np.asarray(obs["ranges"], float)[ORDER]
     grid.scan(pose.x, pose.y, pose.heading, ranges, ranges < MARKED, STATE["time"])
     later = pose.ahead(commands)
     grid.replan(later.x, later.y)

@@ -75,7 +75,7 @@ def policy(obs):
     goal_x, goal_y = (float(value) for value in obs["goal"])
     wanted = math.atan2(goal_y - pose.y, goal_x - pose.x) - pose.heading
     wanted = math.remainder(wanted, math.tau)
-    ranges = np.asarray(obs["ranges"], float)
+    ranges = np.asarray(obs["ranges"], float)[ORDER]
     angles, seen = FAN[AHEAD], ranges[AHEAD]
     free = free_lengths(ranges, angles)
     gap = widest_gap(free)

@@ -47,7 +47,7 @@ FREE = ROOM
 STUCK = 25
 """Steps within 3 px after which the robot recovers."""
 
-SEES = PARAMS["map"] or ROBOT["field_of_view_deg"] > 300.0  # also behind
+SEES = PARAMS["map"] or math.degrees(VIEW) > 300.0  # also behind
 LEAST = -math.inf if SEES else 0.0  # speed ahead, as a share
 
 
@@ -114,7 +114,7 @@ def policy(obs):
     pose, grid, commands = STATE["pose"], STATE["grid"], STATE["commands"]
     pose.update(obs)
     STATE["time"] += DT
-    ranges = np.asarray(obs["ranges"], float)
+    ranges = np.asarray(obs["ranges"], float)[ORDER]
     hit = ranges < RANGE - 1e-3
     grid.scan(pose.x, pose.y, pose.heading, ranges, hit, STATE["time"])
     later = pose.ahead(commands)

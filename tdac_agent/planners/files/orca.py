@@ -230,7 +230,7 @@ def policy(obs):
     pose, grid = STATE["pose"], STATE["grid"]
     pose.update(obs)
     STATE["time"] += DT
-    ranges = np.asarray(obs["ranges"], float)
+    ranges = np.asarray(obs["ranges"], float)[ORDER]
     walls = track(grid, pose, ranges)
     grid.scan(pose.x, pose.y, pose.heading, ranges, walls, STATE["time"])
     grid.replan(pose.x, pose.y)

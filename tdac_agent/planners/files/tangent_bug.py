@@ -131,7 +131,7 @@ def policy(obs):
     pose.update(obs)
     STATE["time"] += DT
     STATE["step"] += 1
-    points = remembered(pose, np.asarray(obs["ranges"], float))
+    points = remembered(pose, np.asarray(obs["ranges"], float)[ORDER])
     free = free_lengths(points, DIRECTIONS)
     wanted = math.atan2(goal[1] - pose.y, goal[0] - pose.x)
     if STATE["follows"] and nearest_seen(free, pose, goal) < STATE["least"] - LEAVE:

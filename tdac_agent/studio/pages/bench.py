@@ -12,7 +12,7 @@ from tdac_agent.bench.arena import DRIVEN
 from tdac_agent.bench.bench import RESULTS, SPLITS
 from tdac_agent.bench.page import PAGE
 from tdac_agent.evaluation.policies import BUILTIN, PRIVILEGED
-from tdac_agent.planners.planner import planner_names
+from tdac_agent.planners.names import planner_names
 from tdac_agent.studio.folder import as_word, folders_with, lines_in, within
 from tdac_agent.studio.jobs import StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.layout import (

@@ -43,8 +43,9 @@ iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
   height: 82vh; background: white; }
 .status { border-radius: 999px; padding: .1em .7em; font-weight: 600;
   background: #e4e2da; }
-.status.verified, .status.selected, .status.trained, .status.finished {
-  background: #cfe9dc; }
+.status.verified, .status.trained, .status.finished { background: #cfe9dc; }
+.status.passed { background: #cfe6ec; }
+.status.selected { background: #dcdcf3; }
 .status.running { background: #d6e4f5; }
 .status.not-verified, .status.not-finished { background: #f4d9d2; }
 .q-uploader { width: 100%; max-width: 32rem; border: 2px dashed #bdbab0;

@@ -11,6 +11,7 @@ from tdac_agent.studio.folder import STATE, as_word, made_within
 from tdac_agent.studio.jobs import job_of, start, stop_job
 from tdac_agent.studio.pages.films import show_film
 from tdac_agent.studio.run_status import readable_run
+from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
@@ -46,7 +47,7 @@ class Robustness:
         """Shows what has been measured, and which video is finished."""
         if not self._card.visible:
             run = readable_run(folder)
-            if run is None or not run.verified or run.on_set:
+            if run is None or not run.passed or run.on_set:
                 return
             self._card.visible = True
         job = job_of(self._place, self._out)
@@ -72,6 +73,8 @@ class Robustness:
                 low, high = report.interval.low, report.interval.high
                 text += f" (95 % interval {low:.3f} to {high:.3f})"
             ui.label(f"{text}.")
+            for line in report.gap_lines(UNITS[report.provenance.unit]):
+                ui.label(f"{line}.")
             with ui.row().classes("items-center gap-2"):
                 ui.label("Failures first, then the slowest; click one to watch it:")
                 for episode in report.worst[:SHOWN]:

@@ -116,7 +116,7 @@ class RunPage(JobPage):
         continues = own and state.status != "running"
         self._show_status(state.status, running=state.running, continues=continues)
         self._follow.visible = state.running
-        self._download.visible = state.status in ("verified", "selected")
+        self._download.visible = state.status in ("verified", "passed", "selected")
         self._judge.visible = state.status == "selected"
         self._remarks.clear()
         with self._remarks:

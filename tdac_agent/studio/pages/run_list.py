@@ -138,7 +138,7 @@ def _row(folder: Path) -> dict[str, Any]:
 def _cells(place: Path, row: dict[str, Any]) -> dict[str, Any]:
     run = str(Path(row["run"]).resolve().relative_to(place))
     iteration = f"iteration {row['k']}" if "k" in row else NONE
-    if row["status"] not in ("verified", "selected") and "k" in row:
+    if row["status"] not in ("verified", "passed", "selected") and "k" in row:
         iteration += f" of {row['iterations']}"
     iteration += variations_text(row) if "k" in row else ""
     cost = row.get("cost")

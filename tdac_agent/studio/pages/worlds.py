@@ -13,7 +13,7 @@ from nicegui import ui
 
 from tdac_agent.evaluation.replay import SHOWN
 from tdac_agent.html_report.scene import data_address
-from tdac_agent.planners.planner import planner_names
+from tdac_agent.planners.names import planner_names
 from tdac_agent.studio.driving import KeyboardDrive
 from tdac_agent.studio.folder import FILES, STATE, as_word, keep, made_within
 from tdac_agent.studio.jobs import free_folder, start

@@ -12,19 +12,25 @@ from tdac_agent.models.choice import Options, check_names, missing_for_name
 from tdac_agent.models.prices import load_prices
 from tdac_agent.models.ready import needs_limit
 from tdac_agent.models.tariff import MAX_COST
+from tdac_agent.models.vendors import VENDORS
 from tdac_agent.studio.folder import STATE
 from tdac_agent.studio.pages.layout import keep_upload
 
-WHO = {
-    "builtin": "the built-in template, no language model",
-    "anthropic": "a model of Anthropic",
-    "openai": "a model of OpenAI, or of a server with its API",
+OTHERS = {
     "manual": "a person, or a chat window: copy the prompt, paste the answer",
     "file": "a controller of my own; if it fails, the template takes over",
 }
-VENDORS = ("anthropic", "openai")
 QUESTIONS = "questions"
 """Folder in `.studio` with the questions of a `manual` run."""
+
+
+def _who() -> dict[str, str]:
+    """Who can write the controller, with what the page calls them."""
+    vendors = {
+        each.name: f"a model of {each.company}{each.serves}"
+        for each in VENDORS.values()
+    }
+    return {"builtin": "the built-in template, no language model", **vendors, **OTHERS}
 
 
 class Writers:
@@ -41,7 +47,7 @@ class Writers:
     ) -> None:
         self._place, self._changed, self._file = place, changed, ""
         self._on_task = on_task
-        self._who = ui.radio(WHO, value="builtin", on_change=self._update).props(
+        self._who = ui.radio(_who(), value="builtin", on_change=self._update).props(
             "dense"
         )
         with ui.row().classes("w-full items-end gap-4") as self._paid:

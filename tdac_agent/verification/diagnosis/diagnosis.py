@@ -17,6 +17,7 @@ from tdac_agent.verification.diagnosis.course import (
     heading_error,
     turned_away,
 )
+from tdac_agent.verification.diagnosis.gap import too_close_text
 from tdac_agent.verification.diagnosis.motion import forward, saturated
 from tdac_agent.verification.diagnosis.mover import (
     MoverTouch,
@@ -25,6 +26,7 @@ from tdac_agent.verification.diagnosis.mover import (
     time_in_sight,
     where_from,
 )
+from tdac_agent.verification.diagnosis.nearest import gap_of
 from tdac_agent.verification.diagnosis.report import Cause, Diagnosis
 from tdac_agent.verification.diagnosis.stall import PROGRESS, percent
 from tdac_agent.verification.diagnosis.surroundings import (
@@ -61,10 +63,19 @@ def diagnose(rollout: Rollout, task: Nominal, shown: Units | None = None) -> Dia
         text = "A held-out start failed; its details are not disclosed."
         return Diagnosis(cause="held out", text=text)
     around = surroundings_of(task, shown)
-    return _diagnose(rollout_on_screen(rollout, around.units), around)
+    near = _passed_too_close(rollout, task, around.units)
+    return _diagnose(rollout_on_screen(rollout, around.units), around, near)
 
 
-def _diagnose(rollout: Rollout, around: Surroundings) -> Diagnosis:
+def _passed_too_close(rollout: Rollout, task: Nominal, units: Units) -> str:
+    """Where the body came too close to an obstacle; empty if it did not."""
+    gap = gap_of(rollout, task)
+    if gap is None or not gap.too_close:
+        return ""
+    return f"It came {too_close_text(gap, units)}. "
+
+
+def _diagnose(rollout: Rollout, around: Surroundings, near: str) -> Diagnosis:
     if rollout.error is not None:
         return _error(rollout, around.units)
     if rollout.trajectory.steps == 0:
@@ -72,7 +83,7 @@ def _diagnose(rollout: Rollout, around: Surroundings) -> Diagnosis:
         return _diagnosis(rollout, around.units, "no motion", text, 0)
     if rollout.outcome == "collision":
         return _collision(rollout, around)
-    return _no_arrival(rollout, around)
+    return _no_arrival(rollout, around, near)
 
 
 def _error(rollout: Rollout, units: Units) -> Diagnosis:
@@ -169,7 +180,7 @@ def _passed_goal(rollout: Rollout, units: Units) -> str:
     return f"It had passed the goal in step {best} with {left}. "
 
 
-def _no_arrival(rollout: Rollout, around: Surroundings) -> Diagnosis:
+def _no_arrival(rollout: Rollout, around: Surroundings, near: str) -> Diagnosis:
     cause, text, step = why_no_arrival(rollout, around)
     trajectory = rollout.trajectory
     end = _pose(trajectory, trajectory.steps)
@@ -181,7 +192,7 @@ def _no_arrival(rollout: Rollout, around: Surroundings) -> Diagnosis:
             f"its {side_of(touch.bearing)}."
         )
     error, course = _course(rollout, around)
-    text = f"{cause}: {text} {course}"
+    text = f"{cause}: {text} {near}{course}"
     return _diagnosis(rollout, around.units, cause, text, step, heading_error=error)
 
 

@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.units import Place, Units
+from tdac_agent.verification.diagnosis.gap import Gap, closest
 
 Group = Literal["static", "unit", "end to end", "user", "judge"]
 GROUPS: tuple[Group, ...] = ("static", "unit", "end to end", "user", "judge")
@@ -95,6 +96,15 @@ class Episode(StrictRecord):
     call_ms_mean: float
     call_ms_p99: float
     error: str | None = None
+    smallest_gap: Gap | None = Field(
+        None, description="Smallest gap between body and obstacles, with its place."
+    )
+
+    @property
+    def too_close(self) -> bool:
+        """Whether it reached the goal with a smaller gap than the required one."""
+        found, reached = self.smallest_gap, self.outcome == "reached"
+        return reached and found is not None and found.too_close
 
 
 class Provenance(StrictRecord):
@@ -164,8 +174,24 @@ class Report(StrictRecord):
 
     @property
     def passed(self) -> bool:
-        """Whether the controller is verified."""
+        """Whether the controller passed all tests."""
         return self.verdict.passed
+
+    @property
+    def closest(self) -> Episode | None:
+        """The episode with the smallest gap; None if no gap is on record."""
+        found = closest((each, each.smallest_gap) for each in self.episodes)
+        return None if found is None else found[0]
+
+    @property
+    def smallest_gap(self) -> Gap | None:
+        """The smallest gap of all episodes."""
+        return None if self.closest is None else self.closest.smallest_gap
+
+    @property
+    def too_close(self) -> tuple[Episode, ...]:
+        """The episodes that reached the goal with less than the required gap."""
+        return tuple(each for each in self.episodes if each.too_close)
 
 
 def id_of(nodeid: str) -> str:

@@ -21,10 +21,10 @@ from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_agent.tasks.task import read_task
 from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.episode_row import EpisodeRow, driven_row
 from tdac_agent.verification.judge.in_order import in_order
 from tdac_agent.verification.judge.policy_spec import PolicySpec
-from tdac_agent.verification.judge.sequential import SequentialTest
 from tdac_agent.verification.judge.set_checks import (
     CHECKED_STEPS,
     CHECKS_FILE,
@@ -38,6 +38,7 @@ from tdac_agent.verification.judge.worlds import (
     SetWorlds,
     TaskWorld,
     Worlds,
+    public_split,
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
@@ -77,7 +78,7 @@ class EpisodeJob(BaseModel):
     policy: PolicySpec
     numbers: tuple[int, ...]
     checks: bool = False
-    test: SequentialTest | None = None
+    test: EndingTest | None = None
     told: bool = True
     patience: int | None = None
     tier: str
@@ -166,7 +167,7 @@ def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
     on timing. Episodes after its decision are dropped.
     """
     job.out.mkdir(exist_ok=True)
-    counts, fault, problem = [0, 0], None, None
+    counts, fault, problem = [0, 0, 0], None, None
     tier = job.tier if job.policy.kind == "controller" else UNSANDBOXED
     before = kept_rows(job.rows, job.numbers)
     with ExitStack() as stack:
@@ -190,6 +191,7 @@ def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
                     file.write(done.row.model_dump_json() + "\n")
                     file.flush()
                 counts[not done.row.success] += 1
+                counts[2] += done.row.touched
                 if job.test and job.test.decide(*counts) != "undecided":
                     break
         except SandboxError as error:
@@ -242,8 +244,8 @@ def _checked(run: EpisodeRun) -> tuple[Checks, str]:
         return Checks(results=results), job.tier
     assert not isinstance(worlds, TaskEpisodes)
     # A public world, so that a failure tells nothing of hidden ones.
-    public, own = ("dev", "test", "train"), worlds.worlds
-    split = next((s for s in public if worlds.tasks.count(s) != 0), own.split)
+    own = worlds.worlds
+    split = public_split(worlds.tasks) or own.split
     shown = own.model_copy(update={"split": split, "salt_file": None})
     # Here and not in a worker pool, so that its processes share what this loads.
     drive = partial(_drive, replace(run, worlds=opened(shown)), 0, CHECKED_STEPS)

@@ -14,7 +14,9 @@ from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
+from tdac_agent.verification.diagnosis.gap import Gap
 from tdac_agent.verification.diagnosis.measures import spectral_arc_length
+from tdac_agent.verification.diagnosis.nearest import gap_of
 from tdac_agent.verification.diagnosis.report import Cause
 from tdac_envs.drive.scores import barn_score, path_score, time_score
 
@@ -64,10 +66,13 @@ class EpisodeRow(StrictRecord):
         None, description="Spectral arc length of the speed; 0 would be smoothest."
     )
     clearance_min: float | None = Field(
-        None, description="Least gap between body and obstacles."
+        None, description="Least gap at the ends of steps, on the lattice of pixels."
     )
     clearance_mean: float | None = Field(
-        None, description="Mean gap between body and obstacles."
+        None, description="Mean gap at the ends of steps."
+    )
+    smallest_gap: Gap | None = Field(
+        None, description="Smallest gap between body and obstacles, with its place."
     )
     gap: float | None = Field(None, description="Narrowest passage of the world.")
     detour: float | None = None
@@ -93,6 +98,11 @@ class EpisodeRow(StrictRecord):
         return self.outcome == "reached" and not self.collisions
 
     @property
+    def touched(self) -> bool:
+        """Whether something was touched."""
+        return self.outcome == "collision" or self.collisions > 0
+
+    @property
     def number(self) -> int:
         """Its seed, or the number of its world."""
         number = self.index if self.seed is None else self.seed
@@ -100,9 +110,21 @@ class EpisodeRow(StrictRecord):
         return number
 
     @property
+    def least_gap(self) -> float | None:
+        """Its smallest gap; of an older record, the least at the ends of steps."""
+        found = self.smallest_gap
+        return self.clearance_min if found is None else found.gap
+
+    @property
     def gap_left(self) -> float:
-        """Its least gap; 0 after a failure."""
-        return self.clearance_min or 0.0 if self.success else 0.0
+        """Its smallest gap; 0 after a failure."""
+        return self.least_gap or 0.0 if self.success else 0.0
+
+    @property
+    def too_close(self) -> bool:
+        """Whether it reached the goal with a smaller gap than the required one."""
+        found = self.smallest_gap
+        return self.success and found is not None and found.too_close
 
 
 class Scores(StrictRecord):
@@ -162,6 +184,7 @@ def driven_row(
         d_min=round(float(distances.min()), digits),
         clearance_min=round(float(gaps.min()), _DIGITS) if gaps.size else None,
         clearance_mean=round(float(gaps.mean()), _DIGITS) if gaps.size else None,
+        smallest_gap=gap_of(rollout, task, told=told),
         contact=rollout.contact,
         error=rollout.error,
         cpu_seconds=round(cpu_seconds, 3),

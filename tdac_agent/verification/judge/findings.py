@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from tdac_agent.episodes.trajectory import Rollout
-from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
+from tdac_agent.verification.diagnosis.nearest import gap_of
 from tdac_agent.verification.diagnosis.report import Episode
 from tdac_agent.verification.judge.jobs import Findings
 from tdac_agent.verification.judge.judge import NOMINAL, Judge, Key, rollout_key
+from tdac_agent.verification.judge.suite_episode import SuiteTask
 
 
 def driven(judge: Judge) -> list[Rollout]:
@@ -24,7 +25,10 @@ def driven(judge: Judge) -> list[Rollout]:
 
 
 def findings_of(
-    judge: Judge, expected: list[str], shown: Units | None = None
+    judge: Judge,
+    expected: list[str],
+    shown: Units | None = None,
+    checks: dict[str, str | None] | None = None,
 ) -> Findings:
     """The findings of a settled judge.
 
@@ -32,6 +36,7 @@ def findings_of(
         judge: The judge.
         expected: The tests that had to run.
         shown: Units that the user reads, if they are not the environment's.
+        checks: Static and contract tests on a task set.
     """
     task = judge.task
     rollouts = judge.rollouts
@@ -42,7 +47,7 @@ def findings_of(
         and (rollout.held_out or rollout.outcome not in ("reached", "stopped"))
     }
     diagnoses = {
-        key: diagnose(rollout, task.nominal).model_dump_json()
+        key: diagnose(rollout, task.nominal, task.told_units).model_dump_json()
         for key, rollout in failed.items()
     }
     texts = {} if shown is None else failed
@@ -57,6 +62,7 @@ def findings_of(
         tier=judge.tier,
         child_cpu_seconds=round(judge.cpu_seconds, 3),
         fault=judge.fault,
+        checks=checks or {},
     )
 
 
@@ -72,8 +78,8 @@ def _named(key: Key, rollouts: Mapping[Key, Rollout]) -> Rollout:
     return replace(rollout, name="run_episode")
 
 
-def _episode(rollout: Rollout, task: Task) -> Episode:
-    fraction, within = task.spec.progress.fraction, task.progress_steps + 1
+def _episode(rollout: Rollout, task: SuiteTask) -> Episode:
+    fraction, within = task.progress_fraction, task.progress_steps + 1
     figures = {}
     for kind, suffix in (("geodesic", ""), ("euclidean", "_euclidean")):
         distances = rollout.distances(kind)
@@ -90,5 +96,6 @@ def _episode(rollout: Rollout, task: Task) -> Episode:
         call_ms_mean=round(rollout.call_ms[0], 3),
         call_ms_p99=round(rollout.call_ms[1], 3),
         error=rollout.error,
+        smallest_gap=gap_of(rollout, task.nominal),
         **figures,
     )

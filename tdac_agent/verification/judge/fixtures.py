@@ -12,8 +12,8 @@ import pytest
 
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.sandbox import ControllerError
-from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.judge import Judge, rollout_key
+from tdac_agent.verification.judge.suite_episode import SuiteTask
 from tdac_agent.verification.suite.contract import ParseError, parse_source
 from tdac_agent.verification.suite.oracle import Oracle
 
@@ -62,8 +62,11 @@ class Controller:
 
 
 @pytest.fixture(scope="session")
-def task(pytestconfig: pytest.Config) -> Task:
-    """The task: `params`, `nominal`, `spec`, `progress_steps`."""
+def task(pytestconfig: pytest.Config) -> SuiteTask:
+    """The task: `params`, `nominal`, `spec`, `progress_steps`.
+
+    On a task set, that of its first public world.
+    """
     return pytestconfig.stash[JUDGE].task
 
 
@@ -74,7 +77,7 @@ def controller(pytestconfig: pytest.Config) -> Controller:
 
 
 @pytest.fixture(scope="session")
-def oracle(task: Task) -> Oracle:
+def oracle(task: SuiteTask) -> Oracle:
     """Exact answers to questions about planning and the task's environment."""
     return task.environment.oracle()
 

@@ -18,12 +18,16 @@ SUITE: Final = "suite"
 
 
 class Job(BaseModel):
-    """A suite to run on a controller; all paths are absolute."""
+    """A suite to run on a controller; all paths are absolute.
+
+    With `set_file`, the suite has tests of a task set, whose first world of `split` is
+    there instead of a task. Static and contract tests come first.
+    """
 
     model_config = ConfigDict(extra="forbid")
 
     kind: Literal["suite"] = SUITE
-    task: Path
+    task: Path = Field(description="Folder of what the controller may read.")
     controller: Path
     suites: list[Path] = Field(description="In the order in which they run.")
     profile: Profile
@@ -34,6 +38,8 @@ class Job(BaseModel):
     out: Path
     trajectories: Path | None = Field(description="Folder; None to discard them.")
     metres: bool = Field(False, description="Whether the user reads metres of the map.")
+    set_file: Path | None = None
+    split: str = ""
 
 
 def write_job(job: BaseModel, path: Path) -> None:
@@ -55,3 +61,7 @@ class Findings(PrintableRecord):
     tier: str
     child_cpu_seconds: float
     fault: str | None
+    checks: dict[str, str | None] = Field(
+        default_factory=dict,
+        description="Static and contract tests on a set: why each failed, or None.",
+    )

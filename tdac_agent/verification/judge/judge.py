@@ -23,10 +23,12 @@ from tdac_agent.sandbox import (
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.blame import faults_of_judge
 from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.level import FIRST_WORLD, Level
 from tdac_agent.verification.judge.remote import Unit
 from tdac_agent.verification.judge.suite_episode import (
     EpisodeRequest,
     SuitePool,
+    SuiteTask,
     VerificationSettings,
     drive,
     load_controller,
@@ -53,11 +55,18 @@ OWN_LOOPS: tuple[Key, ...] = (
 )
 
 
+ONE_WORLD = (
+    "the suite does not suit a task set: it needs rollout({0!r}, drive={1!r}), and a "
+    "set has only rollout('nominal'), without jittered starts and without run_episode; "
+    "mark such tests with pytest.mark.jitter or pytest.mark.paper"
+)
+
+
 class Judge:
     """Everything that a suite can ask about one controller on one task.
 
     Args:
-        task: Task of the controller.
+        task: Task of the controller, or the first world of its task set.
         source: Bytes of `controller.py`.
         workdir: Folder whose files the controller may read.
         tier: Sandbox tier, or `auto`.
@@ -67,6 +76,7 @@ class Judge:
         worker_pool: Drives the episodes; by default a new one, forked now.
         at_a_time: Maximum number of concurrent episodes.
         wall_seconds: Time limit of the whole verification, s.
+        level: The task set; None for a task.
 
     Attributes:
         tier: Name of the tier that was used.
@@ -77,7 +87,7 @@ class Judge:
 
     def __init__(
         self,
-        task: Task,
+        task: SuiteTask,
         source: bytes,
         workdir: Path,
         *,
@@ -88,6 +98,7 @@ class Judge:
         worker_pool: SuitePool | None = None,
         at_a_time: int = min(SIZE, EPISODES),
         wall_seconds: float = WALL_SECONDS,
+        level: Level | None = None,
     ) -> None:
         self.task = task
         self.source = source
@@ -103,7 +114,7 @@ class Judge:
         self._deadline = time.monotonic() + wall_seconds
         self._too_long = f"the verification took longer than {wall_seconds:g} s"
         self._settings = VerificationSettings(
-            source, workdir, tier, self._limits, self._deadline
+            source, workdir, tier, self._limits, self._deadline, level
         )
         self._own = ExitStack()
         if child_pool is None:
@@ -175,6 +186,9 @@ class Judge:
             raise ValueError(
                 f"expected 'nominal' or 'jitter N', N = 1 to {JITTERS}, got {name!r}"
             )
+        if self._settings.level is not None and (name, drive) != NOMINAL[::2]:
+            self.fault = self.fault or ONE_WORLD.format(name, drive)
+            raise Fault(self.fault)
         key = (name, steps, drive)
         self._wanted.add(key)
         return self._submit(key).result()
@@ -260,12 +274,13 @@ class Judge:
         return self._episodes[key]
 
     def start_pose(self, name: str) -> Pose:
-        """Start of a named episode."""
+        """Start of a named episode of a task."""
         return self.task.nominal.start if name == "nominal" else self._starts[name]
 
     @cached_property
     def _starts(self) -> dict[str, Pose]:
         task = self.task
+        assert isinstance(task, Task)
         starts = spread_starts(task.nominal, self.seed, JITTERS, task.start_check())
         return dict(zip(NAMES[1:], starts, strict=True))
 
@@ -320,6 +335,9 @@ class Judge:
 
     def _request(self, name: str, steps: int | None, drive: str) -> EpisodeRequest:
         seed = episode_seed(self.seed, NAMES.index(name))
+        if self._settings.level is not None:
+            world = {"index": FIRST_WORLD}
+            return EpisodeRequest(name, None, steps, drive, seed, world)
         return EpisodeRequest(name, self.start_pose(name), steps, drive, seed)
 
     def _overspent(self) -> str:

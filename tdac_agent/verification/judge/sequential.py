@@ -14,6 +14,8 @@ from tdac_envs.core.errors import TaskError
 Decision = Literal["accepted", "rejected", "undecided"]
 ALPHA = BETA = 0.05
 MARGIN = 0.05
+CLEAN = 0.99
+"""Share of drives without a contact from which a controller should be accepted."""
 MOST_EPISODES = 1_000_000
 """Limit of one run; each episode takes hundreds of bytes and at least milliseconds."""
 
@@ -53,6 +55,8 @@ class SequentialTest:
             be accepted. In between, either decision is right.
         alpha: Target probability of accepting at `refuse_at`.
         beta: Target probability of rejecting at `accept_at`.
+        contact: A test of the share of drives without a contact, which must accept,
+            too. It can only lower the probability of accepting.
     """
 
     accept_at: float
@@ -60,6 +64,7 @@ class SequentialTest:
     margin: float = MARGIN
     alpha: float = ALPHA
     beta: float = BETA
+    contact: SequentialTest | None = None
 
     def __post_init__(self) -> None:
         if not 0.0 < self.margin < self.accept_at < 1.0:
@@ -103,20 +108,27 @@ class SequentialTest:
         """Number of successes without a failure after which it accepts."""
         return math.ceil(self.bounds[1] / self.steps[0])
 
-    def decide(self, successes: int, failures: int) -> Decision:
-        """The decision after some episodes."""
+    def decide(self, successes: int, failures: int, contacts: int = 0) -> Decision:
+        """The decision after some episodes, some of whose failures are contacts."""
         success, failure = self.steps
         ratio = successes * success + failures * failure
         low, high = self.bounds
+        own: Decision = "undecided"
         if ratio >= high:
-            return "accepted"
-        return "rejected" if ratio <= low else "undecided"
+            own = "accepted"
+        elif ratio <= low:
+            own = "rejected"
+        if self.contact is None or own == "rejected":
+            return own
+        other = self.contact.decide(successes + failures - contacts, contacts)
+        return own if other == "accepted" else other
 
     def characteristics(self, rate: float) -> Characteristics:
         """How this test decides on a controller of known success rate.
 
-        Exact: after each episode, sums the probabilities of all numbers of failures at
-        which the test decides, and keeps those at which it continues.
+        Exact, if there is no test of contacts: after each episode, sums the
+        probabilities of all numbers of failures at which the test decides, and keeps
+        those at which it continues.
         """
         (success, failure), (low, high) = self.steps, self.bounds
         open_, failures = np.ones(1), np.zeros(1)

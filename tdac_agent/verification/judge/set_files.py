@@ -1,4 +1,7 @@
-"""What a controller for a task set may read: the same in all worlds but for the map."""
+"""Files of a task set: for the judge, and what a controller may read.
+
+That is the same in all worlds but for the map.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,17 @@ import numpy as np
 from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.robots import EPuckRobotParams
-from tdac_envs.ladder.set_file import CpuSpec, DisturbanceSpec, SetFile
-from tdac_envs.ladder.task_sets import AnyTask
+from tdac_envs.ladder.set_disturbances import DisturbanceSpec
+from tdac_envs.ladder.set_file import CpuSpec, SetFile
+from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
+
+
+def write_set(tasks: TaskSet, path: Path) -> Path:
+    """Writes the set file of a set, for other processes; returns its path."""
+    values = tasks.file.model_dump(mode="json", by_alias=True)
+    path.write_text(json.dumps(values), encoding="utf-8")  # JSON is YAML
+    return path
 
 
 def write_files(folder: Path, file: SetFile, task: AnyTask) -> None:
@@ -46,13 +57,13 @@ def write_as_level(folder: Path, task: Task) -> None:
         raise TaskError(f"the task {task.name!r} is not on a map")
     facts = {
         "schema_version": 1,
-        "robot": nominal.robot.model_dump(),
+        "robot": nominal.robot.written(),
         "dt": nominal.dt,
         "goal_tolerance": nominal.goal_tolerance,
         "observed": ["pose", "goal", "wheel_speeds", "ranges"],
         "frame": "map",
         "map": True,
-        "disturbances": DisturbanceSpec().model_dump(),
+        "disturbances": DisturbanceSpec().written(),
         "cpu": CpuSpec().model_dump(),
     }
     folder.mkdir(parents=True, exist_ok=True)
@@ -62,13 +73,13 @@ def write_as_level(folder: Path, task: Task) -> None:
 
 def level_params(file: SetFile) -> dict[str, Any]:
     """What `params.json` tells a controller: the robot and its budget, no world."""
-    robot, disturbances = file.robot, file.disturbances.model_dump()
+    robot, disturbances = file.robot, file.disturbances.written()
     sizes: dict[str, Any]
     if isinstance(robot, EPuckRobotParams):
         sizes = {"kind": robot.kind, **robot.sizes}
         disturbances |= robot.errors
     else:
-        sizes = robot.model_dump()
+        sizes = robot.written()
     return {
         "schema_version": 1,
         "robot": sizes,

@@ -6,8 +6,9 @@ import functools
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from tdac_agent.episodes.episode import Record, run_own_loop, run_policy
+from tdac_agent.episodes.episode import Driver, Record, run_own_loop, run_policy
 from tdac_agent.episodes.trajectory import Outcome, Rollout
 from tdac_agent.sandbox import (
     Child,
@@ -19,9 +20,16 @@ from tdac_agent.sandbox import (
 from tdac_agent.tasks.task import Task, read_task
 from tdac_agent.verification.judge.blame import faults_of_judge
 from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.cpu_budget import Budgeted
+from tdac_agent.verification.judge.level import Level
 from tdac_agent.verification.judge.worker_pool import WorkerPool
 from tdac_envs.drive.task import Pose
 
+if TYPE_CHECKING:
+    from tdac_agent.verification.judge.first_world import FirstWorld
+
+SuiteTask: TypeAlias = "Task | FirstWorld"
+"""Where a suite drives: on a task, or in the first world of a task set."""
 SHOWN_JITTERS = 2
 
 
@@ -35,6 +43,7 @@ class VerificationSettings:
         tier: Sandbox tier, or `auto`.
         limits: Limits of each child.
         deadline: Latest end, by `time.monotonic`.
+        level: The task set; None for a task.
     """
 
     source: bytes
@@ -42,6 +51,7 @@ class VerificationSettings:
     tier: str
     limits: Limits
     deadline: float
+    level: Level | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,17 +60,19 @@ class EpisodeRequest:
 
     Attributes:
         name: `nominal`, or `jitter 1` and so on.
-        start: Start pose.
+        start: Start pose; None in the first world of a set, which has its own.
         steps: Maximum number of steps; None for the horizon.
         drive: `policy`, `run_episode` or `truncated run_episode`.
         seed: Seed of all that the environment draws, such as movers.
+        options: Options of the environment's `reset`, instead of a start.
     """
 
     name: str
-    start: Pose
+    start: Pose | None
     steps: int | None
     drive: str
     seed: int
+    options: dict[str, Any] | None = None
 
     @property
     def held_out(self) -> bool:
@@ -94,17 +106,24 @@ def drive_known(
     child_pool: ChildPool, settings: VerificationSettings, request: EpisodeRequest
 ) -> SuiteResult:
     """The same as `drive`, for the task in the folder of the settings."""
-    return drive(_task_of(settings.workdir), child_pool, settings, request)
+    task = task_of(settings.workdir, settings.level)
+    return drive(task, child_pool, settings, request)
 
 
 @functools.lru_cache(maxsize=1)
-def _task_of(workdir: Path) -> Task:
-    return read_task(workdir)
+def task_of(workdir: Path, level: Level | None) -> SuiteTask:
+    """The task in a folder, or the first world of a task set."""
+    if level is None:
+        return read_task(workdir)
+    # Task sets need much that a task does not.
+    from tdac_agent.verification.judge.first_world import FirstWorld
+
+    return FirstWorld(level)
 
 
 @faults_of_judge()
 def drive(
-    task: Task,
+    task: SuiteTask,
     child_pool: ChildPool,
     settings: VerificationSettings,
     request: EpisodeRequest,
@@ -116,13 +135,13 @@ def drive(
     """
     began = time.process_time()
     limit = request.steps if request.steps is not None else task.nominal.horizon
-    record = Record(task.make_env(), request.start, limit, seed=request.seed)
-    record.seen = task.setting.seen
+    record = _record(task, request, limit)
+    record.seen = task.seen
     if request.drive == "truncated run_episode":
         record.truncates, record.collisions_before = True, 2
     child = child_pool.take(settings.tier, settings.limits)
     try:
-        load_controller(child, settings)
+        driver = _loaded(child, settings)
     except ControllerFault as fault:
         usage = child.close()
         rollout = replace(not_driven(task, request, fault), printed=usage.printed)
@@ -137,7 +156,7 @@ def drive(
             )
         else:
             rollout = run_policy(
-                child,
+                driver,
                 record,
                 request.name,
                 held_out=request.held_out,
@@ -147,6 +166,22 @@ def drive(
         usage = child.close()
     rollout = replace(rollout, printed=usage.printed)
     return SuiteResult(rollout, usage, time.process_time() - began, child.tier)
+
+
+def _record(task: SuiteTask, request: EpisodeRequest, most: int) -> Record:
+    env, options = task.make_env(), request.options
+    return Record(env, request.start, most, seed=request.seed, options=options)
+
+
+def _loaded(child: Child, settings: VerificationSettings) -> Driver:
+    """The controller in a child; its CPU time is limited on a task set."""
+    if settings.level is None:
+        load_controller(child, settings)
+        return child
+    child.copy_files(settings.workdir, settings.source)
+    driver = Budgeted(child, settings.level.cpu)
+    driver.load()
+    return driver
 
 
 def load_controller(child: Child, settings: VerificationSettings) -> None:
@@ -160,7 +195,9 @@ def load_controller(child: Child, settings: VerificationSettings) -> None:
     child.load()
 
 
-def not_driven(task: Task, request: EpisodeRequest, fault: ControllerFault) -> Rollout:
+def not_driven(
+    task: SuiteTask, request: EpisodeRequest, fault: ControllerFault
+) -> Rollout:
     """The episode of a controller that cannot be imported, or is out of resources."""
     return replace(
         skipped(task, request, "error", str(fault)),
@@ -170,10 +207,10 @@ def not_driven(task: Task, request: EpisodeRequest, fault: ControllerFault) -> R
 
 
 def skipped(
-    task: Task, request: EpisodeRequest, outcome: Outcome, reason: str
+    task: SuiteTask, request: EpisodeRequest, outcome: Outcome, reason: str
 ) -> Rollout:
     """An episode without steps."""
-    record = Record(task.make_env(), request.start, 1, seed=request.seed)
+    record = _record(task, request, 1)
     record.reset()
     nominal = task.nominal
     return Rollout(

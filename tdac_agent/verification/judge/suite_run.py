@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
-from tdac_agent.tasks.task import read_task
+from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.jobs import Job
 from tdac_agent.verification.judge.judge import Judge
-from tdac_agent.verification.judge.suite_episode import SuitePool
+from tdac_agent.verification.judge.level import Level
+from tdac_agent.verification.judge.suite_episode import SuitePool, task_of
 
 
 def judge_suite(
@@ -20,7 +22,8 @@ def judge_suite(
     later: contextlib.ExitStack,
 ) -> None:
     """Runs the suite of a job, and writes the findings."""
-    task = read_task(job.task)
+    level = None if job.set_file is None else _level_of(job.set_file, job.split)
+    task = task_of(job.task, level)
     judge = Judge(
         task,
         job.controller.read_bytes(),  # raw read: our temporary folder
@@ -30,14 +33,19 @@ def judge_suite(
         limits=job.limits,
         child_pool=child_pool,
         worker_pool=worker_pool,
+        level=level,
     )
     later.callback(judge.close)
-    judge.begin(jitters=not job.paper, own_loop=job.profile == "paper")
+    checks = None
+    if level is None:
+        judge.begin(jitters=not job.paper, own_loop=job.profile == "paper")
+    else:
+        checks = _checks_of(judge)
     # Loaded while the first episodes are under way.
     from tdac_agent.verification.judge.findings import driven, findings_of
     from tdac_agent.verification.judge.plugin import JudgePlugin, run_tests
 
-    if len(job.suites) > 1:
+    if level is not None or len(job.suites) > 1:
         # Bytecode stored beside a user's tests may not match them.
         sys.pycache_prefix = str(job.out / "bytecode")
     plugin = JudgePlugin(judge, profile=job.profile, paper=job.paper)
@@ -49,6 +57,29 @@ def judge_suite(
                 if rollout.trajectory.steps:
                     pool.submit(rollout.trajectory.save, job.trajectories / name)
         judge.settle()
-        shown = task.setting.in_metres().shown if job.metres else None
-        findings = findings_of(judge, plugin.expected, shown).model_dump_json()
+        shown = None
+        if job.metres:
+            assert isinstance(task, Task)
+            shown = task.setting.in_metres().shown
+        findings = findings_of(judge, plugin.expected, shown, checks).model_dump_json()
     (job.out / "findings.json").write_text(findings, encoding="utf-8")
+
+
+def _level_of(set_file: Path, split: str) -> Level:
+    from tdac_envs.ladder.task_sets import load_set  # not needed on a task
+
+    return Level(set_file, split, load_set(set_file).file.cpu)
+
+
+def _checks_of(judge: Judge) -> dict[str, str | None]:
+    """The static and contract tests of a controller for a task set."""
+    from tdac_agent.verification.judge.set_checks import (
+        CHECKED_STEPS,
+        STABLE,
+        static_checks,
+    )
+
+    results = static_checks(judge.source)
+    if len(results) > 1:  # it parses
+        results[STABLE] = judge.rollout(steps=CHECKED_STEPS).error
+    return results

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
@@ -14,7 +14,11 @@ from tdac_agent.tasks.setting import JudgedEnv, Nominal
 from tdac_agent.tasks.units import Units
 from tdac_envs.drive.env import Observation
 
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
+
 FOREVER = 1 << 62
+PUBLIC = ("dev", "test", "train")
 
 
 class Worlds(Protocol):
@@ -90,3 +94,8 @@ class SetWorlds(BaseModel):
     split: str
     salt_file: Path | None = None
     hidden_folder: Path | None = None
+
+
+def public_split(tasks: TaskSet) -> str | None:
+    """A split whose worlds may be told of; None if a set has none."""
+    return next((name for name in PUBLIC if tasks.count(name) != 0), None)

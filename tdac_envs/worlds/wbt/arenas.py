@@ -6,6 +6,7 @@ import numpy as np
 
 from tdac_envs.worlds.footprint import THINNEST, Disc, Rectangle
 from tdac_envs.worlds.wbt.colours import floor_look, wall_look
+from tdac_envs.worlds.wbt.content import material_of
 from tdac_envs.worlds.wbt.fields import number, numbers, positive
 from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.placing import placed
@@ -45,11 +46,13 @@ def arena(node: WbtNode, frame: NodeFrame) -> Arena | str:
             x, y, own.heading, max(length, THINNEST), max(width, THINNEST)
         )
     if node.kind == "Floor":
-        return Arena(inside, z=z, floor_look=floor_look(node))
+        return Arena(
+            inside, z=z, floor_look=floor_look(node), material=material_of(node)
+        )
     thickness = positive(node, "wallThickness", 0.01) * stretch[0]
     height = positive(node, "wallHeight", 0.1) * stretch[2]
     facets = int(min(max(number(node, "subdivision", 48.0), 8.0), 200.0))
     return Arena(
         inside, max(thickness, THINNEST), max(height, THINNEST), z, facets,
-        floor_look(node), wall_look(node),
+        floor_look(node), wall_look(node), material_of(node),
     )  # fmt: skip

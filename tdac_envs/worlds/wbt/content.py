@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from tdac_envs.worlds.materials import MATERIAL
 from tdac_envs.worlds.wbt.fields import text
 from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.tree import WbtNode
@@ -62,6 +63,15 @@ def name_of(node: WbtNode) -> str:
         WorldError: The `name` field is not a string.
     """
     return text(node, "name", node.define)
+
+
+def material_of(node: WbtNode) -> str:
+    """The node's contact material.
+
+    Raises:
+        WorldError: The `contactMaterial` field is not a string.
+    """
+    return text(node, "contactMaterial", MATERIAL)
 
 
 def is_goal(node: WbtNode) -> bool:

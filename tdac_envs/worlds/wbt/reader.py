@@ -10,6 +10,12 @@ from tdac_envs.core.arguments import finite_point
 from tdac_envs.core.errors import WorldError, WorldFileError, file_hint
 from tdac_envs.core.intake import printable, read_file
 from tdac_envs.worlds.bodies import bodies, floor_under
+from tdac_envs.worlds.materials import (
+    FRICTION,
+    INFINITE_FRICTION,
+    MATERIAL,
+    Contact,
+)
 from tdac_envs.worlds.wbt.content import WorldContent
 from tdac_envs.worlds.wbt.fields import children, number, number_list, numbers, text
 from tdac_envs.worlds.wbt.frames import NodeFrame, world_frame
@@ -17,7 +23,7 @@ from tdac_envs.worlds.wbt.protofiles import ProtoFolder
 from tdac_envs.worlds.wbt.tree import Document, WbtNode, parse
 from tdac_envs.worlds.wbt.unknown import unknown_fields, without_odd_scales
 from tdac_envs.worlds.wbt.walk import walk
-from tdac_envs.worlds.world import INFINITE_FRICTION, EPuck, World
+from tdac_envs.worlds.world import EPuck, World
 
 LARGEST_FILE = 8_000_000
 """Maximum size of a world file, bytes."""
@@ -25,7 +31,7 @@ LARGEST_FILE = 8_000_000
 _FLU_SINCE = (2022, 1)
 _ENU_SINCE = (2020, 2)
 _Z_UP = {"ENU": True, "NUE": False, "EUN": False}
-_STEP, _MATERIAL = 32.0, "default"
+_STEP = 32.0
 _RAISED = 0.005
 
 
@@ -87,7 +93,7 @@ def read_world(
         arenas=tuple(found.arenas),
         obstacles=tuple(found.obstacles),
         time_step=_time_step(info, found),
-        friction=_friction(info),
+        contacts=_contacts(info),
         unmodelled=tuple(found.unmodelled),
         source=name,
         version=document.version,
@@ -174,17 +180,17 @@ def _time_step(info: WbtNode | None, found: WorldContent) -> float:
     return _STEP
 
 
-def _friction(info: WbtNode | None) -> float:
-    """The friction between two default materials: those of e-pucks and most solids."""
+def _contacts(info: WbtNode | None) -> tuple[Contact, ...]:
+    """The friction of each pair of materials that the file lists."""
     pairs = () if info is None else children(info, "contactProperties")
-    for pair in pairs:
-        materials = {text(pair, f"material{k}", _MATERIAL) for k in (1, 2)}
-        found = number_list(pair, "coulombFriction")
-        if materials == {_MATERIAL} and found:
-            return (
-                found[0] if 0.0 <= found[0] < INFINITE_FRICTION else INFINITE_FRICTION
-            )
-    return 1.0
+    return tuple(map(_contact, pairs))
+
+
+def _contact(pair: WbtNode) -> Contact:
+    one, other = (text(pair, f"material{k}", MATERIAL) for k in (1, 2))
+    found = (*number_list(pair, "coulombFriction"), FRICTION)[0]
+    finite = 0.0 <= found < INFINITE_FRICTION
+    return Contact(one, other, found if finite else INFINITE_FRICTION)
 
 
 def _driven_first(

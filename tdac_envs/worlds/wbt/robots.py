@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tdac_envs.worlds.wbt.fields import child, children, numbers, text
+from tdac_envs.worlds.wbt.fields import child, children, flag, numbers, text
 from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.placing import placed
 from tdac_envs.worlds.wbt.tree import WbtNode
@@ -46,6 +46,8 @@ def epuck(node: WbtNode, frame: NodeFrame) -> EPuck:
         z=z,
         version="2" if text(node, "version") == "2" else "1",
         controller=text(node, "controller"),
+        # A Robot node does not have this field.
+        kinematic=node.kind not in ROBOTS and flag(node, "kinematic", False),
     )
 
 

@@ -9,7 +9,7 @@ from tdac_envs.worlds.looks import Look
 from tdac_envs.worlds.wbt.appearance import reflectance
 from tdac_envs.worlds.wbt.arenas import ARENAS, arena
 from tdac_envs.worlds.wbt.colours import look, proto_look
-from tdac_envs.worlds.wbt.content import WorldContent, is_goal, name_of
+from tdac_envs.worlds.wbt.content import WorldContent, is_goal, material_of, name_of
 from tdac_envs.worlds.wbt.fields import StrayError, child, children
 from tdac_envs.worlds.wbt.frames import NodeFrame
 from tdac_envs.worlds.wbt.geometry import GROUPS, Pieces, bounds, geometry
@@ -103,6 +103,7 @@ def _proto(node: WbtNode, frame: NodeFrame, found: WorldContent) -> None:
     obstacle = Obstacle(
         name_of(node), node.kind, x, y, body.solid, body.visible, body.mass,
         body.reflectance, is_goal(node), (proto_look(node),) * len(body.visible),
+        material_of(node),
     )  # fmt: skip
     found.obstacle(node, obstacle)
 
@@ -130,7 +131,7 @@ def _solid(node: WbtNode, own: NodeFrame, found: WorldContent) -> None:
     obstacle = Obstacle(
         name_of(node), _kind(node), x, y, body.parts, visible.parts,
         mass_of(node, body.volume), looks[0][1] if looks else 1.0, is_goal(node),
-        tuple(colours),
+        tuple(colours), material_of(node),
     )  # fmt: skip
     found.obstacle(node, obstacle, place)
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable
 
 from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle
+from tdac_envs.worlds.materials import MATERIAL, Contact
 from tdac_envs.worlds.wbt.appearance import red_of
 from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part, Unmodelled, World
 
@@ -41,7 +42,7 @@ def write_world(world: World, *, supervisor: bool = False) -> str:
         "\n".join(["#VRML_SIM R2025a utf8", *map(_comment, world.unmodelled), ""]),
         "\n".join([*map(_extern, externs), ""]),
         _block(
-            "WorldInfo", [f"basicTimeStep {_n(world.time_step)}", *_friction(world)]
+            "WorldInfo", [f"basicTimeStep {_n(world.time_step)}", *_contacts(world)]
         ),
         _block("Viewpoint", [f"orientation {_FROM_ABOVE}", _position(world)]),
         "TexturedBackground {\n}\nTexturedBackgroundLight {\n}",
@@ -54,11 +55,20 @@ def write_world(world: World, *, supervisor: bool = False) -> str:
     return "\n".join(blocks) + "\n"
 
 
-def _friction(world: World) -> list[str]:
-    if world.friction == 1.0:
-        return []
-    properties = f"ContactProperties {{ coulombFriction [ {_n(world.friction)} ] }}"
-    return [f"contactProperties [ {properties} ]"]
+def _contacts(world: World) -> list[str]:
+    pairs = [_block("ContactProperties", _contact(c)) for c in world.contacts]
+    return [_list("contactProperties", pairs)] if pairs else []
+
+
+def _contact(contact: Contact) -> list[str]:
+    names = (contact.one, contact.other)
+    lines = [f"material{k} {_quoted(name)}" for k, name in enumerate(names, start=1)]
+    return [*lines, f"coulombFriction [ {_n(contact.friction)} ]"]
+
+
+def _material(thing: Arena | Obstacle) -> list[str]:
+    default = thing.material == MATERIAL
+    return [] if default else [f"contactMaterial {_quoted(thing.material)}"]
 
 
 def _extern(name: str) -> str:
@@ -95,6 +105,7 @@ def _arena(arena: Arena) -> str:
     if arena.has_wall:
         lines.append(f"wallThickness {_n(arena.wall_thickness)}")
         lines.append(f"wallHeight {_n(arena.wall_height)}")
+    lines += _material(arena)
     return _block(arena.kind, lines)
 
 
@@ -102,6 +113,7 @@ def _robot(robot: EPuck, supervisor: bool) -> str:
     lines = [_translation(robot.x, robot.y, robot.z), _turn(robot.heading)]
     lines += [f"name {_quoted(robot.name)}", f"controller {_quoted(robot.controller)}"]
     lines += ["supervisor TRUE"] if supervisor else []
+    lines += ["kinematic TRUE"] if robot.kinematic else []
     return _block("E-puck", [*lines, f'version "{robot.version}"'])
 
 
@@ -117,6 +129,7 @@ def _obstacle(thing: Obstacle) -> str:
     lines.append(f"name {_quoted(thing.name)}")
     if thing.kind != "Solid":
         lines.append(f"model {_quoted(thing.kind)}")
+    lines += _material(thing)
     if thing.solid:
         pieces = [_placed(thing, part, single, False) for part in thing.solid]
         body = pieces[0] if single else _block("Group", [_list("children", pieces)])

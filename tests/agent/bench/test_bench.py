@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from script import AHEAD, STILL
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import Select, WebDriverWait
 
@@ -22,7 +23,6 @@ from tdac_agent.bench.record import Bench
 from tdac_agent.bench.shown import merged, read, reveal
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.executors.local import executor_of
-from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.store import mark_rows
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
@@ -30,25 +30,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import BUILT_IN
 from tdac_envs.ladder.space_time import earliest_arrival
 
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
-AHEAD = "def policy(obs):\n    return 1.0, 1.0\n"
 RAISES = "def policy(obs):\n    raise ValueError('no')\n"
-
-
-@pytest.fixture(scope="module")
-def judge():
-    with WarmJudge() as warm:
-        yield warm
-
-
-@pytest.fixture
-def level(tmp_path):
-    """A set of short episodes."""
-    short = {"factor": 1.0, "least": 40, "most": 40}
-    path = tmp_path / "few.yaml"
-    values = {"name": "few", "worlds": [{"name": "clutter"}], "horizon": short}
-    path.write_text(yaml.safe_dump(values))
-    return path
 
 
 @pytest.fixture
@@ -61,13 +43,13 @@ def files(tmp_path):
 
 
 @pytest.mark.slow
-def test_rows_are_what_verify_says(judge, tmp_path, files):
+def test_rows_are_what_verify_says(warm, tmp_path, files):
     """Scores, contacts and intervals; a broken entrant is a row with its reason."""
     out = tmp_path / "out"
-    found = bench(["builtin", *files], ["known"], "dev", 2, out=out, judge=judge)
+    found = bench(["builtin", *files], ["known"], "dev", 2, out=out, judge=warm)
     own, still, ahead, broken = found.rows
     alone = verify_episodes(
-        files[1].partition("=")[2], load_set("known"), 2, split="dev", judge=judge
+        files[1].partition("=")[2], load_set("known"), 2, split="dev", judge=warm
     )
     assert ahead.time.value == pytest.approx(alone.scores.time)
     assert ahead.path == pytest.approx(alone.scores.path)
@@ -98,12 +80,12 @@ def test_rows_are_what_verify_says(judge, tmp_path, files):
 
 
 @pytest.mark.slow
-def test_several_sets_have_equal_weight(judge, tmp_path, level, files):
+def test_several_sets_have_equal_weight(warm, tmp_path, level, files):
     """An entrant that does not drive on all of them is in no row over all."""
     other = tmp_path / "other.yaml"
     other.write_text(level.read_text().replace("few", "other"))
     found = bench(
-        ["orca", *files], [level, other], "dev", 2, out=tmp_path / "out", judge=judge
+        ["orca", *files], [level, other], "dev", 2, out=tmp_path / "out", judge=warm
     )
     assert {row.entrant for row in found.overall} == {"still", "ahead"}
     for row in found.overall:
@@ -115,7 +97,7 @@ def test_several_sets_have_equal_weight(judge, tmp_path, level, files):
 
 
 @pytest.mark.slow
-def test_it_goes_on_after_an_interruption(judge, tmp_path, level, files):
+def test_it_goes_on_after_an_interruption(warm, tmp_path, level, files):
     """What has been driven is not driven again, and the results are the same."""
     out, driven = tmp_path / "out", []
 
@@ -126,7 +108,7 @@ def test_it_goes_on_after_an_interruption(judge, tmp_path, level, files):
     def note(name, entrant, episodes, successes):
         driven.append(entrant)
 
-    given = {"split": "dev", "worlds": 2, "judge": judge}
+    given = {"split": "dev", "worlds": 2, "judge": warm}
     with pytest.raises(KeyboardInterrupt):
         bench(files, [level], out=out, watch=interrupt, **given)
     first = bench(files, [level], out=out, watch=note, **given)
@@ -137,10 +119,10 @@ def test_it_goes_on_after_an_interruption(judge, tmp_path, level, files):
     assert bench(files, [level], out=tmp_path / "other", **given) == first
 
 
-def test_hidden_worlds(judge, tmp_path, level, files, monkeypatch):
+def test_hidden_worlds(warm, tmp_path, level, files, monkeypatch):
     """A salt is drawn when the entrants are on record, and revealed at the end."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    out, given = tmp_path / "out", {"split": "hidden", "worlds": 2, "judge": judge}
+    out, given = tmp_path / "out", {"split": "hidden", "worlds": 2, "judge": warm}
 
     def recorded(name, entrant, episodes, successes):
         entries = json.loads((out / "entrants.json").read_text())
@@ -158,12 +140,12 @@ def test_hidden_worlds(judge, tmp_path, level, files, monkeypatch):
 
 
 @pytest.mark.slow
-def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
+def test_sealed_worlds(warm, tmp_path, level, files, monkeypatch):
     """With a salt of one's own, no row of a world is shown until it is revealed."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     salt, out = tmp_path / "salt", tmp_path / "out"
     salt.write_bytes(bytes(range(32)))
-    given = {"split": "hidden", "worlds": 2, "judge": judge, "salt_file": salt}
+    given = {"split": "hidden", "worlds": 2, "judge": warm, "salt_file": salt}
     found = bench(files[:2], [level], out=out, **given)
     names = {path.name for path in out.iterdir()}
     shown = {"bench.json", "bench.html", "timing.csv", "scores.svg"}
@@ -193,20 +175,20 @@ def test_sealed_worlds(judge, tmp_path, level, files, monkeypatch):
 
 
 @pytest.mark.slow
-def test_levels_are_in_the_order_of_the_ladder(judge, tmp_path, files):
+def test_levels_are_in_the_order_of_the_ladder(warm, tmp_path, files):
     """However the folders were given; sets of one's own come last."""
     for name in ("moving", "known"):
         out = tmp_path / name
-        bench(files[:1], [name], "dev", worlds=1, out=out, judge=judge)
+        bench(files[:1], [name], "dev", worlds=1, out=out, judge=warm)
     found = merged([tmp_path / "moving", tmp_path / "known"])
     assert [own.name for own in found.sets] == ["known", "moving"]
     assert [row.set for row in found.rows] == ["known", "moving"]
 
 
 @pytest.mark.slow
-def test_folders_together(judge, tmp_path, level, files):
+def test_folders_together(warm, tmp_path, level, files):
     """Two benches on the same worlds are one; on others they are refused."""
-    given = {"split": "dev", "judge": judge}
+    given = {"split": "dev", "judge": warm}
     both = bench(files[:2], [level], worlds=3, out=tmp_path / "both", **given)
     for number in (0, 1):
         folder = tmp_path / str(number)
@@ -225,33 +207,33 @@ def test_folders_together(judge, tmp_path, level, files):
 
 
 @pytest.mark.slow
-def test_processes_of_an_executor(tdac, judge, tmp_path, level, files, monkeypatch):
+def test_processes_of_an_executor(
+    refused, done, warm, tmp_path, level, files, monkeypatch
+):
     """The same bytes as one after another; a broken file is a row here, too."""
     monkeypatch.chdir(tmp_path)
     words = ["builtin", *files, "lost.zip"]
     (tmp_path / "lost.zip").write_bytes(b"")
-    bench(words, [level], worlds=2, out=tmp_path / "alone", judge=judge)
+    bench(words, [level], worlds=2, out=tmp_path / "alone", judge=warm)
     given = ("--set", str(level), "-n", "2", "--out", str(tmp_path / "spread"))
     spread = ("--executor", "local", "--workers", "2")
-    code, out, err = tdac("bench", *words, *given, *spread)
-    assert code == 0, err
+    out = done("bench", *words, *given, *spread)
     assert "lost.zip" in out
     for name in (RESULTS, WORLD_TABLE):
         one, other = (tmp_path / part / name for part in ("alone", "spread"))
         assert one.read_bytes() == other.read_bytes()
-    code, _, err = tdac("bench", "builtin", *given, "--workers", "2")
-    assert code == 2
+    err = refused("bench", "builtin", *given, "--workers", "2")
     assert "--workers needs --executor" in err
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("ray") is None, reason="Ray is not installed")
-def test_a_ray_cluster(judge, tmp_path, level, files):
+def test_a_ray_cluster(warm, tmp_path, level, files):
     """As without one."""
     found = [
         bench(["builtin", *files], [level], worlds=2, out=tmp_path / name, **spread)
         for name, spread in (
-            ("alone", {"judge": judge}),
+            ("alone", {"judge": warm}),
             ("ray", {"executor": executor_of("ray"), "workers": 2}),
         )
     ]
@@ -259,7 +241,7 @@ def test_a_ray_cluster(judge, tmp_path, level, files):
 
 
 @pytest.mark.slow
-def test_seeds_of_a_training(judge, tmp_path, level, files):
+def test_seeds_of_a_training(warm, tmp_path, level, files):
     """Several files under one name are one entrant, resampled by file and world."""
     paths = [file.partition("=")[2] for file in files[:2]]
     found = bench(
@@ -268,7 +250,7 @@ def test_seeds_of_a_training(judge, tmp_path, level, files):
         "dev",
         3,
         out=tmp_path / "out",
-        judge=judge,
+        judge=warm,
     )
     both, still = found.rows
     assert len(both.files) == 2
@@ -278,10 +260,10 @@ def test_seeds_of_a_training(judge, tmp_path, level, files):
 
 
 @pytest.mark.slow
-def test_a_privileged_planner_stands_apart(judge, tmp_path, files, monkeypatch):
+def test_a_privileged_planner_stands_apart(warm, tmp_path, files, monkeypatch):
     """It plans on the same worlds, after the others, and is compared with none."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
-    given = {"worlds": 2, "judge": judge}
+    given = {"worlds": 2, "judge": warm}
     words, tasks = ["privileged", files[0]], load_set("moving")
     found = bench(words, ["moving", "known"], split="dev", out=tmp_path / "a", **given)
     first, last = found.of_set("moving")
@@ -301,7 +283,7 @@ def test_a_privileged_planner_stands_apart(judge, tmp_path, files, monkeypatch):
 
 
 @pytest.mark.slow
-def test_runs_on_the_same_world(judge, tmp_path, files):
+def test_runs_on_the_same_world(warm, tmp_path, files):
     """The unit is a world: a success rate with several runs has no exact interval."""
     short = {"factor": 1.0, "least": 40, "most": 40}
     barn = {"barn": str(BUILT_IN / "barn" / "worlds.json"), "splits": ["test"]}
@@ -310,14 +292,14 @@ def test_runs_on_the_same_world(judge, tmp_path, files):
     own = {"goal_tolerance": 40, "horizon": short, "disturbances": {"wheel_slip": 0.01}}
     path.write_text(yaml.safe_dump({"worlds": barn, **own}))
     assert load_set(path).runs("test", 500) == 2
-    found = bench(files[:2], [path], "test", 3, out=tmp_path / "a", judge=judge)
+    found = bench(files[:2], [path], "test", 3, out=tmp_path / "a", judge=warm)
     assert {row.worlds for row in found.rows} == {3}
     episodes = [SimpleNamespace(time_score=k, success=k > 2) for k in range(6)]
     driven = Driven.of("one", [episodes], 2)
     assert driven.time.tolist() == [[0, 1, 2], [3, 4, 5]]
     assert driven.success.tolist() == [[0, 0, 0], [1, 1, 1]]
     with pytest.raises(TaskError, match="expected a multiple of 250"):
-        bench(files[:2], [path], "test", 300, out=tmp_path / "b", judge=judge)
+        bench(files[:2], [path], "test", 300, out=tmp_path / "b", judge=warm)
 
 
 @pytest.mark.parametrize(
@@ -345,7 +327,7 @@ def test_what_is_refused(tmp_path, entrants, sets, split, error, message):
     assert not (tmp_path / "out" / "bench.json").exists()
 
 
-def test_the_command(tdac, tmp_path, level, files):
+def test_the_command(tdac, done, tmp_path, level, files):
     """`run` may be left out; `show` prints the same again."""
     out = tmp_path / "out"
     words = (*files, "--set", level, "--split", "dev", "-n", "2", "--out", out)
@@ -355,8 +337,7 @@ def test_the_command(tdac, tmp_path, level, files):
     for text in ("worlds 0 to 1 of dev", "raises did not drive", "wrote bench.json"):
         assert text in said
     assert tdac("bench", "run", *words)[1] == said
-    code, again, _ = tdac("bench", "show", out)
-    assert code == 0
+    again = done("bench", "show", out)
     assert said.startswith(again.rstrip())
     record = Bench.model_validate_json(tdac("bench", *words, "--json")[1])
     assert record == read(out)
@@ -368,25 +349,23 @@ def test_the_command(tdac, tmp_path, level, files):
     assert all(len(line) <= 80 for line in said.splitlines() if "0.000 (" in line)
 
 
-def test_fewer_entrants_than_before(tdac, tmp_path, level, files):
+@pytest.mark.slow
+def test_fewer_entrants_than_before(tdac, refused, done, tmp_path, level, files):
     """It is said, and nothing is lost; `show --out` writes them elsewhere."""
     out, both = tmp_path / "out", tmp_path / "both"
     given = ("--set", level, "--split", "dev", "-n", "1", "--out", out)
     tdac("bench", *files[:2], *given)
-    code, said, _ = tdac("bench", files[0], *given)
-    assert code == 0
+    said = done("bench", files[0], *given)
     assert "These results replace those of ahead." in " ".join(said.split())
-    code, said, _ = tdac("bench", *files[:2], *given)
+    said = done("bench", *files[:2], *given)
     assert "These results replace" not in said
-    code, said, _ = tdac("bench", "show", out, "--out", both)
-    assert code == 0
+    said = done("bench", "show", out, "--out", both)
     assert "wrote bench.json, worlds.csv, scores.svg, bench.html" in said
     for name in (RESULTS, WORLD_TABLE):
         assert (both / name).read_bytes() == (out / name).read_bytes()
-    code, _, error = tdac("bench", "show", both, "--out", out)
-    assert code == 2
+    error = refused("bench", "show", both, "--out", out)
     assert "has a bench of its own: give another --out" in error
-    code, said, _ = tdac("bench", files[0], *given[:-3], "2", "--out", out)
+    said = done("bench", files[0], *given[:-3], "2", "--out", out)
     assert "replace those on 1 world of dev of few" in " ".join(said.split())
 
 
@@ -406,23 +385,22 @@ def test_names_and_seeds(tmp_path, files, monkeypatch):
         named([str(tmp_path)])
 
 
-def test_nobody_drives(tdac, tmp_path, level, files):
+def test_nobody_drives(tdac, refused, tmp_path, level, files):
     """Exit code 1, and no traceback."""
     code, said, _ = tdac(
         "bench", files[2], "--set", level, "-n", "1", "--out", tmp_path / "out"
     )
     assert (code, "did not drive" in said) == (1, True)
-    code, _, err = tdac("bench", "show", tmp_path)
-    assert (code, len(err.strip().splitlines())) == (2, 1)
+    err = refused("bench", "show", tmp_path)
     code, _, err = tdac("bench", files[2])
     assert (code, "at least one task set or task" in err) == (2, True)
 
 
-def test_tasks_on_the_command_line(tdac, tmp_path):
+@pytest.mark.slow
+def test_tasks_on_the_command_line(tdac, done, tmp_path):
     """A task is driven from jittered starts; hidden worlds are of sets alone."""
     words = "bench", "builtin", "go-to-goal", "--task", "maze", "-n", "2"
-    code, said, _ = tdac(*words, "--set", "known", "--out", tmp_path / "out")
-    assert code == 0
+    said = done(*words, "--set", "known", "--out", tmp_path / "out")
     assert "jittered starts 0 to 1" in said
     assert "worlds 0 to 1 of test" in said
     code, _, err = tdac(*words, "--split", "hidden", "--out", tmp_path / "no")
@@ -430,7 +408,7 @@ def test_tasks_on_the_command_line(tdac, tmp_path):
 
 
 @pytest.mark.slow
-def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
+def test_an_interrupted_file_goes_on(warm, tmp_path, level, files):
     """Not only whole files, but each of their episodes is driven once."""
     out, seen = tmp_path / "out", []
 
@@ -441,7 +419,7 @@ def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
     def note(name, entrant, episodes, successes):
         seen.append(episodes)
 
-    given = {"split": "dev", "worlds": 6, "judge": judge}
+    given = {"split": "dev", "worlds": 6, "judge": warm}
     with pytest.raises(KeyboardInterrupt):
         bench(files[:1], [level], out=out, watch=interrupt, **given)
     (rows,) = out.glob("driven/few/*/unfinished/episodes.jsonl")
@@ -459,10 +437,10 @@ def test_an_interrupted_file_goes_on(judge, tmp_path, level, files):
 
 
 @pytest.mark.slow
-def test_the_page(judge, tmp_path, level, files):
+def test_the_page(warm, tmp_path, level, files):
     """Tables, and replays of all entrants on the same worlds; none of hidden ones."""
     out = tmp_path / "out"
-    found = bench(["go-to-goal", *files], [level], "dev", 8, out=out, judge=judge)
+    found = bench(["go-to-goal", *files], [level], "dev", 8, out=out, judge=warm)
     html = (out / "bench.html").read_text()
     for row in found.rows[:2]:
         assert f"{row.time.value:.3f}" in html
@@ -485,10 +463,10 @@ def test_the_page(judge, tmp_path, level, files):
 
 
 @pytest.mark.slow
-def test_the_page_in_a_browser(browser, judge, tmp_path, level, files):
+def test_the_page_in_a_browser(browser, warm, tmp_path, level, files):
     """Another entrant is shown in the same world, another world has its own map."""
     out = tmp_path / "out"
-    bench(files[:2], [level], "dev", 2, out=out, judge=judge)
+    bench(files[:2], [level], "dev", 2, out=out, judge=warm)
     browser.get((out / "bench.html").as_uri())
     script = "return document.querySelector('canvas').toDataURL()"
     pictures = [browser.execute_script(script)]
@@ -507,10 +485,10 @@ def test_the_page_in_a_browser(browser, judge, tmp_path, level, files):
     assert browser.get_log("browser") == []
 
 
-def test_tasks_beside_sets(judge, tmp_path, files, level, small_task):
+def test_tasks_beside_sets(warm, tmp_path, files, level, small_task):
     """Programs and planners drive on both, and are compared over all of them."""
     out = tmp_path / "out"
-    given = {"tasks": [small_task.folder], "out": out, "judge": judge}
+    given = {"tasks": [small_task.folder], "out": out, "judge": warm}
     found = bench(["dwa", files[0]], [level], "dev", 2, **given)
     assert [each.split for each in found.sets] == ["dev", "jitter"]
     by = {(row.set, row.entrant): row for row in found.rows}

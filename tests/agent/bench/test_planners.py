@@ -3,12 +3,12 @@
 import json
 
 import pytest
+import yaml
 
+from tdac_agent.planners.names import FOLDER, PLANNERS, planner_names
 from tdac_agent.planners.planner import (
-    FOLDER,
     TUNED,
     levels_of,
-    planner_names,
     planner_on,
     ranges_of,
     source_of,
@@ -60,6 +60,16 @@ def test_values_on_record_are_of_this_file():
                 low, high = ranges_of(name)[constant]
                 assert low <= value <= high
                 assert f"\n{constant} = {value!r}\n" in planner.source
+
+
+def test_a_planner_is_its_file_and_an_entry(tdac):
+    """The table names all; the commands, which read it without a parser, list all."""
+    text = PLANNERS.read_text("utf-8")
+    assert planner_names() == tuple(yaml.safe_load(text))
+    for command in (("bench", "run"), ("evaluate",)):
+        code, told, _ = tdac(*command, "--help")
+        assert code == 0
+        assert all(name in told for name in planner_names())
 
 
 def test_files_have_the_constants_that_are_tuned():

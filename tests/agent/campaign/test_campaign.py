@@ -21,12 +21,12 @@ def once(tmp_path_factory):
     return small, small.run("--workers", 2, name="broken"), small.run("--json")
 
 
-def test_a_campaign_leaves_its_tables(small):
+def test_a_campaign_leaves_its_tables(small, done):
     small.write(learners=["builtin"], runs=1)
-    code, said, _ = small.run()
-    assert code == 0
+    out = small.folder / "out"
+    said = done("campaign", small.folder / "few.yaml", "--out", out)
     assert "1 of 1 runs have ended" in said
-    [run] = pd.read_csv(small.folder / "out/runs.csv").to_dict("records")
+    [run] = pd.read_csv(out / "runs.csv").to_dict("records")
     assert (run["learner"], run["tau"]) == ("builtin", 1)
 
 
@@ -112,18 +112,17 @@ def test_of_finished_runs_only_records_may_be_kept(once):
     assert all((run / "iterations").is_dir() for run in runs if run not in thin)
 
 
-def test_a_dry_run_writes_nothing_and_needs_no_key(tdac, monkeypatch):
+def test_a_dry_run_writes_nothing_and_needs_no_key(done, monkeypatch):
     monkeypatch.delenv("OPENAI_API_KEY", raising=False)
-    code, said, _ = tdac("campaign", "paper_2d", "--dry-run")
-    assert code == 0
+    said = done("campaign", "paper_2d", "--dry-run")
     assert "25 runs; no model was asked" in said
     words = " ".join(said.split())
     assert "if no controller ever passes: 1000 candidates are tested" in words
     assert "1500 questions are asked; without a limit they cost 409.44 USD" in words
     assert "so this campaign costs at most 50.00 USD" in words
-    code, said, _ = tdac("campaign", "paper_2d", "--dry-run", "--max-cost", 1e6)
+    said = done("campaign", "paper_2d", "--dry-run", "--max-cost", 1e6)
     assert "never reached, since all runs cost at most 1778." in " ".join(said.split())
-    code, said, _ = tdac("campaign", "offline", "--dry-run")
+    said = done("campaign", "offline", "--dry-run")
     assert re.search(r"at most \d+ candidates are tested: K x \(1 \+ J\)", said)
     assert not list(Path().iterdir())
 

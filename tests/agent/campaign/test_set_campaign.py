@@ -1,6 +1,7 @@
 """Campaigns on task sets: names, what the runs do, tables, the report."""
 
 import json
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -146,24 +147,22 @@ def test_a_wrong_file_on_sets_is_refused_in_a_line(changes, message, on_set):
     assert "\n" not in str(caught.value)
 
 
-def test_an_unknown_set_is_one_line(on_set):
+def test_an_unknown_set_is_one_line(on_set, refused):
     on_set.write(sets=["nosuch"])
-    code, _, complained = on_set.run()
-    assert (code, len(complained.splitlines())) == (2, 1)
+    complained = refused("campaign", on_set.folder / "few.yaml")
     assert "unknown task set" in complained
     assert "nosuch" in complained
 
 
-def test_a_dry_run_on_a_set(on_set):
+def test_a_dry_run_on_a_set(on_set, done):
     """It has the first question's price, and writes nothing."""
     on_set.write(learners=["openai:gpt-6-sol"], max_cost=1.0)
     text = yaml.safe_load((on_set.folder / "few.yaml").read_text())
     assert text["sets"] == ["worlds.yaml"]
-    code, said, complained = on_set.run("--dry-run")
-    assert (code, complained) == (0, "")
+    said = done("campaign", on_set.folder / "few.yaml", "--dry-run")
     assert "set worlds" in said
     assert "2 runs; no model was asked" in said
-    assert not (on_set.folder / "out").exists()
+    assert not list(Path().iterdir())
 
 
 @pytest.mark.slow

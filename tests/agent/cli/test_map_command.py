@@ -15,6 +15,7 @@ from tdac_agent import load_task
 from tdac_agent.cli.coordinates import with_coordinates
 from tdac_agent.cli.task_choice import chosen_task, kind_of_file
 from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task import lay_out
 from tdac_envs.core.errors import MapError, RefusedError, TaskError
 
@@ -105,6 +106,22 @@ def test_a_task_in_metres_is_the_one_in_pixels(ros):
     assert " px" not in str(caught.value)
 
 
+def test_a_map_with_a_resolution_is_in_metres_unless_pixels_are_chosen(ros):
+    """Without --metres: 0.6 is a radius in metres, and with --frame pixels in px."""
+    ends = {"start": (1.05, 5.95), "goal": (11.05, 5.95)}
+    flags = TaskFlags(map_image=str(ros), robot_radius=0.6, **ends)
+    task = chosen_task(flags)
+    assert task.spec.frame == "metres"
+    assert task.nominal.body_radius == pytest.approx(6.0)
+    assert tolerance_text(task.setting) == "0.6 m (1.0 radii)"
+    pixels = {"start": (30.0, 30.0), "goal": (130.0, 30.0), "robot_radius": 6.0}
+    same = chosen_task(replace(flags, frame="pixels", **pixels))
+    assert same.nominal.start[:2] == pytest.approx(task.nominal.start[:2])
+    assert same.nominal.robot.range_max == task.nominal.robot.range_max == 35.0
+    with pytest.raises(TaskError, match="give the body's radius in metres"):
+        chosen_task(replace(flags, robot_radius=None))
+
+
 def test_metres_of_a_task_file(ros):
     """The key `metres` means what the flag means."""
     file = ros.parent / "task.yaml"
@@ -115,7 +132,7 @@ def test_metres_of_a_task_file(ros):
     task = load_task(file)
     assert task.nominal.goal_tolerance == pytest.approx(5.0)
     assert task.nominal.robot.range_max == pytest.approx(50.0)
-    assert task.nominal.robot.max_wheel_speed == 75.59
+    assert task.nominal.robot.max_wheel_speed == pytest.approx(5.0)
 
 
 def test_a_bundled_map_has_no_metres(tmp_path):
@@ -274,6 +291,8 @@ def test_a_picture_with_a_resolution(ros):
     assert task.nominal.body_radius == pytest.approx(6.0)
     with pytest.raises(MapError, match=r"plan.yaml gives 0.1 m per px"):
         chosen_task(replace(flags, map_image=str(ros), resolution=0.2))
+    typed = replace(flags, resolution=0.1, metres=False)
+    assert chosen_task(typed).sha256() == task.sha256()
     file = ros.parent / "task.yaml"
     file.write_text(
         "map: plan.png\nresolution: 0.1\nframe: metres\nstart: [3.05, 8.95]\n"
@@ -292,10 +311,9 @@ def test_no_help_names_a_python_type(tdac, command):
     )
 
 
-def test_the_grid_as_a_ros_map(tdac, tmp_path):
+def test_the_grid_as_a_ros_map(tdac, done, tmp_path):
     """It is the same map, and says its resolution, which somebody has to state."""
-    code, text, errors = tdac("map", "office", "--yaml", "--resolution", 0.05)
-    assert code == 0, errors
+    text = done("map", "office", "--yaml", "--resolution", 0.05)
     assert "office-map/map.yaml (0.05 m per px)" in text
     again = tdac("map", "office-map/map.yaml", "--json")
     cells = np.load("office-map/occupancy.npy")

@@ -94,6 +94,22 @@ def test_params_are_those_of_the_environment(name, tmp_path):
     assert env.pose()[2] - before[2] == pytest.approx(full / robot["axle_length"])
 
 
+@pytest.mark.parametrize(("kinematic", "axle"), [(False, 0.057), (True, 0.052)])
+def test_a_controller_is_told_the_axle_by_which_it_turns(tmp_path, kinematic, axle):
+    """In the folder, the prompt, the template and the world that it reads."""
+    robot = replace(room().robot, kinematic=kinematic)
+    task = in_file(tmp_path, room(robots=(robot,)))
+    assert task.params.robot.axle_length == task.nominal.axle_length == axle
+    assert EPUCK.prompt_facts(task)["axle"] == f"{axle:g}"
+    facts = [EPUCK.template(task.setting).facts, EPUCK.privileged_facts(task.nominal)]
+    assert [own["axle_length"] for own in facts] == [axle, axle]
+    env = task.make_env()
+    env.reset(seed=0)
+    before = env.pose()[2]
+    env.step(np.array([-1.0, 1.0], np.float32))
+    assert env.pose()[2] - before == pytest.approx(2 * task.nominal.full_step / axle)
+
+
 def test_names_of_bundled_tasks():
     """A world's task has a name of its own where a map is called the same."""
     assert bundled_tasks() == (*bundled_maps(), *WORLDS)

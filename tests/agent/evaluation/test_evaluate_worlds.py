@@ -5,34 +5,15 @@ import json
 import cv2
 import pytest
 import yaml
+from script import AHEAD, STILL
 
 from tdac_agent.builtin.level import LEVELS
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
 from tdac_agent.evaluation.evaluation_report import Evaluation
-from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
-
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
-AHEAD = "def policy(obs):\n    return 1.0, 1.0\n"
-
-
-@pytest.fixture(scope="module")
-def judge():
-    with WarmJudge() as warm:
-        yield warm
-
-
-@pytest.fixture
-def level(tmp_path):
-    """A set of short episodes, in which nothing arrives."""
-    worlds = [{"name": "aisles"}, {"name": "clutter"}]
-    short = {"factor": 1.0, "least": 40, "most": 40}
-    path = tmp_path / "few.yaml"
-    path.write_text(yaml.safe_dump({"name": "few", "worlds": worlds, "horizon": short}))
-    return path
 
 
 @pytest.fixture
@@ -49,12 +30,12 @@ def files(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_row_is_what_verify_says(judge, tmp_path, level, files):
+def test_a_row_is_what_verify_says(warm, tmp_path, level, files):
     """Scores, generators and causes; a refused file has a row without figures."""
     tasks, out = load_set(level), tmp_path / "out"
-    found = evaluate(files, [tasks], 4, split="dev", judge=judge, out=out)
+    found = evaluate(files, [tasks], 4, split="dev", judge=warm, out=out)
     for file, row in zip(files[:2], found.rows, strict=False):
-        alone = verify_episodes(file, tasks, 4, split="dev", judge=judge)
+        alone = verify_episodes(file, tasks, 4, split="dev", judge=warm)
         assert row.scores == alone.scores
         assert row.by_generator == alone.by_generator
         assert row.causes == alone.causes
@@ -77,7 +58,7 @@ def test_a_row_is_what_verify_says(judge, tmp_path, level, files):
 
 
 @pytest.mark.slow
-def test_finished_policies_are_not_driven_again(judge, tmp_path, level, files):
+def test_finished_policies_are_not_driven_again(warm, tmp_path, level, files):
     """After an interruption, and of a finished evaluation; another one is refused."""
     tasks, out, driven = load_set(level), tmp_path / "out", []
 
@@ -89,7 +70,7 @@ def test_finished_policies_are_not_driven_again(judge, tmp_path, level, files):
         if episodes:
             driven.append(policy)
 
-    given = {"split": "dev", "episodes": 2, "judge": judge, "out": out}
+    given = {"split": "dev", "episodes": 2, "judge": warm, "out": out}
     with pytest.raises(KeyboardInterrupt):
         evaluate(files[:2], [tasks], watch=interrupt, **given)
     first = evaluate(files[:2], [tasks], watch=note, **given)
@@ -104,23 +85,23 @@ def test_finished_policies_are_not_driven_again(judge, tmp_path, level, files):
 
 
 @pytest.mark.slow
-def test_builtin_is_the_controller_of_the_level(judge, level):
+def test_builtin_is_the_controller_of_the_level(warm, level):
     """A set with the observations of `unknown` has that of `unknown`."""
-    given = {"split": "dev", "judge": judge}
+    given = {"split": "dev", "judge": warm}
     (row,) = evaluate(["builtin"], [load_set("known")], 2, **given).rows
     assert (row.knows, row.successes) == ("+ map", 2)
     own = verify_episodes(
-        LEVELS / "known.py", load_set("known"), 2, split="dev", judge=judge
+        LEVELS / "known.py", load_set("known"), 2, split="dev", judge=warm
     )
     assert row.scores == own.scores
     (row,) = evaluate(["builtin"], [load_set(level)], 1, **given).rows
     assert row.knows == "sensors"
 
 
-def test_baselines_and_planners_drive_on_worlds_and_on_tasks(judge, level, small_task):
+def test_baselines_and_planners_drive_on_worlds_and_on_tasks(warm, level, small_task):
     """All that drives on a set drives on a task on a map, and the other way round."""
     words = ["reference", "go-to-goal", "random", "dwa"]
-    found = evaluate(words, [load_set(level), small_task], 2, judge=judge)
+    found = evaluate(words, [load_set(level), small_task], 2, judge=warm)
     knows = {row.policy: row.knows for row in found.of("few")}
     assert knows == {
         "reference": "privileged",
@@ -162,11 +143,11 @@ def test_a_level_without_a_controller_of_our_own(tmp_path):
         evaluate(["no.py"], [load_set(path)], 1)
 
 
-def test_the_command(tdac, level, files):
+def test_the_command(tdac, done, level, files):
     """A table with scores, failures and generators; JSON with the same figures."""
     words = ("evaluate", *files, "--set", level, "--split", "dev", "-n", "4")
-    code, out, _ = tdac(*words)
-    assert code == 0
+    words += ("--out", "out")
+    out = done(*words)
     for said in ("worlds 0 to 3 of dev", "SCT", "BARN", "0/4", "aisles", "clutter"):
         assert said in out
     assert "still.py, failures: 4 " in out
@@ -176,17 +157,15 @@ def test_the_command(tdac, level, files):
 
 
 @pytest.mark.slow
-def test_playing_a_world(tdac, level, files):
+def test_playing_a_world(rejected, done, level, files):
     """As a film; the exit code says whether the goal was reached."""
     words = ("--set", level, "--index", "1", "--video", "a.gif", "--speed", "20")
-    code, out, _ = tdac("play", files[0], *words)
-    assert code == 1
+    out = rejected("play", files[0], *words)
     assert "wrote a.gif" in out
     assert "world 1: out of time after 40 steps" in out
     film = cv2.VideoCapture("a.gif")
     assert film.read()[0]
-    code, out, _ = tdac("play", "builtin", "--set", "known", *words[2:])
-    assert code == 0
+    out = done("play", "builtin", "--set", "known", *words[2:])
     assert "world 1: reached after" in out
 
 
@@ -206,11 +185,9 @@ def test_playing_a_world(tdac, level, files):
         (("evaluate", "--set", "know"), "did you mean 'known'?"),
     ],
 )
-def test_mistakes_are_one_line(tdac, words, message):
+def test_mistakes_are_one_line(refused, words, message):
     video = ("--video", "a.gif") if words[0] == "play" else ()
-    code, out, err = tdac(words[0], "builtin", *words[1:], *video)
-    assert (code, out) == (2, "")
-    assert err.count("\n") == 1
+    err = refused(words[0], "builtin", *words[1:], *video)
     assert message in err
 
 

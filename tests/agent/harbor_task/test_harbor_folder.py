@@ -13,6 +13,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from script import STILL
 from small import write_small_task
 
 from tdac_agent import load_task
@@ -25,7 +26,6 @@ from tdac_envs.ladder.task_sets import load_set
 
 SCHEMA = Path(__file__).with_name("task_schema.json")
 """Harbor 0.26.0's own schema of `task.toml`: `harbor task schema`."""
-NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_the_oracle_is_rewarded_and_others_are_not(small, tmp_path, capfd):
     rewards, said = judged(root, capfd)
     assert rewards == {"reward": 1.0, "verified": 1.0}
     assert said.startswith("all ")
-    controller.write_text(NOTHING)
+    controller.write_text(STILL)
     rewards, said = judged(root, capfd)
     assert rewards["reward"] == 0.0
     assert "no motion" in said
@@ -147,7 +147,7 @@ def test_the_oracle_is_rewarded_and_others_are_not(small, tmp_path, capfd):
 def test_a_broken_judge_gives_no_reward(small, tmp_path, capfd):
     """Neither pass nor fail: Harbor then reports an error of the trial."""
     root = container(tmp_path, small)
-    (root / "app/controller.py").write_text(NOTHING)
+    (root / "app/controller.py").write_text(STILL)
     empty = tmp_path / "empty"
     empty.mkdir()
     words = [root / "app/controller.py", empty, root / "logs/verifier"]
@@ -174,9 +174,8 @@ def test_a_folder_that_is_not_empty_is_refused(tmp_path):
         ("--task maze -n 3", "-n needs --set NAME"),
     ],
 )
-def test_the_command_says_what_is_missing(tdac, words, why):
-    code, _, err = tdac("export", "harbor", "--out", "x", *words.split())
-    assert (code, err.count("\n")) == (2, 1)
+def test_the_command_says_what_is_missing(refused, words, why):
+    err = refused("export", "harbor", "--out", "x", *words.split())
     assert why in err
 
 

@@ -5,14 +5,15 @@ import shutil
 import numpy as np
 import pytest
 from changed_run import change_run
-from hostile_model import CRASHES, CRASHES_LATER, EVIL, HITS, SUITE, Model
+from hostile_model import CRASHES, CRASHES_LATER, EVIL, SUITE, Model
+from script import AHEAD
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.html_report import make_page
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.diagnosis.report import Report
 
 
@@ -25,7 +26,7 @@ def runs(tmp_path_factory, good_source, warm):
     (suite / "test_own.py").write_text(SUITE)
     spec = write_small_task(place.parent / "policy", profile="policy")
     name = place / f"hostile {EVIL.replace('/', '')}"
-    model = Model(CRASHES, CRASHES_LATER, HITS, HITS.replace("1.0", "0.9"))
+    model = Model(CRASHES, CRASHES_LATER, AHEAD, AHEAD.replace("1.0", "0.9"))
     task = load_task(
         write_small_task(place.parent / "evil", profile="policy", suite="../suite"),
         trust=True,
@@ -33,7 +34,7 @@ def runs(tmp_path_factory, good_source, warm):
     synthesize(task, model, out=name, iterations=2, patience=1, judge=warm)
     synthesize(
         load_task(spec),
-        Model(HITS, good_source),
+        Model(AHEAD, good_source),
         out=place / "verified",
         iterations=2,
         judge=warm,

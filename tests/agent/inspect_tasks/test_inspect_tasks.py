@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import anyio
 import pytest
 from installed import installation
+from script import STILL
 
 from tdac_agent.synthesis.answers import exam_of, files_of, reference_of
 from tdac_agent.tasks.task_file import bundled_tasks
@@ -20,7 +21,6 @@ from tdac_envs.ladder.set_file import set_names
 pytestmark = pytest.mark.skipif(find_spec("inspect_ai") is None, reason="no Inspect")
 MOCK_EVAL = Path(__file__).with_name("mock_eval.py")
 ROOT = Path(__file__).parents[3]
-NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 def answer(source):
@@ -81,14 +81,14 @@ def metrics(log):
 @pytest.mark.slow
 def test_a_reference_is_verified_and_others_are_not(tmp_path):
     """Score 1, 0, and 0 with the reason; the log opens in Inspect's reader."""
-    answers = [reference(task="maze"), answer(NOTHING), "I would rather not."]
+    answers = [reference(task="maze"), answer(STILL), "I would rather not."]
     log = evaluated(tmp_path, task="tdac_agent/tdac_maze", answers=answers)
     assert log.eval.task == "tdac_agent/tdac_maze"
     by_source = {score.answer: score for score in scores(log)}
     [good] = [s for source, s in by_source.items() if source and "plan_path" in source]
     assert good.value == 1.0
     assert good.explanation == "all 41 tests passed"
-    still = by_source[NOTHING]
+    still = by_source[STILL]
     assert still.value == 0.0
     assert "tests failed" in still.explanation
     assert "nominal: no motion" in still.explanation
@@ -105,7 +105,7 @@ def test_a_reference_is_verified_and_others_are_not(tmp_path):
 @pytest.mark.slow
 def test_a_level_gives_the_share_of_worlds_and_the_time_score(tmp_path):
     """With their means over the answers, and the standard error over worlds."""
-    answers = [reference(level="unknown", worlds=2, split="test"), answer(NOTHING)]
+    answers = [reference(level="unknown", worlds=2, split="test"), answer(STILL)]
     log = evaluated(
         tmp_path,
         task="tdac_agent/tdac_unknown",
@@ -135,7 +135,7 @@ def test_hidden_worlds_tell_nothing_but_scores(tmp_path):
         tmp_path,
         task="tdac_agent/tdac_unknown",
         args=args,
-        answers=[answer(NOTHING)],
+        answers=[answer(STILL)],
     )
     [still] = scores(log)
     assert still.explanation == "the goal reached in 0 of 2 worlds; 2 no motion"
@@ -147,7 +147,7 @@ def test_hidden_worlds_tell_nothing_but_scores(tmp_path):
 @pytest.mark.slow
 def test_a_model_repairs_what_the_feedback_names(tmp_path):
     """From no code to a verified controller, then it is asked no more."""
-    answers = ["Wait.", answer(NOTHING), reference(task="maze"), "never asked"]
+    answers = ["Wait.", answer(STILL), reference(task="maze"), "never asked"]
     log = evaluated(tmp_path, task="tdac_agent/tdac_maze", answers=answers, attempts=4)
     [sample] = log.samples
     [score] = scores(log)
@@ -167,7 +167,7 @@ def test_feedback_on_a_level_is_not_from_the_judged_worlds(tmp_path):
         tmp_path,
         task="tdac_agent/tdac_unknown",
         args={"worlds": 2},
-        answers=[answer(NOTHING), reference(**about)],
+        answers=[answer(STILL), reference(**about)],
         attempts=2,
     )
     [sample] = log.samples
@@ -207,7 +207,7 @@ def test_names_in_inspect_begin_with_the_package():
     from tdac_agent.inspect_tasks import registry
 
     solvers = registry.repair, registry.tdac_builtin
-    for made in (registry.verified, registry.driven, *solvers):
+    for made in (registry.passed, registry.driven, *solvers):
         assert registry_info(made).name == f"tdac_agent/{made.__name__}"
 
 
@@ -218,7 +218,7 @@ def test_a_cancelled_sample_ends_the_judges_work():
     state, ended = SimpleNamespace(metadata={"task": "maze"}), []
 
     def judge(exam, poll):
-        ended.append(exam.judge(NOTHING.encode(), poll))
+        ended.append(exam.judge(STILL.encode(), poll))
 
     async def cancelled():
         with anyio.move_on_after(0.5) as scope:

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("mcp.server", reason="needs tdac[mcp]")
 
-from few_worlds import KNOWN, write_set
+from few_worlds import write_set
 from mcp_agent import Running, converse
 
 from tdac_agent.mcp.opening import open_session
@@ -15,26 +15,9 @@ from tdac_envs import load_set
 
 
 @pytest.fixture
-def few(tmp_path):
-    """A set that `known.py` solves."""
-    return load_set(write_set(tmp_path / "few.yaml"))
-
-
-@pytest.fixture
 def easy(tmp_path):
     """The same, with a low bar: few hidden worlds decide that it is met."""
     return load_set(write_set(tmp_path / "easy.yaml", bar=0.1))
-
-
-@pytest.fixture(scope="session")
-def solver():
-    """The source of a controller that reaches all goals of `few`."""
-    return KNOWN.read_text()
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run"
 
 
 @pytest.fixture

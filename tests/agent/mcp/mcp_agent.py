@@ -20,7 +20,6 @@ from mcp_types import Implementation
 
 NAME = Implementation(name="scripted", version="7")
 TOKEN = "a-token-of-these-tests"
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 @dataclass
@@ -152,9 +151,3 @@ class Running:
 def record(folder):
     """The record of a run."""
     return json.loads((folder / "run.json").read_text())
-
-
-def journal(folder):
-    """The events of a run."""
-    lines = (folder / "journal.jsonl").read_text().splitlines()
-    return [json.loads(line) for line in lines]

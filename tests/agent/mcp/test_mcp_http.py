@@ -7,7 +7,8 @@ from urllib.parse import urlsplit
 
 import pytest
 from few_worlds import write_set
-from mcp_agent import STILL, TOKEN, Running, converse, over_http, record
+from mcp_agent import TOKEN, Running, converse, over_http, record
+from script import STILL
 
 
 @pytest.fixture(scope="module")
@@ -122,15 +123,13 @@ def test_a_token_is_drawn(running, tmp_path):
     assert (code, error) == (130, "interrupted\n")
 
 
-def test_a_weak_token_is_refused(tdac, monkeypatch):
+def test_a_weak_token_is_refused(refused, monkeypatch):
     monkeypatch.setenv("TDAC_MCP_TOKEN", "short")
-    code, text, error = tdac("mcp", "--set", "known", "--http")
-    assert (code, text) == (2, "")
+    error = refused("mcp", "--set", "known", "--http")
     assert "at least 16" in error
 
 
-def test_a_port_that_is_taken(tdac, server):
+def test_a_port_that_is_taken(refused, server):
     port = urlsplit(server.address).port
-    code, _, error = tdac("mcp", "--set", "known", "--http", "--port", port)
-    assert code == 2
+    error = refused("mcp", "--set", "known", "--http", "--port", port)
     assert f"--port {port}: " in error

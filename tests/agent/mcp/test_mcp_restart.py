@@ -5,15 +5,15 @@ import time
 
 import anyio
 import pytest
+from changed_run import journal
 from few_worlds import write_set
 from mcp_agent import (
-    STILL,
     converse,
-    journal,
     over_http,
     over_stdio,
     record,
 )
+from script import STILL
 
 SECONDS = 60
 SPIN = "def policy(obs):\n    return 0.3, -0.3\n"
@@ -142,7 +142,7 @@ def test_killed_after_the_choice(running, tmp_path, solver):
     assert "was chosen" in told
     assert verdict["verified"]
     assert file.read_bytes() == salt
-    assert record(out)["status"] == "verified"
+    assert record(out)["status"] == "passed"
 
 
 @pytest.mark.slow
@@ -170,26 +170,23 @@ def test_a_finished_run_answers_from_its_record(serve, small_task, good_source, 
     assert (out / "run.json").read_bytes() == before
 
 
-def test_another_run_is_refused(serve, small_task, few, out, tdac):
+def test_another_run_is_refused(serve, small_task, few, out, refused):
     """Another task, another budget, and a run that another program began."""
 
     async def conversation(agent):
         await agent.told("submissions")
 
     serve(small_task, conversation)
-    code, _, error = tdac("mcp", "--set", "known", "--out", out)
-    assert code == 2
+    error = refused("mcp", "--set", "known", "--out", out)
     assert f"tdac mcp --out {out}" in error
     words = "--task", small_task.folder, "--episodes", 60, "--out", out
-    code, _, error = tdac("mcp", *words)
-    assert code == 2
+    error = refused("mcp", *words)
     assert "K 21 instead of 10" in error
-    code, _, error = tdac("synth", "--resume", out)
-    assert code == 2
+    error = refused("synth", "--resume", out)
     assert f"tdac mcp --out {out}" in error
 
 
-def test_a_run_of_another_installation_is_refused(serve, small_task, out, tdac):
+def test_a_run_of_another_installation_is_refused(serve, small_task, out, refused):
     """Its record is not trusted."""
 
     async def conversation(agent):
@@ -199,6 +196,5 @@ def test_a_run_of_another_installation_is_refused(serve, small_task, out, tdac):
     text = (out / "run.json").read_text()
     mark = record(out)["mark"]
     (out / "run.json").write_text(text.replace(mark, "0" * len(mark)))
-    code, _, error = tdac("mcp", "--out", out)
-    assert code == 2
+    error = refused("mcp", "--out", out)
     assert "did not begin" in error

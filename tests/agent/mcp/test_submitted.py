@@ -1,20 +1,19 @@
 """The file in what an agent submits: all of it, or a refusal that does not count."""
 
 import pytest
+from script import STILL
 
 from tdac_agent.mcp.answers import Refused
 from tdac_agent.mcp.submitted import source_of
 
-FILE = "def policy(obs):\n    return 0.0, 0.0\n"
-
 
 @pytest.mark.parametrize(
     "text",
-    [FILE, f"```python\n{FILE}```\n", f"\ufeff```\n{FILE}```", f" ```\n{FILE}```"],
+    [STILL, f"```python\n{STILL}```\n", f"\ufeff```\n{STILL}```", f" ```\n{STILL}```"],
 )
 def test_a_file_is_taken_as_it_is_or_out_of_its_fence(text):
     """Agents send the file, or an answer with it."""
-    assert source_of(text) == FILE
+    assert source_of(text) == STILL
 
 
 @pytest.mark.parametrize("text", ["x = (\n", "import math\n", "Here it is."])
@@ -26,10 +25,10 @@ def test_what_is_no_controller_is_judged_as_it_is(text):
 REFUSED = {
     " \n": "is empty",
     "x" * 200_001: "200001 bytes",
-    f"```python\n{FILE}": "has no end",
-    f"# ... unchanged ...\n{FILE}": "leaves out code",
-    f"def helper():\n    ...\n\n\n{FILE}": "leaves out code",
-    f"```python\n# ... imports unchanged\n{FILE}```": "leaves out code",
+    f"```python\n{STILL}": "has no end",
+    f"# ... unchanged ...\n{STILL}": "leaves out code",
+    f"def helper():\n    ...\n\n\n{STILL}": "leaves out code",
+    f"```python\n# ... imports unchanged\n{STILL}```": "leaves out code",
 }
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from crash_child import run_all
 from fault_server import OPENAI, answers
+from script import STILL
 from small import write_small_task
 
 from tdac_agent.models.prices import SHIPPED, load_prices
@@ -20,7 +21,6 @@ from tdac_agent.runs.run_record import load_rules, load_run
 from tdac_agent.storage.journal import read_records
 
 CHILD = Path(__file__).parents[1] / "crash_child.py"
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 PRICE = load_prices(SHIPPED).models["openai:gpt-4o"]
 ENOUGH = 10.0
 

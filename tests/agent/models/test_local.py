@@ -13,7 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from small import write_small_task
+from script import STILL
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault, ProviderError
@@ -28,17 +29,9 @@ from tdac_agent.models.provider import (
     recorded_seed,
 )
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_envs.core.extras import install_command
 
 QUESTION = Request("generate", "Wände? ÄÖ\n" * 20_000)
-STANDS = "def policy(obs):\n    return 0.0, 0.0\n"
-
-
-@pytest.fixture(scope="module")
-def policy_task(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("task")
-    return load_task(write_small_task(folder, profile="policy"))
 
 
 @pytest.fixture
@@ -125,6 +118,7 @@ side_by_side([lambda: model.complete(Request("generate", "x"))] * 2)
 """
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_no_program_outlives_an_interrupt(tmp_path, no_traces, number):
     """Nor does what it started, although the threads that asked are not awaited."""
@@ -266,13 +260,13 @@ def test_a_folder_that_is_gone(tmp_path):
 def once_recorded(policy_task, good_source, tmp_path_factory, warm):
     """A run: a refusal to write code, one that stands still, its repair."""
     folder = tmp_path_factory.mktemp("mail")
-    answers = ["I would rather not.", STANDS, good_source]
+    answers = ["I would rather not.", STILL, good_source]
     fenced = [answers[0], *(f"```python\n{text}```\n" for text in answers[1:])]
     done = answer_in(folder, fenced)
     out = folder.with_name("recorded")
     run = synthesize(policy_task, Manual(folder, poll=0.005), out=out, judge=warm)
     done()
-    assert run.verified
+    assert run.passed
     return out
 
 
@@ -500,13 +494,12 @@ def test_a_key_goes_nowhere_unencrypted(kind, url, safe, options, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_command_says_that_a_key_would_be_read(tdac, good, monkeypatch):
+def test_the_command_says_that_a_key_would_be_read(tdac, refused, good, monkeypatch):
     """Exit 2, one line, nothing sent; with the flag the server is looked for."""
     monkeypatch.setenv("OPENAI_API_KEY", "key-12345678")
     words = ["synth", "--task", good, "--learner", "openai:m", "--max-tokens", 0]
     words += ["--base-url", "http://gpu.invalid/v1", "--out", "run"]
-    code, _, err = tdac(*words)
-    assert (code, err.count("\n")) == (2, 1)
+    err = refused(*words)
     assert "would go unencrypted to http://gpu.invalid/v1: use https, unset" in err
     assert not Path("run").exists()
     code, _, err = tdac(*words, "--key-over-http")

@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from script import Script
 
 from tdac_agent.models.provider import (
     PermanentFault,
@@ -16,21 +17,9 @@ from tdac_agent.models.retry import RetryPolicy, answer
 QUESTION = Request("generate", "?")
 
 
-class Script:
-    """A provider that fails as it is told, and remembers how long it was given."""
-
-    name = "script"
-    paid = False
-
-    def __init__(self, *faults):
-        self.faults = list(faults)
-        self.given = []
-
-    def complete(self, request):
-        self.given.append(request.seconds)
-        if self.faults:
-            raise self.faults.pop(0)
-        return Reply("done")
+def failing(*faults):
+    """A model that answers after some faults."""
+    return Script(*faults, Reply("done"))
 
 
 def ask(model, policy):
@@ -47,24 +36,24 @@ def ask(model, policy):
 
 def test_waits_double_and_are_drawn():
     """Between half and all of 2, 4, 8 s; three retries, no more."""
-    model = Script(*[ProviderFault("503")] * 9)
+    model = failing(*[ProviderFault("503")] * 9)
     end, waits = ask(model, RetryPolicy())
     assert isinstance(end, ProviderFault)
     assert len(waits) == 3
     assert all(2**n / 2 <= wait <= 2**n for n, wait in enumerate(waits, start=1))
-    assert len(model.given) == 4
+    assert len(model.requests) == 4
 
 
 def test_a_permanent_fault_is_not_asked_again():
     """One question, no wait."""
-    end, waits = ask(Script(PermanentFault("401")), RetryPolicy())
+    end, waits = ask(failing(PermanentFault("401")), RetryPolicy())
     assert isinstance(end, PermanentFault)
     assert waits == []
 
 
 def test_a_rate_limit_is_waited_for():
     """More often than there are retries, as long as the provider asks for."""
-    model = Script(*[RateLimited("429", 7.0)] * 2, *[RateLimited("429")] * 20)
+    model = failing(*[RateLimited("429", 7.0)] * 2, *[RateLimited("429")] * 20)
     end, waits = ask(model, RetryPolicy())
     assert end == "done"
     assert waits[:2] == [7.0, 7.0]
@@ -91,18 +80,18 @@ def test_a_rate_limit_is_waited_for():
 )
 def test_no_wait_is_longer_than_it_may_be(faults, policy):
     """Neither the longest wait nor the time for the whole question is exceeded."""
-    model = Script(*faults)
+    model = failing(*faults)
     end, waits = ask(model, policy)
     assert all(0 <= wait <= policy.longest_wait for wait in waits)
     assert all(wait < policy.seconds for wait in waits)
-    assert max(model.given) <= policy.seconds
-    assert len(model.given) == len(waits) + 1
+    assert max(request.seconds for request in model.requests) <= policy.seconds
+    assert len(model.requests) == len(waits) + 1
     assert end == "done" or end is faults[len(waits)]
 
 
 def test_a_busy_server_is_left_alone_as_long_as_it_asks():
     """Its `Retry-After` counts, up to the longest wait."""
-    model = Script(ProviderFault("503", 30.0), ProviderFault("529", 1e9))
+    model = failing(ProviderFault("503", 30.0), ProviderFault("529", 1e9))
     assert ask(model, RetryPolicy()) == ("done", [30.0, 60.0])
 
 
@@ -112,10 +101,10 @@ def test_an_interrupt_ends_the_wait():
     def interrupted(seconds):
         raise KeyboardInterrupt
 
-    model = Script(ProviderFault("503"))
+    model = failing(ProviderFault("503"))
     with pytest.raises(KeyboardInterrupt):
         answer(model.complete, QUESTION, RetryPolicy(), lambda miss: None, interrupted)
-    assert len(model.given) == 1
+    assert len(model.requests) == 1
 
 
 def test_a_policy_that_is_none():

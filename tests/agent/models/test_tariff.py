@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from script import STILL
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.errors import ProviderError
@@ -16,10 +18,8 @@ from tdac_agent.models.prices import SHIPPED, Price
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.tariff import UNPRICED_TOKENS, Tariff, bounds_of, tariffs_of
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_envs.core.extras import install_command
 
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 PRICE = Price(input=2, output=10, cache_read=0.1, cache_write=2.5)
 
 
@@ -172,16 +172,14 @@ def test_a_shared_budget_has_limits_of_its_own(tmp_path, small_task, warm):
         )
 
 
-def test_all_that_is_missing_is_said_at_once(tdac, monkeypatch):
+def test_all_that_is_missing_is_said_at_once(tdac, refused, monkeypatch):
     """Keys, a package and a price, in one line; a dry run says it, too."""
     for name in ("OPENAI_API_KEY", "ANTHROPIC_API_KEY"):
         monkeypatch.delenv(name, raising=False)
         monkeypatch.delenv(name.replace("API_KEY", "BASE_URL"), raising=False)
     monkeypatch.setitem(sys.modules, "anthropic", None)
     words = ("synth", "--learner", "openai:unheard-of", "--optimizer", "anthropic:x")
-    exit_code, _, err = tdac(*words, "--out", "r")
-    assert exit_code == 2
-    assert err.count("\n") == 1
+    err = refused(*words, "--out", "r")
     needed = [
         "set the environment variable OPENAI_API_KEY",
         f"anthropic:x needs a package: {install_command(None)}",
@@ -196,14 +194,12 @@ def test_all_that_is_missing_is_said_at_once(tdac, monkeypatch):
     assert not Path("r").exists()
 
 
-def test_words_that_bound_nothing(tdac, monkeypatch):
+def test_words_that_bound_nothing(refused, monkeypatch):
     """One clear line, and no folder."""
     monkeypatch.setenv("OPENAI_API_KEY", "sk-none")
     words = ("synth", "--out", "r", "--learner")
-    exit_code, _, err = tdac(*words, "openai:unheard-of")
-    assert exit_code == 2
+    err = refused(*words, "openai:unheard-of")
     assert "no price is known for openai:unheard-of" in err
-    exit_code, _, err = tdac(*words, "openai:gpt-4o", "--max-cost", "inf")
-    assert exit_code == 2
+    err = refused(*words, "openai:gpt-4o", "--max-cost", "inf")
     assert "--max-cost must be finite" in err
     assert not Path("r").exists()

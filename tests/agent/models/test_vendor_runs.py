@@ -8,17 +8,18 @@ import sys
 from pathlib import Path
 
 import pytest
+from changed_run import journal
 from fault_server import ANTHROPIC, MODEL, OPENAI, PATHS, answers, begins, fails
+from script import STILL
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
-STANDS = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 def code(vendor, source):
@@ -28,10 +29,6 @@ def code(vendor, source):
 @pytest.fixture
 def task_file(tmp_path):
     return write_small_task(tmp_path / "task", profile="policy") / "task.yaml"
-
-
-def journal(folder):
-    return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
 @pytest.mark.slow
@@ -45,7 +42,7 @@ def test_faults_cost_neither_k_nor_j(
         fails(ANTHROPIC, 529, "overloaded_error"),
         begins(ANTHROPIC, lambda line: line.reset()),
         begins(ANTHROPIC, lambda line: None),
-        code(ANTHROPIC, STANDS),
+        code(ANTHROPIC, STILL),
         fails(OPENAI, 429, "rate_limit_exceeded", retry_after="0"),
         code(OPENAI, good_source),
     ]
@@ -83,7 +80,7 @@ def test_a_fault_that_stays_ends_the_run(
 ):
     """A wrong key in mid-run: the run ends as a fault, all before it is kept."""
     server.script = [
-        code(ANTHROPIC, STANDS),
+        code(ANTHROPIC, STILL),
         fails(ANTHROPIC, 401, "authentication_error", "no such key"),
     ]
     url = server.url(ANTHROPIC)
@@ -168,7 +165,7 @@ def test_the_key_is_in_no_place(server, canary, task_file, tmp_path, no_traces):
         told = line.handler.headers["authorization"]
         assert canary in told
         if len(server.seen) == 1:
-            return answers(OPENAI, f"{told}\n```python\n{STANDS}# {told}\n```\n")(line)
+            return answers(OPENAI, f"{told}\n```python\n{STILL}# {told}\n```\n")(line)
         return fails(OPENAI, 401, "invalid_api_key", f"wrong key: {told}")(line)
 
     server.script = [look]

@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from script import AHEAD
 
 from tdac_agent.prompting.feedback import (
     MAX_CHARS,
@@ -15,8 +16,6 @@ from tdac_agent.prompting.feedback import (
 from tdac_agent.verification.diagnosis.report import GROUPS, Diagnosis, Failure
 from tdac_agent.verification.verify import verify
 
-WALL = "def policy(obs):\n    return 1.0, 1.0\n"
-
 
 def report_with(report, *failures):
     return report.model_copy(update={"failures": failures})
@@ -24,7 +23,7 @@ def report_with(report, *failures):
 
 def test_feedback_tells_what_happened(small_task, warm):
     """The tests that failed, with figures and the diagnosis; no path, no address."""
-    report = verify(WALL, small_task, profile="policy", judge=warm)
+    report = verify(AHEAD, small_task, profile="policy", judge=warm)
     text = render_feedback(report)
     assert text.startswith(f"{report.verdict.failed_tests} of ")
     assert "test_no_collisions" in text
@@ -35,7 +34,7 @@ def test_feedback_tells_what_happened(small_task, warm):
 
 def test_held_out_starts_are_told_by_name_only(small_task, warm):
     """Figures of a held-out start appear nowhere, whatever its test says."""
-    report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+    report = verify(AHEAD, small_task, profile="policy", paper=True, judge=warm)
     told = "A held-out start failed; its details are not disclosed."
     failure = Failure(
         test="own/test_gap.py::test_gap",
@@ -52,7 +51,7 @@ def test_held_out_starts_are_told_by_name_only(small_task, warm):
 
 def test_long_messages_are_cut(small_task, warm):
     """A message of any length is bounded, and says how much was left out."""
-    report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+    report = verify(AHEAD, small_task, profile="policy", paper=True, judge=warm)
     failure = Failure(test="a::b", group="unit", message="x" * 10_000)
     text = render_feedback(report_with(report, failure))
     assert len(text) < MAX_CHARS + 200
@@ -61,7 +60,7 @@ def test_long_messages_are_cut(small_task, warm):
 
 def test_at_most_three_causes_in_full(small_task, warm):
     """What shares a cause shares a paragraph; each part of the suite has its say."""
-    report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+    report = verify(AHEAD, small_task, profile="policy", paper=True, judge=warm)
     failures = [
         Failure(test=f"a::t{n}", group="unit", message=f"reason {n // 2}.")
         for n in range(10)
@@ -83,7 +82,7 @@ def test_at_most_three_causes_in_full(small_task, warm):
 
 def test_every_cause_is_told(small_task, warm):
     """Beside those in full each has a line of its own; of very many, the names."""
-    report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+    report = verify(AHEAD, small_task, profile="policy", paper=True, judge=warm)
     failures = [
         Failure(test=f"a::t{n}", group="unit", message=f"reason {n}\n{'y' * 999}.")
         for n in range(8)
@@ -124,7 +123,7 @@ SAME = {
 @pytest.mark.parametrize("cause", SAME)
 def test_failures_with_one_root_are_one_group(small_task, warm, cause):
     """One mistake that fails tests in many ways is told once, whatever the part."""
-    report = verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+    report = verify(AHEAD, small_task, profile="policy", paper=True, judge=warm)
     groups = ("static", "unit", "end to end", "user")
     failures = [
         Failure(test=f"t{n}", group=groups[n], message=message)
@@ -148,7 +147,7 @@ def test_a_broken_file_is_one_cause(small_task, warm):
 
 def test_an_attempt_in_one_line(small_task, warm):
     """How many tests, what happened, with figures."""
-    report = verify(WALL, small_task, profile="policy", judge=warm)
+    report = verify(AHEAD, small_task, profile="policy", judge=warm)
     line = feedback_of(report).line
     failed, expected = report.verdict.failed_tests, report.verdict.expected
     assert line.startswith(f"{failed} of {expected} tests failed: nominal: ")
@@ -181,7 +180,7 @@ def failures(draw):
 
 @pytest.fixture(scope="module")
 def any_report(small_task, warm):
-    return verify(WALL, small_task, profile="policy", paper=True, judge=warm)
+    return verify(AHEAD, small_task, profile="policy", paper=True, judge=warm)
 
 
 @pytest.mark.slow

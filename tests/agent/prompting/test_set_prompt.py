@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 import tdac_envs
+from tdac_agent.prompting.params_text import params_text
 from tdac_agent.prompting.prompt import FULL, PromptError, PromptTemplate
 from tdac_agent.prompting.rules import BEGIN, RuleBook
 from tdac_agent.prompting.set_prompt import set_prompt
@@ -30,7 +31,8 @@ def test_a_prompt_has_all_of_its_level(name):
     limit = math.ceil(ceil * float(spaces["goal"].high[0]) - 1e-3) / ceil
     assert f"to {limit:g} |" in text or f"to {spaces['goal'].high[0]:g} |" in text
     params = text.partition("```json\n")[2].partition("\n```")[0]
-    assert json.loads(params) == level_params(file)
+    assert params == params_text(level_params(file))
+    assert json.loads(params).keys() == level_params(file).keys()
     for value in (file.bar, file.goal_tolerance, file.horizon.most, file.full_step):
         assert f"{value:g}" in text
     assert ("occupancy.npy" in text) == file.map

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import yaml
 from script import NO_RULES, STILL, Script, code
-from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
@@ -22,20 +22,8 @@ from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.locks import LOCK_FILE, hold
-from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
-
-
-@pytest.fixture(scope="module")
-def policy_task(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("task")
-    return load_task(write_small_task(folder, profile="policy"))
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run"
 
 
 def events(folder, name):
@@ -118,16 +106,15 @@ def test_an_answer_that_is_damaged_is_asked_for_again(
 @pytest.fixture(scope="module")
 def once_verified(policy_task, tmp_path_factory, warm):
     out = tmp_path_factory.mktemp("verified") / "run"
-    assert synthesize(policy_task, "builtin", out=out, judge=warm).verified
+    assert synthesize(policy_task, "builtin", out=out, judge=warm).passed
     return out
 
 
-def test_a_run_that_has_ended(once_verified, out, tdac):
+def test_a_run_that_has_ended(once_verified, out, tdac, done):
     """Nothing is asked, nothing is written, and it is said."""
     shutil.copytree(once_verified, out)
     before = {path: path.stat().st_mtime_ns for path in out.rglob("*")}
-    code, told, _ = tdac("synth", "--resume", out)
-    assert code == 0
+    told = done("synth", "--resume", out)
     assert "has already finished; nothing was done" in " ".join(told.split())
     assert {path: path.stat().st_mtime_ns for path in out.rglob("*")} == before
     record = json.loads((out / "run.json").read_text())
@@ -247,29 +234,26 @@ def test_a_folder_knows_how_it_was_begun(tmp_path, name, warm):
     assert model.requests[0].prompt.endswith("Please.\n")
 
 
-def test_resume_takes_no_other_flags(tdac, halted):
+def test_resume_takes_no_other_flags(refused, halted):
     """It goes on as it was begun; a folder without a run is one clear line."""
-    code, _, err = tdac("synth", "--resume", halted, "-K", 3, "--out", "x")
-    assert code == 2
+    err = refused("synth", "--resume", halted, "-K", 3, "--out", "x")
     assert "--resume continues a run as it was begun: leave out -K, --out" in err
-    code, _, err = tdac("synth", "--resume", halted, "--learner", "builtin")
-    assert code == 2
+    err = refused("synth", "--resume", halted, "--learner", "builtin")
     assert "contains another run (learner " in err
-    code, _, err = tdac("synth", "--resume", halted.parent)
-    assert code == 2
+    err = refused("synth", "--resume", halted.parent)
     assert "is not a run folder" in err
 
 
-def test_a_run_that_ended_before_it_had_begun_is_begun_again(tdac, halted, tmp_path):
+def test_a_run_that_ended_before_it_had_begun_is_begun_again(refused, halted, tmp_path):
     """Its task is not there yet; the message says what to do."""
     folder = tmp_path / "early"
     folder.mkdir()
     (folder / "run.json").write_bytes((halted / "run.json").read_bytes())
-    code, _, err = tdac("synth", "--resume", folder)
-    assert code == 2
+    err = refused("synth", "--resume", folder)
     assert f"repeat its command with --out {folder}" in err
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_clear_line(tmp_path, good):
     """Exit 3 before anything is asked; with room again the run goes on."""
     place = tmp_path / "small-disk"
@@ -290,7 +274,7 @@ def test_a_full_disk_is_one_clear_line(tmp_path, good):
     assert "the disk is full: " in done.stderr.splitlines()[-1]
 
 
-def test_runs_are_listed(tdac, halted, once_verified):
+def test_runs_are_listed(tdac, done, halted, once_verified):
     """Whatever else lies there; each with its way on, the torn ones by their reason."""
     place = halted.parent
     shutil.copytree(once_verified, place / "good")
@@ -298,8 +282,7 @@ def test_runs_are_listed(tdac, halted, once_verified):
     (place / "torn" / "run.json").write_text('{"schema_ver')
     (place / "foreign").mkdir()
     (place / "foreign" / "notes.txt").write_text("mine")
-    exit_code, told, _ = tdac("runs", place)
-    assert exit_code == 0
+    told = done("runs", place)
     assert "foreign" not in told
     assert f"to continue: tdac synth --resume {halted}" in told
     assert "verified" in told
@@ -321,10 +304,9 @@ def test_runs_are_listed(tdac, halted, once_verified):
     assert json.loads(tdac("runs", halted, "--json")[1])[0]["status"] == "killed"
 
 
-def test_no_runs(tdac, tmp_path):
+def test_no_runs(tdac, refused, tmp_path):
     """An empty folder has none; one that is not there is one clear line."""
     assert "no runs in" in tdac("runs", tmp_path)[1]
     assert tdac("runs")[:2] == (0, "no runs in runs; `tdac synth` makes one\n")
-    exit_code, _, err = tdac("runs", tmp_path / "none")
-    assert exit_code == 2
+    err = refused("runs", tmp_path / "none")
     assert err.startswith("error: cannot read")

@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from few_worlds import KNOWN, write_set
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.models.budget import Enough
@@ -33,12 +35,12 @@ from tdac_agent.runs.replay import DEMO
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.studio.run_status import from_elsewhere
 from tdac_agent.synthesis.setup import hold_folder
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import display_name
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.tasks.trust import NotTrustedError, tree_sha256
 from tdac_agent.verification.verify import verify
+from tdac_envs import load_set
 
 TEST = "def test_own(rollout):\n    assert rollout('nominal').reached\n"
 
@@ -52,8 +54,29 @@ def made(tmp_path_factory, warm):
     (folder / "tests" / "test_own.py").write_text(TEST)
     task = replace(task, suite=folder / "tests")
     run = synthesize(task, out=folder / "run", iterations=1, judge=warm)
-    assert run.verified
+    assert run.passed
     return run.folder
+
+
+@pytest.fixture(scope="module")
+def made_on_set(tmp_path_factory, warm):
+    """Such a run on a task set."""
+    folder = tmp_path_factory.mktemp("own")
+    few = load_set(write_set(folder / "few.yaml"))
+    (folder / "tests").mkdir()
+    (folder / "tests" / "test_own.py").write_text(TEST)
+    given = {"out": folder / "run", "suite": folder / "tests", "judge": warm}
+    few_episodes = {"episodes": 2, "feedback_episodes": 1, "start_from": KNOWN}
+    run = synthesize(few, "builtin", iterations=1, patience=0, **given, **few_episodes)
+    assert run.status == "selected"
+    assert run.suite_sha256
+    return run.folder
+
+
+@pytest.fixture
+def run_on_set(made_on_set, tmp_path):
+    """A copy of it, elsewhere."""
+    return Path(shutil.copytree(made_on_set, tmp_path / "elsewhere" / "moved"))
 
 
 @pytest.fixture
@@ -85,13 +108,28 @@ def test_own_folders_need_nothing(tdac, run):
     assert tdac("synth", "--resume", run)[0] == 0
 
 
+def test_own_folders_on_sets_need_nothing(tdac, run_on_set):
+    """Their tests are run again, and gone on with; a foreign one asks."""
+    code, out, err = tdac("verify", run_on_set, "-n", 1)
+    assert (code, err) == (0, "")
+    assert "tests of your own: all 1 passed" in out
+    assert tdac("synth", "--resume", run_on_set)[0] == 0
+    (run_on_set / "suite" / "test_own.py").write_text("raise SystemExit\n")
+    code, out, err = tdac("verify", run_on_set, "-n", 1)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert f"wants to run the tests in {run_on_set}/suite (sha256" in err
+
+
 @pytest.mark.slow
-def test_a_permission_holds_once(tdac, run):
+@pytest.mark.parametrize("ground", ["run", "run_on_set"])
+def test_a_permission_holds_once(tdac, request, ground):
     """`--suite` or `--trust`, which lists what it allows; nothing of it is kept."""
+    run = request.getfixturevalue(ground)
+    words = ("verify", run, *["-n", 1] * (ground == "run_on_set"))
     test = run / "suite" / "test_own.py"
     test.write_text(f"{TEST}\n\ndef test_more():\n    pass\n")
     before = {p: p.read_bytes() for p in run.rglob("*.*") if p.is_file()}
-    refused = tdac("verify", run)
+    refused = tdac(*words)
     assert (refused[0], refused[1]) == (2, "")
     assert refused[2].count("\n") == 1
     short = tree_sha256(run / "suite")[:12]
@@ -100,10 +138,10 @@ def test_a_permission_holds_once(tdac, run):
         f"wants to {wish}: allow it with --suite {run}/suite, or with --trust"
         in (refused[2])
     )
-    code, _, err = tdac("verify", run, "--trust")
+    code, _, err = tdac(*words, "--trust")
     assert (code, err) == (0, f"trusted for this command only: {run} may {wish}\n")
-    assert tdac("verify", run, "--suite", run / "suite")[0] == 0
-    assert tdac("verify", run) == refused
+    assert tdac(*words, "--suite", run / "suite")[0] == 0
+    assert tdac(*words) == refused
     assert {p: p.read_bytes() for p in run.rglob("*.*") if p.is_file()} == before
 
 
@@ -225,14 +263,13 @@ def unfinished(tmp_path_factory, made, warm):
 
 
 @pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
-def test_a_mark_holds_for_one_run(tdac, run, unfinished, change):
+def test_a_mark_holds_for_one_run(refused, run, unfinished, change):
     """A copied mark, or other files below it: its verdict is not believed."""
     assert is_own_folder(load_run(unfinished))
     change(run, unfinished)
     assert not is_own_folder(load_run(run))
     if load_run(run).finished:
-        code, _, err = tdac("synth", "--resume", run)
-        assert (code, err.count("\n")) == (2, 1)
+        err = refused("synth", "--resume", run)
         assert "did not begin, or that was changed since" in err
 
 
@@ -347,7 +384,7 @@ def test_what_was_allowed_stays_somebody_elses(tmp_path, run, secret, warm):
     (run / "run.json").write_text(json.dumps(record))
     secret()
     again = synthesize(load_task(run, trust=True), out=run, iterations=1, judge=warm)
-    assert again.verified
+    assert again.passed
     assert not is_own(load_run(run), run / "suite")
 
 
@@ -408,12 +445,11 @@ def test_a_bundled_world_has_the_name_of_its_task():
     assert display_name(moved).startswith("epuck-maze, changed (map ")
 
 
-def test_the_verdict_names_the_folder(tdac, good):
+def test_the_verdict_names_the_folder(done, good):
     """With the hash of its map and how near the goal has to be come."""
     content = yaml.safe_load((good / "task.yaml").read_text())
     (good / "task.yaml").write_text(yaml.safe_dump({**content, "name": "maze"}))
-    code, out, _ = tdac("verify", good / "controller.py", "--profile", "policy")
-    assert code == 0
+    out = done("verify", good / "controller.py", "--profile", "policy")
     words = " ".join(out.split())
     assert "(task maze, not the bundled one (map " in words
     assert f"px) of {good}, profile policy" in words

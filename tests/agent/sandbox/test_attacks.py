@@ -128,7 +128,7 @@ def check_call(launch, tier, name):
         child.policy(OBS, timeout=limit)
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 def test_cpu_time_is_limited(launch, tier):
     child = loaded(
         launch,
@@ -140,7 +140,7 @@ def test_cpu_time_is_limited(launch, tier):
         child.policy(OBS)
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 def test_cpu_time_counts_though_the_child_has_ended_itself(launch, tier):
     source = """
         import os, time

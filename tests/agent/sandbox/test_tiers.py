@@ -159,6 +159,7 @@ JUDGE = """
 """
 
 
+@pytest.mark.slow_after(1)
 def test_a_child_ends_with_its_killed_judge(tier, tmp_path, wait_until_gone):
     end_judge(tier, tmp_path, signal.SIGKILL, wait_until_gone)
 

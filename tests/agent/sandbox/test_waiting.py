@@ -47,7 +47,7 @@ def crowded(loaded, crowd, tier):
     return start
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 def test_standing_in_line_for_a_cpu_is_not_the_controllers_time(crowded):
     """0.6 s of work are within a second, however long they take by the clock."""
     child = crowded(BUSY)
@@ -65,7 +65,7 @@ def test_on_a_busy_machine_too_much_work_is_too_much(crowded):
     assert not caught.value.is_retryable
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 def test_on_a_busy_machine_sleeping_is_the_controllers_time(crowded):
     """A controller that waits is not in line; what for, nobody knows."""
     with pytest.raises(ControllerTimeout, match="policy") as caught:

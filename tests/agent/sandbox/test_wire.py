@@ -73,7 +73,7 @@ def test_a_value_comes_back_equal_and_of_the_same_types(value):
     assert same(decode(encode(value)), value)
 
 
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=100)
 @given(st.binary(max_size=200))
 def test_any_bytes_are_a_value_or_a_wire_error(data):
     try:
@@ -83,7 +83,7 @@ def test_any_bytes_are_a_value_or_a_wire_error(data):
     assert same(decode(encode(value)), value)
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=100)
 @given(values, st.data())
 def test_damaged_values_are_a_value_or_a_wire_error(value, data):
     raw = bytearray(encode(value))

@@ -154,7 +154,7 @@ def test_a_forged_job_stops_nobody(tmp_path, victim):
     """Neither with a mark of another job, nor without one."""
     facts = {**FACTS, "pid": victim.pid, "born": module._born(victim.pid)}
     put(tmp_path, facts)
-    job = start(tmp_path, ["runs", "."], "x")
+    job = start(tmp_path, ["--version"], "x")
     mark = json.loads((job.folder / "job.json").read_text())["mark"]
     put(tmp_path, {**facts, "mark": mark}, "00009")
     forged = [each for each in jobs(tmp_path) if each.file.pid == victim.pid]
@@ -220,7 +220,7 @@ def test_a_job_of_another_folder_is_not_ours(tmp_path, way):
 
 def test_a_job_is_ours_in_a_later_studio(tmp_path):
     """As long as it is where it was begun; the same words start it but once."""
-    job = start(tmp_path, ["runs", "."], "x")
+    job = start(tmp_path, ["--version"], "x")
     module._read.cache_clear()
     assert job_of(tmp_path, "x") == job
     assert job.ours
@@ -229,7 +229,7 @@ def test_a_job_is_ours_in_a_later_studio(tmp_path):
 
 def test_a_job_from_elsewhere_hides_none_of_ours(tmp_path):
     """Though it claims to be newer, and to work on the same."""
-    job = start(tmp_path, ["runs", "."], "bench-1")
+    job = start(tmp_path, ["--version"], "bench-1")
     put(tmp_path, {**FACTS, "started": "2999-01-01T00:00:00+00:00"}, "00002")
     assert job_of(tmp_path, "bench-1") == job
     wait(job)

@@ -139,6 +139,7 @@ def open_plan(browser, plan):
     says(browser, "A path of")
 
 
+@pytest.mark.slow
 def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     """By clicks alone; the page shows the command, and the candidate drives."""
     open_plan(page, plan)
@@ -150,7 +151,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     button = "//button[.//span[normalize-space()='Write and verify a controller']]"
     ActionChains(page).double_click(page.find_element(By.XPATH, button)).perform()
     wait(page, lambda b: "/run?" in b.current_url)
-    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.passed"))
     begun = [job.file.about for job in jobs(studio.place)]
     assert [about for about in begun if "plan" in about] == ["runs/plan-1"]
     assert "not begun here" not in text_of(page)
@@ -159,7 +160,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
         clock = page.find_element(By.CSS_SELECTOR, ".player .clock")
         wait(page, lambda b: "reached" in clock.text)
     run = json.loads((studio.place / "runs/plan-1/run.json").read_text())
-    assert run["status"] == "verified"
+    assert run["status"] == "passed"
 
 
 @pytest.mark.slow
@@ -174,6 +175,7 @@ def test_no_request_leaves_this_machine(browser, page, studio):
             assert name.startswith((studio.base, "data:", "blob:")), name
 
 
+@pytest.mark.slow
 def test_a_goal_that_cannot_be_reached(page, plan):
     """The reason is shown, and nothing can be started."""
     open_plan(page, plan)
@@ -196,7 +198,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     says(page, "--from .studio/files/blind.py")
     says(page, "The controller is blind.py.")
     press(page, "Write and verify a controller")
-    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.passed"))
     with framed(page):
         wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "a.cell")) > 1)
         assert page.find_elements(By.CSS_SELECTOR, "a.cell.failed")
@@ -387,6 +389,7 @@ def test_the_map_is_beside_its_controls(page, studio):
     resize(page, "desktop")
 
 
+@pytest.mark.slow
 def test_a_map_and_what_was_found_are_in_sight(page, studio, tmp_path):
     """A tall one too, and on a phone, where the controls are below the map."""
     picture = np.full((900, 300), 255, np.uint8)
@@ -437,7 +440,7 @@ def test_a_killed_server_kills_no_run(browser, page, studio, plan):
     studio.start()
     assert studio.base == base  # though it was not told which port to take
     # The page goes on by itself.
-    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.passed"))
     assert page.current_url == f"{base}/run?at={at}"
     wait(page, lambda b: not b.find_element(By.ID, "lost").is_displayed())
     browser.get(f"{base}/runs")

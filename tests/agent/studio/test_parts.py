@@ -203,7 +203,7 @@ def test_a_command_at_work_is_not_started_twice(tmp_path):
     job = start(tmp_path, ["runs", "."], free_folder("demo", tmp_path))
     assert job.file.about == "runs/demo-1"
     assert start(tmp_path, ["runs", "."], "runs/demo-1") == job
-    assert start(tmp_path, ["sets"], "runs/demo-1") != job
+    assert start(tmp_path, ["--version"], "runs/demo-1") != job
     assert free_folder("demo", tmp_path) == "runs/demo-2"
     for each in jobs(tmp_path):
         wait_for(each)
@@ -277,7 +277,7 @@ def test_what_is_not_unpacked(tmp_path, files, message):
 def test_a_run_from_elsewhere_is_marked():
     """Such as the recorded run that `tdac demo` replays."""
     folder = Path(tdac_agent.__file__).parent / "runs" / "demo"
-    assert load_run(folder).status == "verified"
+    assert load_run(folder).status == "passed"
     assert "did not begin" in from_elsewhere(load_run(folder))
 
 

@@ -3,13 +3,10 @@
 from dataclasses import dataclass, field
 
 import pytest
-from few_worlds import KNOWN, write_set
 from script import Script
-from small import write_small_task
+from unconfirmed import synthesize
 
-from tdac_agent import load_task, synthesize
 from tdac_agent.models.retry import RetryPolicy
-from tdac_envs import load_set
 
 ON_SET = {"episodes": 12, "feedback_episodes": 2, "seed": 3}
 
@@ -27,27 +24,9 @@ class Ground:
         return not self.given
 
 
-@pytest.fixture
-def task(tmp_path):
-    """The small task in the profile `policy`."""
-    return load_task(write_small_task(tmp_path / "task", profile="policy"))
-
-
-@pytest.fixture
-def few(tmp_path):
-    """A set that `known.py` solves."""
-    return load_set(write_set(tmp_path / "few.yaml"))
-
-
 @pytest.fixture(scope="session")
-def solver():
-    """The source of a controller that reaches all goals of `few`."""
-    return KNOWN.read_text()
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run"
+def task(policy_task):
+    return policy_task
 
 
 @pytest.fixture
@@ -74,5 +53,16 @@ def write(out, warm):
         model = model or Script(*answers)
         given = {"out": out, "judge": warm, "retry": RetryPolicy(first_wait=0.0)}
         return model, synthesize(ground.problem, model, **given | ground.given | values)
+
+    return run
+
+
+@pytest.fixture
+def improve(write):
+    """Runs that improve what works, with few episodes."""
+
+    def run(ground, model="builtin", **values):
+        few = {"seed": 3, "iterations": 6} if ground.is_task else {"episodes": 4}
+        return write(ground, model=model, **{"improve": 32} | few | values)[1]
 
     return run

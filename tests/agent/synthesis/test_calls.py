@@ -4,6 +4,7 @@ import socket
 from dataclasses import replace
 
 import pytest
+from script import Paid
 
 from tdac_agent.errors import Fault
 from tdac_agent.models.budget import NOTHING, Amount, Budget
@@ -23,27 +24,12 @@ from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
+from tdac_agent.synthesis.options import SynthOptions
 
 QUESTION = Request("generate", "What?", sample=(0, 1, 0), max_tokens=100)
 TARIFF = Tariff(price=Price(input=1000, output=1000))
 WORST = TARIFF.worst(QUESTION)
 ANSWER = Reply("yes", tokens_in=3, tokens_out=7, model="m-1", notes=("so",))
-
-
-class Script:
-    """A provider that gives prepared answers."""
-
-    name = "script"
-    paid = True
-
-    def __init__(self, *answers):
-        self.answers = list(answers)
-
-    def complete(self, request):
-        answer = self.answers.pop(0)
-        if isinstance(answer, BaseException):
-            raise answer
-        return answer
 
 
 @pytest.fixture
@@ -67,7 +53,9 @@ def make(tmp_path):
         budget.restore({f"{run.id}/{call}": a for call, a in past.taken.items()})
         retry = RetryPolicy(first_wait=0.0)
         recorder = Recorder(run, past)
-        return Calls(recorder, budget, {"script": TARIFF}, retry, max_output=100)
+        return Calls(
+            recorder, budget, {"script": TARIFF}, retry, SynthOptions(max_output=100)
+        )
 
     return calls
 
@@ -75,9 +63,9 @@ def make(tmp_path):
 def test_an_answer_is_settled_and_found_again(make):
     """What it took replaces what was reserved; the next process does not ask."""
     budget = Budget(max_cost=1.0)
-    assert make(budget).ask(Script(ANSWER), QUESTION) == ANSWER
+    assert make(budget).ask(Paid(ANSWER), QUESTION) == ANSWER
     assert budget.taken == Amount(10, 0.01)
-    again, later = Budget(max_cost=1.0), Script()
+    again, later = Budget(max_cost=1.0), Paid()
     calls = make(again)
     assert calls.ask(later, QUESTION) == ANSWER
     assert again.taken == Amount(10, 0.01)
@@ -96,7 +84,7 @@ def test_an_answer_is_settled_and_found_again(make):
 )
 def test_what_was_lost_counts(make, fault, lost):
     """An answer that may have been billed, with all that was reserved for it."""
-    budget, model = Budget(max_cost=1.0), Script(fault, ANSWER)
+    budget, model = Budget(max_cost=1.0), Paid(fault, ANSWER)
     if isinstance(fault, PermanentFault):
         with pytest.raises(Fault, match="401"):
             make(budget).ask(model, QUESTION)
@@ -115,12 +103,12 @@ def test_what_was_lost_counts(make, fault, lost):
 def test_a_process_that_dies_in_a_call(make):
     """What it reserved counts, and the question is put once more."""
     with pytest.raises(KeyboardInterrupt):
-        make(Budget()).ask(Script(KeyboardInterrupt()), QUESTION)
+        make(Budget()).ask(Paid(KeyboardInterrupt()), QUESTION)
     budget = Budget(max_cost=2 * WORST.usd)
     calls = make(budget)
     assert len(calls.recorder.past.open) == 1
     assert budget.taken == WORST
-    assert calls.ask(Script(ANSWER), QUESTION) == ANSWER
+    assert calls.ask(Paid(ANSWER), QUESTION) == ANSWER
     assert budget.taken.usd == pytest.approx(WORST.usd + 0.01)
     # Answered since; what the lost answer may have cost stays.
     later = make(Budget()).recorder.past
@@ -128,14 +116,14 @@ def test_a_process_that_dies_in_a_call(make):
     assert later.lost_usd == pytest.approx(WORST.usd)
     small = Budget(max_cost=1.9 * WORST.usd)
     with pytest.raises(OutOfBudget):
-        make(small).ask(Script(ANSWER), replace(QUESTION, prompt="Other?"))
+        make(small).ask(Paid(ANSWER), replace(QUESTION, prompt="Other?"))
 
 
 def test_a_key_covers_all_that_shapes_an_answer():
     """Model, server, kind, prompt, room, sample and turn; not the time it may take."""
-    model, served = Script(), Script()
+    model, served = Paid(), Paid()
     served.served_at = "http://localhost:1/v1"
-    other = Script()
+    other = Paid()
     other.name = "other"
     changes = [
         {"kind": "edit"},

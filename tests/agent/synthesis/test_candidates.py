@@ -8,10 +8,10 @@ import threading
 from types import SimpleNamespace
 
 import pytest
-from script import NO_RULES, STILL, code
+from script import AHEAD, NO_RULES, STILL, code
 from small import write_small_task
+from unconfirmed import synthesize
 
-from tdac_agent import load_task
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.metrics import frames_of
@@ -20,10 +20,8 @@ from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.side_by_side import side_by_side
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import whole
 
-BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
 RAISES = "def policy(obs):\n    raise ValueError\n"
 
 
@@ -65,18 +63,18 @@ def ask(write, on_task):
 
 
 @pytest.mark.slow
-def test_the_best_of_three_is_repaired(ask, good_source, tmp_path):
+def test_the_best_of_three_is_repaired(ask, task, good_source):
     """All are asked at the same time, and each is an iteration."""
     answers = {
         ("generate", 1, 0): code(RAISES),
-        ("generate", 2, 0): code(BUMP),
+        ("generate", 2, 0): code(AHEAD),
         ("generate", 3, 0): code(STILL),
         ("edit", 2, 1): code(good_source),
         ("edit", 3, 1): code(good_source),
     }
     model = Table(answers, together=3)
     run = ask(model)
-    assert run.verified
+    assert run.passed
     assert sorted(model.asked[:3]) == [("generate", k, 0) for k in (1, 2, 3)]
     (edit,) = model.asked[3:]
     first = [len(a.failed_tests) for a in run.attempts[:3]]
@@ -90,7 +88,7 @@ def test_the_best_of_three_is_repaired(ask, good_source, tmp_path):
     frames = frames_of([run])
     assert frames.runs["done"].tolist() == [3]
     with pytest.raises(RunError, match="number of candidates 3 instead of 1"):
-        synthesize(load_task(tmp_path / "task"), model, out=run.folder, iterations=6)
+        synthesize(task, model, out=run.folder, iterations=6)
 
 
 def test_equal_answers_are_tested_once(ask, good_source):
@@ -127,7 +125,7 @@ def test_one_of_three_passes_at_once(ask, good_source):
     answers = {("generate", k, 0): code(STILL) for k in (1, 3)}
     answers[("generate", 2, 0)] = code(good_source)
     run = ask(Table(answers, together=3))
-    assert run.verified
+    assert run.passed
     assert run.tau == 2
     assert [(a.k, a.passed) for a in run.attempts] == [
         *[(1, False), (2, True), (3, False)]
@@ -146,7 +144,7 @@ def test_a_fault_loses_no_answer_of_the_others(ask, good_source):
     again = Table({("generate", 2, 0): code(good_source)}, together=1)
     again.name = model.name
     run = ask(again)
-    assert run.verified
+    assert run.passed
     assert again.asked == [("generate", 2, 0)]
 
 
@@ -154,7 +152,7 @@ def test_a_fault_loses_no_answer_of_the_others(ask, good_source):
 def test_without_a_success_there_are_all_iterations(ask):
     """K = 6 in two groups; one edit and one summary each."""
     answers = {("generate", k, 0): code(f"{STILL}\nA = {k}\n") for k in range(1, 7)}
-    answers |= {("edit", k, 1): code(BUMP) for k in (1, 4)}
+    answers |= {("edit", k, 1): code(AHEAD) for k in (1, 4)}
     answers |= {("summarise", k, 1): NO_RULES for k in (1, 4)}
     model = Table(answers, together=3)
     run = ask(model)

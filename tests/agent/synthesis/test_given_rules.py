@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from script import NO_RULES, STILL, Script, code
+from unconfirmed import synthesize
 
 from tdac_agent.html_report import make_page
 from tdac_agent.models.provider import Reply
@@ -19,7 +20,6 @@ from tdac_agent.prompting.given_rules import (
 from tdac_agent.prompting.prompt import PromptError
 from tdac_agent.prompting.rules import MAX_RULE_TOKENS, RuleBook
 from tdac_agent.runs.run_record import load_rules, load_run
-from tdac_agent.synthesis.synthesize import synthesize
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
 LEARNT = [
@@ -44,7 +44,7 @@ def learnt(task, tmp_path, warm):
 
 
 def test_what_was_learnt_on_one_task_is_given_to_the_next(
-    learnt, task, tmp_path, warm, good_source, tdac
+    learnt, task, tmp_path, warm, good_source, tdac, refused, done
 ):
     """A rule about one task stays there; the next report names the others."""
     file = tmp_path / "rules.md"
@@ -62,7 +62,7 @@ def test_what_was_learnt_on_one_task_is_given_to_the_next(
     model = Script(code(STILL), code(good_source))
     given = {"out": tmp_path / "next", "judge": warm, "retry": AT_ONCE}
     run = synthesize(task, model, rules=read_given(file), **given)
-    assert run.verified
+    assert run.passed
     for request in model.requests:
         assert "- Return plain floats. [R1]" in request.prompt
     assert set(run.given_rules) == {
@@ -75,15 +75,11 @@ def test_what_was_learnt_on_one_task_is_given_to_the_next(
     assert "[code] Return plain floats." in page
     assert "--rules next/given_rules.md" in page
     assert read_given(tmp_path / "next" / "given_rules.md") == read_given(file)
-    code_, said, _ = tdac("rules", tmp_path / "next")
-    assert code_ == 0
+    said = done("rules", tmp_path / "next")
     assert "given at the beginning" in said
     assert "given; more tests failed than before in" in said
     # Other rules make another run.
-    code_, _, err = tdac(
-        "synth", "--task", tmp_path / "task", "--out", tmp_path / "next"
-    )
-    assert code_ == 2
+    err = refused("synth", "--task", task.folder, "--out", tmp_path / "next")
     assert "different given rules" in err
 
 
@@ -101,16 +97,15 @@ def test_a_run_with_given_rules_is_resumed(task, tmp_path, warm, good_source):
     before = load_run(tmp_path / "run")
     rules = given_book(before.given_rules)
     run = synthesize(task, Script(code(good_source)), rules=rules, **given)
-    assert run.verified
+    assert run.passed
     assert run.given_rules == ("[environment] Keep right.",)
 
 
-def test_the_prompt_has_the_given_rules(tdac, tmp_path):
+def test_the_prompt_has_the_given_rules(done, tmp_path):
     """Also on a task set."""
     Path("rules.md").write_text("# Mine\n\nFor all.\n\n- [code] Use no globals.\n")
     for about in (("--task", "maze"), ("--set", "unknown")):
-        code_, out, _ = tdac("synth", *about, "--rules", "rules.md", "--dry-run")
-        assert code_ == 0
+        out = done("synth", *about, "--rules", "rules.md", "--dry-run")
         assert "- Use no globals. [R1]" in out
 
 
@@ -126,18 +121,16 @@ def test_the_prompt_has_the_given_rules(tdac, tmp_path):
         ),
     ],
 )
-def test_a_wrong_rules_file_is_one_line(text, message, tdac):
+def test_a_wrong_rules_file_is_one_line(text, message, refused):
     Path("rules.md").write_text(text)
-    code_, _, err = tdac("synth", "--rules", "rules.md", "--dry-run")
-    assert (code_, len(err.splitlines())) == (2, 1)
+    err = refused("synth", "--rules", "rules.md", "--dry-run")
     assert message in err
 
 
-def test_what_cannot_be_exported_is_one_line(task, tmp_path, warm, tdac):
+def test_what_cannot_be_exported_is_one_line(task, tmp_path, warm, refused):
     given = {"out": tmp_path / "none", "judge": warm, "retry": AT_ONCE}
     synthesize(task, Script(code(STILL), NO_RULES), iterations=1, patience=0, **given)
-    code_, _, err = tdac("rules", "export", tmp_path / "none")
-    assert (code_, len(err.splitlines())) == (2, 1)
+    err = refused("rules", "export", tmp_path / "none")
     assert "no rule to export" in err
     with pytest.raises(PromptError, match="cannot read the rules in"):
         read_given(tmp_path / "nosuch.md")

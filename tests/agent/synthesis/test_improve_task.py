@@ -17,6 +17,7 @@ from tdac_agent.library.listing import row_of, variations_text
 from tdac_agent.metrics import frames_of
 from tdac_agent.runs.improvement_record import NOT_SHOWN, read_improvement
 from tdac_agent.runs.run_record import load_run
+from tdac_agent.runs.selection_record import read_selection
 from tdac_agent.synthesis.workload import LEAST_IMPROVE, shares
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
@@ -59,15 +60,6 @@ def fragile(good_source):
     return good_source.replace("def policy(", "def drive(") + FRAGILE
 
 
-@pytest.fixture
-def improve(write, on_task):
-    def run(model="builtin", **values):
-        given = {"improve": 32, "seed": 3, "iterations": 6} | values
-        return write(on_task, model=model, **given)[1]
-
-    return run
-
-
 def report_of(folder):
     return Report.model_validate_json((folder / "report.json").read_text())
 
@@ -85,12 +77,12 @@ def test_the_shares_of_a_task_are_all_episodes(improve):
 
 @pytest.mark.slow
 def test_a_more_robust_variation_is_asked_for_and_delivered(
-    improve, fragile, good_source, tmp_path
+    improve, on_task, fragile, good_source, tmp_path
 ):
     """The model sees the parent, its figures, and what was tried with it."""
     answers = (fragile, STILL, fragile, good_source, STILL, STILL, STILL)
     model = Script(*map(code, answers))
-    run = improve(model)
+    run = improve(on_task, model)
     out = tmp_path / "run"
     assert model.asked() == [
         ("generate", 1, 0),
@@ -167,10 +159,12 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
 
 
 @pytest.mark.slow
-def test_models_that_see_get_a_picture_of_a_failure(improve, fragile, good_source):
+def test_models_that_see_get_a_picture_of_a_failure(
+    improve, on_task, fragile, good_source
+):
     """None if all goals were reached."""
     model = Script(*map(code, (fragile, good_source, *[STILL] * 12)))
-    improve(model, vision=True)
+    improve(on_task, model, vision=True)
     generated, first, *others = model.requests
     assert generated.images == ()
     (picture,) = first.images
@@ -184,7 +178,7 @@ def test_models_that_see_get_a_picture_of_a_failure(improve, fragile, good_sourc
 
 @pytest.mark.slow
 def test_without_a_better_one_the_first_stays(
-    improve, task, fragile, good_source, tmp_path, warm
+    improve, on_task, task, fragile, good_source, tmp_path, warm
 ):
     """It is delivered before the search begins, and has driven as in `--robust`."""
     model = Script(*map(code, (good_source, fragile, *[STILL] * 4)))
@@ -194,7 +188,7 @@ def test_without_a_better_one_the_first_stays(
         if record["event"] == "drive.start":
             seen.append((tmp_path / "run" / "controller.py").read_text())
 
-    run = improve(model, on_event=watch)
+    run = improve(on_task, model, on_event=watch)
     assert set(seen) == {good_source}
     assert (run.folder / "controller.py").read_text() == good_source
     found = read_improvement(run.folder)
@@ -214,11 +208,11 @@ def test_without_a_better_one_the_first_stays(
 
 @pytest.mark.slow
 def test_all_verified_candidates_of_a_group_found_the_archive(
-    improve, fragile, good_source
+    improve, on_task, fragile, good_source
 ):
     """The run is still compared with its first one."""
     answers = (fragile, good_source, fragile, *[STILL] * 4)
-    run = improve(Script(*map(code, answers)), candidates=3)
+    run = improve(on_task, Script(*map(code, answers)), candidates=3)
     found = read_improvement(run.folder)
     assert [(each.k, each.parent) for each in found.members] == [(1, None), (2, None)]
     assert (found.first, found.selected, run.tau) == ((1, 0), (2, 0), 1)
@@ -226,11 +220,11 @@ def test_all_verified_candidates_of_a_group_found_the_archive(
 
 
 @pytest.mark.slow
-def test_the_end_of_the_budget_ends_the_search_alone(improve, good_source):
+def test_the_end_of_the_budget_ends_the_search_alone(improve, on_task, good_source):
     """The verified controller stays verified."""
     model = Script(code(good_source))
     model.paid = True
-    run = improve(model, max_tokens=ENOUGH_FOR_ONE)
+    run = improve(on_task, model, max_tokens=ENOUGH_FOR_ONE)
     assert (run.status, run.tau) == ("verified", 1)
     assert model.asked() == [("generate", 1, 0)]
     assert "tokens" in run.reason
@@ -240,50 +234,57 @@ def test_the_end_of_the_budget_ends_the_search_alone(improve, good_source):
 
 
 @pytest.mark.slow
-def test_the_built_in_learner_varies_the_same_way_twice(improve, tmp_path):
+def test_the_built_in_learner_varies_the_same_way_twice(improve, ground, tmp_path):
     """With one seed, folders agree but for clocks: after a break, and as a replay."""
 
     class Stop(Exception):
         pass
 
     def stop(record):
-        if record["event"] == "drive.end" and record["k"] == 8:
+        if record["event"] == "drive.end" and record.get("k") == one.iterations + 2:
             raise Stop
 
-    one = improve(out=tmp_path / "a")
+    def record_of(folder):
+        if ground.is_task:
+            return read_improvement(folder)
+        return read_selection(folder).model_copy(update={"stopped": None})
+
+    one = improve(ground, out=tmp_path / "a")
     with pytest.raises(Stop):
-        improve(out=tmp_path / "b", on_event=stop)
+        improve(ground, out=tmp_path / "b", on_event=stop)
     broken = load_run(tmp_path / "b")
-    assert (broken.status, broken.tau, broken.censored) == ("fault", 1, False)
-    assert frames_of([broken]).runs["censored"].tolist() == [False]
-    other = improve(out=tmp_path / "b")
-    again = improve(f"replay:{tmp_path / 'a'}", out=tmp_path / "c")
+    assert (broken.status, broken.improve) == ("fault", 32)
+    if ground.is_task:
+        assert (broken.tau, broken.censored) == (1, False)
+        assert frames_of([broken]).runs["censored"].tolist() == [False]
+    other = improve(ground, out=tmp_path / "b")
+    again = improve(ground, f"replay:{tmp_path / 'a'}", out=tmp_path / "c")
     for run in (other, again):
-        assert run.verified
+        assert run.status == one.status
         assert run.attempts == one.attempts
-        assert read_improvement(run.folder) == read_improvement(one.folder)
+        assert record_of(run.folder) == record_of(one.folder)
         assert sources(run.folder) == sources(one.folder)
     assert len(sources(one.folder)) > 4
     with pytest.raises(RunError, match="number of improving episodes 32 instead of 40"):
-        improve(out=tmp_path / "b", improve=40)
+        improve(ground, out=tmp_path / "b", improve=40)
 
 
 @pytest.mark.slow
 def test_an_interrupted_search_leaves_a_verified_run(
-    improve, good_source, tmp_path, tdac
+    improve, on_task, good_source, tmp_path, tdac
 ):
     """All places say so, and how to go on; also after a break in resuming it."""
     out = tmp_path / "run"
     model = Script(code(good_source), code(STILL), KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
-        improve(model)
+        improve(on_task, model)
 
     def check():
         run = load_run(out)
-        assert (run.verified, run.finished, run.censored) == (True, False, False)
+        assert (run.passed, run.finished, run.censored) == (True, False, False)
         assert (run.tau, [each.k for each in run.attempts]) == (1, [1, 7])
         assert run.controller.read_text() == good_source
-        assert row_of(out)["status"] == "verified"
+        assert row_of(out)["status"] == "passed"
         words = f"{out} is verified; to go on improving it: tdac synth --resume {out}"
         assert words in tdac("runs", tmp_path)[1]
         page = make_page(out)
@@ -300,9 +301,9 @@ def test_an_interrupted_search_leaves_a_verified_run(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        improve(Script(), on_event=interrupt)
+        improve(on_task, Script(), on_event=interrupt)
     check()
-    run = improve(Script(*[code(STILL)] * 3))
+    run = improve(on_task, Script(*[code(STILL)] * 3))
     assert (run.status, len(run.attempts)) == ("verified", 5)
 
 
@@ -330,21 +331,23 @@ def sources(folder):
     }
 
 
-def test_too_few_episodes_on_a_task_are_refused(improve):
+def test_too_few_episodes_are_refused(improve, ground):
     with pytest.raises(TaskError, match="improve"):
-        improve(improve=31)
+        improve(ground, improve=31)
 
 
-def test_a_seed_is_drawn_for_a_search(improve, good_source):
+def test_a_seed_is_drawn_for_a_search(improve, on_task, good_source):
     """So that its record says which episodes it drove."""
-    run = improve(Script(code(good_source), *[code(good_source)] * 3), seed=None)
+    run = improve(
+        on_task, Script(code(good_source), *[code(good_source)] * 3), seed=None
+    )
     assert isinstance(run.seed, int)
     found = read_improvement(run.folder)
     assert found.first_seed > 2**33
 
 
 @pytest.mark.slow
-def test_the_command_improves_a_task(tdac, tmp_path, good_source):
+def test_the_command_improves_a_task(tdac, done, tmp_path, good_source):
     """It tells what the given controller reached, and what the best one is."""
     folder, slow = write_small_task(tmp_path / "task"), tmp_path / "slow.py"
     fast = "CRUISE_SPEED = 1.0"
@@ -369,6 +372,5 @@ def test_the_command_improves_a_task(tdac, tmp_path, good_source):
     listed = tdac("runs", ".")[1]
     assert f"1/20 +{found.asked}" in listed
     assert "k: iterations begun / allowed, + variations of what works" in listed
-    code_, out, _ = tdac("synth", "--resume", "run")
-    assert code_ == 0
+    out = done("synth", "--resume", "run")
     assert "has already finished" in out

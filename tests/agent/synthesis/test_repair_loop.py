@@ -6,15 +6,15 @@ import sys
 from pathlib import Path
 
 import pytest
+from changed_run import journal
+from script import AHEAD, STILL
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent.prompting.rules import BEGIN, RepairRule, RuleBook
 from tdac_agent.runs.run_record import Attempt, Run, load_rules, load_run
-from tdac_agent.synthesis.synthesize import synthesize
 
 PROGRAM = Path(__file__).parents[1] / "scripted_model.py"
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
-WALL = "def policy(obs):\n    return 1.0, 1.0\n"
 SLOW = "Drive no faster than 0.5 near walls."
 
 
@@ -48,13 +48,13 @@ class Model:
 
 
 @pytest.mark.slow
-def test_rules_live_on(task, good_source, tmp_path, out, tdac, monkeypatch, warm):
+def test_rules_live_on(task, good_source, tmp_path, out, done, monkeypatch, warm):
     """Learnt, edited and dropped over three iterations; `tdac rules` shows it all."""
     model = Model(
         tmp_path / "model",
         code(STILL),
         rules(add(SLOW), add("Do not stand still."), add("DO NOT STAND STILL")),
-        code(WALL),
+        code(AHEAD),
         rules(
             {"op": "drop", "id": "R2", "reason": "it drives now"},
             {"op": "edit", "id": "R1", "text": "Turn before the wall at x = 70."},
@@ -80,13 +80,12 @@ def test_rules_live_on(task, good_source, tmp_path, out, tdac, monkeypatch, warm
     assert "k=1 j=0: " in prompts[3].partition("## Earlier attempts")[2]
     check_life(out)
     monkeypatch.setenv("COLUMNS", "80")
-    code_, shown, _ = tdac("rules", out)
-    assert code_ == 0
+    shown = done("rules", out)
     every = f"cured {len(first)} of {len(first)} tests"
     for words in ("R2", "dropped in k=2: it drives now", f"was '{SLOW}'", every):
         assert words in " ".join(shown.split()), shown
     assert max(map(len, shown.splitlines())) <= 80
-    code_, shown, _ = tdac("rules", out, "--json")
+    shown = done("rules", out, "--json")
     assert json.loads(shown) == load_rules(out).model_dump(mode="json")
 
 
@@ -98,8 +97,7 @@ def check_life(folder):
     assert first.edits == (f"k=2: was {SLOW!r}",)
     assert "test_end_to_end.py::test_reaches_goal" in first.evidence
     assert (second.status, second.ended) == ("dropped", 2)
-    lines = (folder / "journal.jsonl").read_text().splitlines()
-    notes = [r["notes"] for r in map(json.loads, lines) if r["event"] == "rules"]
+    notes = [record["notes"] for record in journal(folder, "rules")]
     assert notes[0][2] == "not added: it repeats R2"
     assert "not added: it repeats R2, which was ended in k=2" in notes[2]
 
@@ -147,7 +145,7 @@ def test_earlier_attempts_are_told(task, good_source, tmp_path, out, warm):
     """One line each, the one in question left out; no figure of a held-out start."""
     model = Model(
         tmp_path / "model",
-        *(code(STILL), code(WALL), code(f"{WALL}X = 1\n"), code(good_source)),
+        *(code(STILL), code(AHEAD), code(f"{AHEAD}X = 1\n"), code(good_source)),
     )
     run = synthesize(task, model.name, out=out, iterations=1, patience=3, judge=warm)
     assert run.tau == 1
@@ -174,15 +172,13 @@ def test_the_prompt_is_on_record(task, good_source, tmp_path, out, warm):
     assert "## Advice" not in model.prompts()[0]
 
 
-def test_a_broken_template_leaves_no_folder(tmp_path, tdac):
+def test_a_broken_template_leaves_no_folder(tmp_path, refused):
     """Refused in one line before anything is asked or written."""
     (tmp_path / "mine.j2").write_text("{{ nothing }}")
     folder = write_small_task(tmp_path / "task")
     words = ("--task", folder, "--prompt", tmp_path / "mine.j2", "--out", "run")
-    code_, _, told = tdac("synth", *words)
-    assert code_ == 2
+    told = refused("synth", *words)
     assert "'nothing' is undefined" in told
-    assert told.count("\n") == 1
     assert not Path("run").exists()
 
 
@@ -244,27 +240,23 @@ def test_why_there_are_no_rules(tmp_path, tdac, facts, why):
     assert f"no rules: {why}" in shown.replace("this run ", "")
 
 
-def test_rules_of_what_is_no_run(tmp_path, tdac):
+def test_rules_of_what_is_no_run(tmp_path, refused):
     """A wrong folder and a damaged file are one clear line each."""
-    code_, _, told = tdac("rules", tmp_path)
-    assert code_ == 2
+    told = refused("rules", tmp_path)
     assert "is not a run folder" in told
 
 
 @pytest.mark.slow
-def test_builtin_learns_by_rules(tmp_path, tdac):
+def test_builtin_learns_by_rules(tmp_path, refused, rejected, done):
     """The template's own optimizer passes through the same rules, and says so."""
     folder = write_small_task(tmp_path / "task", horizon=40)
-    code_, _, _ = tdac("synth", "--task", folder, "-K", "3", "-J", "0", "--out", "run")
-    assert code_ == 1
+    rejected("synth", "--task", folder, "-K", "3", "-J", "0", "--out", "run")
     book = load_rules(Path("run"))
     assert book.in_force
     assert all(rule.text.startswith(("set ", "keep ")) for rule in book.rules)
     assert {rule.born for rule in book.rules} == {1, 2, 3}
-    code_, shown, _ = tdac("rules", "run")
-    assert code_ == 0
+    shown = done("rules", "run")
     assert "builtin" in shown
     (Path("run") / "rules.json").write_text("[1")
-    code_, _, told = tdac("rules", "run")
-    assert code_ == 2
+    told = refused("rules", "run")
     assert "is not a rules file" in told

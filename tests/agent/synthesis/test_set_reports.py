@@ -1,12 +1,11 @@
 """What the models are told: counts of categories, at most three diagnoses."""
 
 from few_worlds import write_set
+from script import STILL
 
 from tdac_agent.synthesis.set_reports import REFUSED, set_feedback, summary_of
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
-
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 def test_counts_and_three_diagnoses(few, warm):

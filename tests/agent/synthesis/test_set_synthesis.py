@@ -6,10 +6,10 @@ import re
 import stat
 
 import pytest
-from few_worlds import KNOWN, write_set
-from script import NO_RULES, STILL, Script, code
+from few_worlds import KNOWN, half_of, write_set
+from script import AHEAD, NO_RULES, STILL, Paid, code
+from unconfirmed import synthesize
 
-from tdac_agent import synthesize
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
 from tdac_agent.html_report.set_part import MOST_DRAWN
@@ -18,13 +18,12 @@ from tdac_agent.runs.selection_record import Selection
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
-BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
-
 
 def selection(folder):
     return Selection.model_validate_json((folder / "report.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_repaired_candidate_is_selected(write, on_set, solver, out, few):
     """The failure is told; all episodes count; a pass on dev is not `verified`."""
     model, run = write(on_set, code(STILL), code(solver))
@@ -92,7 +91,7 @@ def test_a_given_controller_is_tested_until_it_fails(write, on_set, out):
 @pytest.mark.slow
 def test_each_test_has_new_worlds(write, on_set, out):
     """Feedback worlds are never used twice, nor for the selection."""
-    write(on_set, code(STILL), code(BUMP), iterations=1, refine=False)
+    write(on_set, code(STILL), code(AHEAD), iterations=1, refine=False)
     driven = {"feedback": [], "validation": []}
     for path in sorted(out.glob("iterations/*/*/*/episodes.json")):
         episodes = json.loads(path.read_text())["episodes"]
@@ -111,7 +110,7 @@ def test_rules_and_categories(write, on_set, solver):
     """A rule's evidence are the categories of failure, and it is told what came."""
     rule = '```json\n[{"op": "add", "scope": "task", "text": "Do move."}]\n```'
     rules = type(NO_RULES)(rule)
-    model, run = write(on_set, code(STILL), code(BUMP), rules, code(solver))
+    model, run = write(on_set, code(STILL), code(AHEAD), rules, code(solver))
     assert run.status == "selected"
     asked = [("generate", 1, 0), ("edit", 1, 1), ("summarise", 1, 1)]
     assert model.asked() == [*asked, ("generate", 2, 0)]
@@ -134,27 +133,13 @@ def selection_or_none(run):
     return selection(run.folder) if path.exists() else None
 
 
-class Paid(Script):
-    """A script whose answers cost tokens, as many as are reserved."""
-
-    paid = True
-
-
 FOR_ONE = 30_000
 """Tokens that are enough for one question and not for two."""
 
 
 @pytest.fixture
 def half(solver):
-    """Reaches some goals."""
-    return f"""{solver}
-
-drive = policy
-
-
-def policy(obs):
-    return drive(obs) if int(obs["goal"][0]) % 2 else (0.0, 0.0)
-"""
+    return half_of(solver)
 
 
 @pytest.mark.slow

@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 from few_worlds import write_set
 from PIL import Image
-from script import NO_RULES, STILL, Script, code
+from script import AHEAD, NO_RULES, STILL, Script, code
+from unconfirmed import synthesize
 
 from tdac_agent.html_report import make_page
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.synthesis.set_reports import world_picture
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.drawing.canvas import MOVER
 
-BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
 MOVERS = [{"kind": "bounce", "count": [3, 3], "radius": [4, 5], "speed": [20, 25]}]
 
 
@@ -40,7 +39,7 @@ def shown_in(request):
 
 @pytest.mark.slow
 def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm):
-    model = Script(code(BUMP), code(STILL), NO_RULES)
+    model = Script(code(AHEAD), code(STILL), NO_RULES)
     given = {"episodes": 12, "feedback_episodes": 2, "seed": 3, "judge": warm}
     run = synthesize(
         crowded, model, out=tmp_path / "run", iterations=1, vision=True, **given
@@ -70,7 +69,7 @@ def test_the_first_failed_world_is_shown_with_its_movers(crowded, tmp_path, warm
 
 def test_what_is_shown_is_what_was_diagnosed(crowded, tmp_path, warm):
     report = verify_episodes(
-        BUMP.encode(), crowded, 3, split="dev", out=tmp_path / "dev", judge=warm
+        AHEAD.encode(), crowded, 3, split="dev", out=tmp_path / "dev", judge=warm
     )
     shown = world_picture(crowded, report, tmp_path / "dev")
     failed = next(each for each in report.episodes if not each.success)
@@ -85,7 +84,7 @@ def test_what_is_shown_is_what_was_diagnosed(crowded, tmp_path, warm):
 
 def test_worlds_of_other_splits_are_never_drawn(few, tmp_path, warm):
     report = verify_episodes(
-        BUMP.encode(), few, 1, split="test", out=tmp_path, judge=warm
+        AHEAD.encode(), few, 1, split="test", out=tmp_path, judge=warm
     )
     assert report.successes == 0
     with pytest.raises(ValueError, match="expected worlds of dev, got test"):

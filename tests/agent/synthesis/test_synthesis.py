@@ -8,10 +8,12 @@ import sys
 
 import pytest
 import script
-from script import NO_RULES, STILL, Script
+from changed_run import journal
+from script import AHEAD, NO_RULES, STILL, Paid, Script
 from small import write_small_task
+from unconfirmed import synthesize
 
-from tdac_agent import load_task, synthesize
+from tdac_agent import load_task
 from tdac_agent.errors import Fault, ProviderError, RunError
 from tdac_agent.models.provider import PermanentFault, ProviderFault, Reply
 from tdac_agent.runs.run_record import load_run
@@ -19,7 +21,6 @@ from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.verification.verify import verify
 from tdac_envs.core.errors import TaskError
 
-BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
 LEARNT = ("Drive towards the goal.", "Do not stand still.")
 OPERATIONS = [{"op": "add", "scope": "code", "text": text} for text in LEARNT]
 RULES = Reply(f"```json\n{json.dumps(OPERATIONS)}\n```", tokens_in=7)
@@ -28,14 +29,6 @@ GARBAGE = Reply("\n\n  lorem \x1b[31mipsum\n" + "dolor sit amet " * 99)
 
 def code(source):
     return script.code(source, tokens_in=10, tokens_out=5)
-
-
-class Paid(Script):
-    paid = True
-
-
-def journal(folder):
-    return [json.loads(x) for x in (folder / "journal.jsonl").read_text().splitlines()]
 
 
 def halted(folder):
@@ -99,6 +92,7 @@ def test_an_interrupt_leaves_a_readable_run(write, ground, out):
         write(ground, iterations=3)
 
 
+@pytest.mark.slow_after(1)
 def test_a_given_controller_is_tried_first(write, ground, tmp_path):
     """`start_from` replaces the first answer of the learner; a path is read."""
     file = tmp_path / "given.py"
@@ -124,7 +118,7 @@ def test_the_budget_ends_a_run_that_more_tokens_continue(write, ground):
     _, run = write(ground, model=model, max_tokens=one, iterations=1)
     assert run.status == "budget"
     assert "--max-tokens" in str(run.enough)
-    model = Paid(code(BUMP), NO_RULES)
+    model = Paid(code(AHEAD), NO_RULES)
     _, run = write(ground, model=model, max_tokens=500_000, iterations=1)
     assert model.asked()[0] == ("edit", 1, 1)
     assert run.status == "not verified"
@@ -138,7 +132,7 @@ def test_it_passes_after_rules_and_an_edit(task, good_source, out, warm):
     learner = Script(code(STILL), code(STILL + "\nX = 2\n"))
     optimizer = Script(code(STILL + "\nX = 1\n"), RULES, code(good_source))
     run = synthesize(task, learner, optimizer, out=out, judge=warm)
-    assert run.verified
+    assert run.passed
     assert run.tau == 2
     assert learner.asked() == [("generate", 1, 0), ("generate", 2, 0)]
     assert optimizer.asked() == [("edit", 1, 1), ("summarise", 1, 1), ("edit", 2, 1)]
@@ -170,7 +164,7 @@ def check_folder(folder, source):
     for name in ("edit.prompt.md", "edit.reply.md", "controller.py", "report.json"):
         assert (last / name).is_file(), name
     assert "+X = 1" in (folder / "iterations/k01/j1/controller.diff").read_text()
-    assert load_run(folder).verified
+    assert load_run(folder).passed
     events = [record["event"] for record in journal(folder)]
     assert (events[0], events[-1]) == ("run.start", "run.end")
     rules = next(r for r in journal(folder) if r["event"] == "rules")["rules"]
@@ -279,7 +273,7 @@ def test_a_given_controller_may_be_poor(write, on_task, source):
 def test_builtin_needs_no_model(write, on_task):
     """The builtin learner verifies the small task by itself."""
     _, run = write(on_task, model="builtin")
-    assert run.verified
+    assert run.passed
     assert run.learner == run.optimizer == "builtin"
     assert run.tokens_in == 0
 
@@ -306,7 +300,7 @@ def test_a_run_folder_is_self_contained(tmp_path, good_source, out, warm):
     test = "def test_own(rollout):\n    assert rollout('nominal').reached, 'no'\n"
     (folder / "mine" / "test_mine.py").write_text(test)
     task = load_task(folder, trust=True)
-    assert synthesize(task, Script(code(good_source)), out=out, judge=warm).verified
+    assert synthesize(task, Script(code(good_source)), out=out, judge=warm).passed
     moved = tmp_path / "elsewhere" / "moved"
     moved.parent.mkdir()
     out.rename(moved)

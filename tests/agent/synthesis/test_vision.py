@@ -9,11 +9,12 @@ from dataclasses import replace
 from datetime import date
 
 import pytest
+from changed_run import journal
 from PIL import Image
-from script import NO_RULES, Script, code
+from script import AHEAD, NO_RULES, Script, code
 from small import write_small_task
+from unconfirmed import synthesize
 
-from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.html_report import make_page
 from tdac_agent.models.picture import LARGEST_SIDE
@@ -21,24 +22,15 @@ from tdac_agent.models.prices import Price, PriceList
 from tdac_agent.models.provider import PermanentFault, Request
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.models.tariff import Tariff
-from tdac_agent.models.tokens import PICTURE_TOKENS
+from tdac_agent.models.tokens import picture_tokens
 from tdac_agent.runs.journal_state import call_key
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.cost_forecast import cost_of
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.synthesis.workload import rest_of
 
 AT_ONCE = RetryPolicy(first_wait=0.0)
-BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
 PLACE = "iterations/k01/j1"
-
-
-@pytest.fixture(scope="module")
-def task(tmp_path_factory):
-    return load_task(
-        write_small_task(tmp_path_factory.mktemp("task"), profile="policy")
-    )
 
 
 @pytest.fixture(scope="module")
@@ -46,15 +38,10 @@ def seen(task, good_source, tmp_path_factory, warm):
     """A run in which a model saw the failure, and what it was asked."""
     out = tmp_path_factory.mktemp("runs") / "seen"
     # The second answer has no Python, so that the question is repeated.
-    model = Script(code(BUMP), NO_RULES, code(good_source))
+    model = Script(code(AHEAD), NO_RULES, code(good_source))
     run = synthesize(task, model, out=out, seed=4, vision=True, judge=warm)
-    assert run.verified
+    assert run.passed
     return out, model
-
-
-def journal(folder, event):
-    lines = (folder / "journal.jsonl").read_text().splitlines()
-    return [each for each in map(json.loads, lines) if each["event"] == event]
 
 
 @pytest.mark.slow
@@ -117,7 +104,7 @@ def test_a_replay_finds_the_same_questions(seen, task, tmp_path, warm):
     out, _ = seen
     given = {"learner": f"replay:{out}", "judge": warm}
     run = synthesize(task, out=tmp_path / "again", vision=True, **given)
-    assert run.verified
+    assert run.passed
     one, other = (each / PLACE / "edit.picture.png" for each in (out, run.folder))
     assert one.read_bytes() == other.read_bytes()
     with pytest.raises(Fault, match="the question differs from the record"):
@@ -129,20 +116,20 @@ def test_a_resumed_run_has_the_same_picture(task, good_source, tmp_path, warm):
     """It is drawn again with the same bytes, and its answer is not asked for again."""
     given = {"out": tmp_path / "run", "seed": 4, "vision": True, "judge": warm}
     given |= {"retry": AT_ONCE, "iterations": 2}
-    first = Script(code(BUMP), PermanentFault("no access"))
+    first = Script(code(AHEAD), PermanentFault("no access"))
     with pytest.raises(Fault, match="no access"):
         synthesize(task, first, **given)
     file = tmp_path / "run" / PLACE / "edit.picture.png"
     before = file.read_bytes()
     file.unlink()
-    second = Script(code(BUMP + "# again\n"), PermanentFault("no access"))
+    second = Script(code(AHEAD + "# again\n"), PermanentFault("no access"))
     with pytest.raises(Fault, match="no access"):
         synthesize(task, second, **given)
     assert second.requests[0].images == first.requests[1].images
     assert file.read_bytes() == before
     file.unlink()
     last = Script(NO_RULES, code(good_source))
-    assert synthesize(task, last, **given).verified
+    assert synthesize(task, last, **given).passed
     assert last.asked() == [("summarise", 1, 1), ("generate", 2, 0)]
     assert file.read_bytes() == before
 
@@ -182,7 +169,7 @@ def test_without_the_flag_a_run_is_as_it_always_was(
     seen, task, good_source, tmp_path, warm
 ):
     """The question has no word of a picture, and nothing else is different."""
-    model = Script(code(BUMP), code(good_source))
+    model = Script(code(AHEAD), code(good_source))
     run = synthesize(task, model, out=tmp_path / "run", seed=4, judge=warm)
     assert all(request.images == () for request in model.requests)
     before, _, section = seen[1].requests[1].prompt.partition("\n\n## A picture")
@@ -208,19 +195,17 @@ def test_without_the_flag_a_run_is_as_it_always_was(
         ),
     ],
 )
-def test_pictures_for_nobody_are_refused(tdac, tmp_path, words, reason):
+def test_pictures_for_nobody_are_refused(refused, tmp_path, words, reason):
     folder = write_small_task(tmp_path / "task")
-    code_, out, err = tdac(
+    err = refused(
         "synth", "--task", folder, "--vision", "--out", tmp_path / "run", *words
     )
-    assert (code_, out) == (2, "")
     assert reason in " ".join(err.split())
     assert not (tmp_path / "run").exists()
 
 
-def test_a_resumed_run_takes_the_flag_from_its_folder(tdac, seen):
-    code_, _, err = tdac("synth", "--resume", seen[0], "--vision")
-    assert code_ == 2
+def test_a_resumed_run_takes_the_flag_from_its_folder(refused, seen):
+    err = refused("synth", "--resume", seen[0], "--vision")
     assert "leave out --vision" in err
 
 
@@ -245,7 +230,7 @@ def test_a_forecast_counts_the_pictures(vendor):
     edits, variations = 2 * 2, 4
     assert shown.pictures == edits + variations
     assert shown.questions == blind.questions
-    usd = PICTURE_TOKENS[vendor.partition(":")[0]] * PRICES.models[vendor].input / 1e6
+    usd = picture_tokens(vendor) * PRICES.models[vendor].input / 1e6
     assert shown.cost_once - blind.cost_once == pytest.approx(8 * usd)
     assert shown.cost_most - blind.cost_most == pytest.approx(3 * 8 * usd)
     assert shown.first_cost == blind.first_cost

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from unconfirmed import synthesize
 
 from tdac_agent.sandbox.exposure import exposure
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import lasting_secret, seed_of
 from tdac_agent.verification.suite.starts import JITTERS, spread_starts
 from tdac_agent.verification.verify import verify

@@ -3,14 +3,15 @@
 import json
 
 import pytest
+from changed_run import journal
+from script import Paid, code
 from small import SHORT, write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.environments.epuck.entry import EPUCK
 from tdac_agent.errors import ControllerFileError, Fault
-from tdac_agent.models.provider import Reply
 from tdac_agent.runs.run_record import load_run
-from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_agent.verification.suite.privileged import (
@@ -300,39 +301,19 @@ def test_the_command_line(choice, name, tdac):
     assert record["rows"][-1]["passed"] == 0
 
 
-class Paid:
-    """A provider that costs money, and counts how often."""
-
-    name = "paid"
-    paid = True
-
-    def __init__(self, source):
-        self.source = source
-        self.calls = 0
-
-    def complete(self, request):
-        self.calls += 1
-        return Reply(f"```python\n{self.source}```\n")
-
-
-def events(folder):
-    lines = (folder / "journal.jsonl").read_text().splitlines()
-    return [json.loads(line) for line in lines]
-
-
 @pytest.mark.slow
 def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source, warm):
     """It ends as a fault, with the reason on record, before the first call."""
     folder = write_small_task(tmp_path / "task", suite="mine", profile="policy")
     (folder / "mine").mkdir()
     (folder / "mine" / "test_mine.py").write_text(IMPOSSIBLE)
-    learner, out = Paid(good_source), tmp_path / "run"
+    learner, out = Paid(code(good_source)), tmp_path / "run"
     task = load_task(folder, trust=True)
     with pytest.raises(Fault, match=r"own/test_mine\.py::test_flies: it took 3 steps"):
         synthesize(task, learner, out=out, judge=warm)
-    assert learner.calls == 0
+    assert learner.requests == []
     assert load_run(out).status == "fault"
-    records = events(out)
+    records = journal(out)
     assert [r["event"] for r in records] == ["run.start", "prove.start", "run.end"]
     assert "the suite failed its check" in records[-1]["reason"]
 
@@ -342,15 +323,15 @@ def test_a_run_pays_nothing_for_a_broken_suite(tmp_path, good_source, warm):
 def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
     """Whoever of the two is paid; it is on record before the first call."""
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
-    paid, out = Paid(good_source), tmp_path / "run"
+    paid, out = Paid(code(good_source)), tmp_path / "run"
     providers = {"learner": "builtin", who: paid}
     seen = []
     run = synthesize(task, **providers, out=out, judge=warm, on_event=seen.append)
-    assert run.verified
+    assert run.passed
     doing = [record["doing"] for record in seen if record["event"] == "prove.step"]
     assert doing == ["reference", "do-nothing"]
-    assert paid.calls == (who == "learner")
-    records = events(out)
+    assert len(paid.requests) == (who == "learner")
+    records = journal(out)
     begun = [record["event"] for record in records][:4]
     assert begun == ["run.start", "prove.start", "prove.end", "call.intent"]
     assert records[2]["proven"] is True
@@ -360,5 +341,5 @@ def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
 def test_what_costs_nothing_needs_no_proof(tmp_path, warm):
     """A run of the builtin learner loses no time."""
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
-    assert synthesize(task, out=tmp_path / "run", judge=warm).verified
-    assert not any(r["event"].startswith("prove") for r in events(tmp_path / "run"))
+    assert synthesize(task, out=tmp_path / "run", judge=warm).passed
+    assert not any(r["event"].startswith("prove") for r in journal(tmp_path / "run"))

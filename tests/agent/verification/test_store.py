@@ -4,7 +4,7 @@ import json
 import shutil
 
 import pytest
-import yaml
+from script import STILL
 
 from tdac_agent.verification.store import (
     MARK,
@@ -17,20 +17,13 @@ from tdac_agent.verification.store import (
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 
-STILL = "def policy(obs):\n    return 0.0, 0.0\n"
 COUNT = 4
 
 
 @pytest.fixture
-def problem(request, small_task, tmp_path):
+def problem(request, small_task, level):
     """A task, or a set of short episodes."""
-    if request.param == "task":
-        return small_task
-    short = {"factor": 1.0, "least": 40, "most": 40}
-    path = tmp_path / "few.yaml"
-    values = {"name": "few", "worlds": [{"name": "clutter"}], "horizon": short}
-    path.write_text(yaml.safe_dump(values))
-    return load_set(path)
+    return small_task if request.param == "task" else load_set(level)
 
 
 def drive(problem, out, warm, watch=None):

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
+from script import STILL
 from small import write_small_task
 
 from tdac_agent import load_task
 from tdac_agent.verification.verify import load_trajectories, verify
-
-NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +21,7 @@ def test_a_verification_draws_movers_from_its_seed(moving, warm, tmp_path):
     kept = []
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         out = tmp_path / name
-        verify(NOTHING, moving, profile="policy", seed=seed, judge=warm, out=out)
+        verify(STILL, moving, profile="policy", seed=seed, judge=warm, out=out)
         kept.append(load_trajectories(out / "trajectories")["nominal"])
     first, same, other = (each.movers for each in kept)
     assert first.dtype == np.float32

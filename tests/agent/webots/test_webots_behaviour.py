@@ -9,6 +9,7 @@ from worlds_for_controllers import BLOCKED, HEAD, NUE, OPEN, PLAIN
 
 from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.webots.controller.pose import rotation_matrix
+from tdac_envs.worlds.world import AXLE_LENGTH
 
 BEGIN = """
 import math
@@ -424,7 +425,7 @@ class TestSensors:
         assert ahead[0] == pytest.approx([0.2, 0.0, 9.81], abs=1e-3)
         assert ahead[1] == pytest.approx([0.0, 0.0, 0.0], abs=1.0)
         rate = turning[1][2] * 13.3158 / 100000.0
-        assert rate == pytest.approx(12.0 * 0.02 / 0.052, rel=1e-3)
+        assert rate == pytest.approx(12.0 * 0.02 / AXLE_LENGTH, rel=1e-3)
         assert turning[0][2] == pytest.approx(9.81)
 
     def test_where_it_is_in_a_z_up_world(self, drive):
@@ -467,8 +468,8 @@ class TestSensors:
         )
         run = drive(code, NUE)
         turn, end, after, gps, angles, rotation = eval(run.report.output)
-        spin = 1.6 * 1.0 * 0.02 / 0.052
-        radius = 4.5 * 0.052
+        spin = 1.6 * 1.0 * 0.02 / AXLE_LENGTH
+        radius = 4.5 * AXLE_LENGTH
         ahead, left = radius * math.sin(spin), radius * (1.0 - math.cos(spin))
         assert end == pytest.approx([0.1 + ahead, 0.0, 0.3 - left], abs=1e-6)
         cos, sin = math.cos(spin), math.sin(spin)
@@ -553,9 +554,9 @@ class TestSupervisor:
             BLOCKED,
         )
         at, turn, speed, own, seen, field, rotation = eval(out[-1])
-        heading = 0.64 * 0.5 * 0.02 / 0.052
+        heading = 0.64 * 0.5 * 0.02 / AXLE_LENGTH
         assert math.atan2(turn[3], turn[0]) == pytest.approx(heading, abs=1e-6)
-        assert speed[5] == pytest.approx(0.5 * 0.02 / 0.052, abs=1e-5)
+        assert speed[5] == pytest.approx(0.5 * 0.02 / AXLE_LENGTH, abs=1e-5)
         assert math.hypot(*speed[:2]) == pytest.approx(0.045, rel=1e-3)
         assert own[:2] == pytest.approx([math.cos(0.3), -math.sin(0.3)])
         assert field == at

@@ -6,6 +6,8 @@ import math
 import pytest
 from worlds_for_controllers import BLOCKED, LINE, NO_GOAL, OPEN, PLAIN
 
+from tdac_envs.worlds.world import AXLE_LENGTH
+
 
 @pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
@@ -109,7 +111,7 @@ def test_blinking(drive):
     assert run.report.output.splitlines()[-1] == "0010000000 99"
     assert "is not a multiple of WorldInfo.basicTimeStep" in run.report.output
     # 1.5 rad/s of the wheels ahead, 1 rad/s of difference.
-    radius = 1.5 * 0.052
+    radius = 1.5 * AXLE_LENGTH
     for x, y, _ in run.log.poses:
         assert math.dist((x, y), (-0.4, radius)) == pytest.approx(radius, abs=1e-6)
 

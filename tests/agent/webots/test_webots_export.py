@@ -219,10 +219,9 @@ def load_task_of(spec, tmp_path):
     return load_task(file)
 
 
-def test_command(tdac, verified):
+def test_command(done, verified):
     """Exit 0; it says what it wrote, what came out, and what was not tried."""
-    code, out, _ = tdac("export", "webots", verified, "--out", "project")
-    assert code == 0
+    out = done("export", "webots", verified, "--out", "project")
     assert "run by tdac, as a Webots controller: reached the goal after" in out
     assert "not run in Webots itself" in out
     assert Path("project/worlds/tdac_my_open_world.wbt").is_file()
@@ -240,11 +239,10 @@ def test_json(tdac, verified):
 
 
 @pytest.mark.slow
-def test_the_whole_way(tdac):
+def test_the_whole_way(tdac, done):
     """What `tdac synth` has verified drives as a Webots project; ± 5 % of the steps."""
     assert tdac("synth", "--task", "epuck-crates", "--out", "run")[0] == 0
-    code, out, _ = tdac("export", "webots", "run", "--out", "project")
-    assert code == 0
+    out = done("export", "webots", "run", "--out", "project")
     found = re.search(r"the goal after (\d+) steps \(when verified: (\d+)\)", out)
     assert found is not None, out
     here, verified = map(int, found.groups())
@@ -252,45 +250,40 @@ def test_the_whole_way(tdac):
 
 
 @pytest.mark.slow
-def test_command_with_a_controller_that_does_not_get_there(tdac, verified):
+def test_command_with_a_controller_that_does_not_get_there(rejected, verified):
     """Exit 1: what drives here is the exported file."""
     (verified / "controller.py").write_text("def policy(obs):\n    return 0.1, -0.1\n")
-    code, out, _ = tdac("export", "webots", verified, "--out", "project")
-    assert code == 1
+    out = rejected("export", "webots", verified, "--out", "project")
     assert "not passed: the goal was not reached" in out
 
 
 class TestRefused:
-    def test_not_verified(self, tdac, verified):
+    def test_not_verified(self, refused, verified):
         """Only verified controllers are exported."""
         record = json.loads((verified / "run.json").read_text())
         (verified / "run.json").write_text(
             json.dumps({**record, "status": "not verified"})
         )
-        code, _, err = tdac("export", "webots", verified, "--out", "project")
-        assert code == 2
+        err = refused("export", "webots", verified, "--out", "project")
         assert "has no verified controller (not verified)" in err
         assert not Path("project").exists()
 
-    def test_a_map(self, tdac, tmp_path):
+    def test_a_map(self, refused, tmp_path):
         """A controller for a map is none for Webots."""
         spec = {"schema": 1, "map": "maze", "name": "maze"}
         folder = make_run(tmp_path / "run", spec, "def policy(obs): return 0, 0\n")
-        code, _, err = tdac("export", "webots", folder, "--out", "project")
-        assert code == 2
+        err = refused("export", "webots", folder, "--out", "project")
         assert "is a run of TDAC-Map2D-v0" in err
 
-    def test_a_folder_in_use(self, tdac, verified):
+    def test_a_folder_in_use(self, refused, verified):
         """Nothing is overwritten."""
         Path("project").mkdir()
         Path("project/mine.txt").write_text("mine")
-        code, _, err = tdac("export", "webots", verified, "--out", "project")
-        assert code == 2
+        err = refused("export", "webots", verified, "--out", "project")
         assert "project is not an empty folder" in err
         assert [path.name for path in Path("project").iterdir()] == ["mine.txt"]
 
-    def test_no_run(self, tdac):
+    def test_no_run(self, refused):
         """A folder without a run."""
-        code, _, err = tdac("export", "webots", ".", "--out", "project")
-        assert code == 2
+        err = refused("export", "webots", ".", "--out", "project")
         assert "is not a run folder" in err

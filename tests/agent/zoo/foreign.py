@@ -29,9 +29,11 @@ from grounds import write_map_task
 from rich.console import Console
 
 from tdac_agent import load_task
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.verification.diagnosis.report import Report
+from tdac_envs import load_set
 
 MOST_SECONDS = 300
 KEYS = dict.fromkeys((KEY, "OPENAI_API_KEY"), "key-12345678")
@@ -175,6 +177,32 @@ brings_tests(
 brings_tests(
     "tests_of_a_task_for_synthesis",
     *("synth", "--task", "RUN/task.yaml", "-K", "1", "-J", "0"),
+)
+
+
+def brings_tests_on_a_set(name: str, *words: str) -> None:
+    """Adds a command on a run on a task set with tests of its own; see above."""
+
+    def build(place: Place) -> list[str | Path]:
+        place.set_suite("conftest.py", CONFTEST).unlink()
+        text = problem_of(load_set("known")).text
+        (place.run / "set.yaml").write_text(text)
+        place.change(episodes=2, feedback_episodes=1, seed=1)
+        return [word.replace("RUN", str(place.run)) for word in words]
+
+    works = words[0] != "synth" or "--set" in words
+    ATTACKS.append(Foreign(name, build, SUITE, works=works))
+
+
+brings_tests_on_a_set("tests_of_a_run_on_a_set", "verify", "RUN", "-n", "1")
+brings_tests_on_a_set(
+    "tests_beside_a_set", "verify", "RUN/controller.py", "--set", "RUN/set.yaml"
+)
+brings_tests_on_a_set(
+    "tests_of_a_set_for_synthesis", *("synth", "--set", "RUN", "--episodes", "2")
+)
+brings_tests_on_a_set(
+    "tests_of_a_run_on_a_set_that_goes_on", "synth", "--resume", "RUN"
 )
 
 
@@ -402,8 +430,8 @@ def make_own_run(folder: Path) -> Path:
     """A run of this installation, verified at once."""
     with tempfile.TemporaryDirectory() as name:
         task = load_task(write_map_task(Path(name), profile="policy"))
-        run = synthesize(task, out=folder, iterations=1)
-    assert run.verified
+        run = synthesize(task, out=folder, iterations=1, confirm=False)
+    assert run.passed
     return folder
 
 

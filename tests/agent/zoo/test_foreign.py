@@ -21,7 +21,7 @@ def test_each_way_is_tried():
     assert {one.name for one in ATTACKS} >= WAYS
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("one", ATTACKS, ids=lambda one: one.name)
 def test_nothing_runs_and_a_line_says_what_was_wanted(one, own, tmp_path):
     """Exit 2, with the flag that allows it; no canary was touched."""

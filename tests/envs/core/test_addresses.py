@@ -62,9 +62,9 @@ def test_one_row_is_replaced():
     flat, whole = np.ones((1, 1)), np.zeros((0, 1, 1), np.int64)
     rows = Addresses([(first, flat, whole), (second, flat, whole)])
     rows.put(0, (other, flat, whole))
-    for words in rows.words:
-        _doubled(words)
-    assert (first[0], second[0], other.tolist()) == (1.0, 2.0, [2.0] * 5)
+    assert rows.words[0, 0].tolist() == [other.ctypes.data, 5, 0, 0]
+    assert rows.words[1, 0].tolist() == [second.ctypes.data, 2, 0, 0]
+    assert (rows.words[0, 1:, 0] == rows.words[1, 1:, 0]).all()
 
 
 def test_arrays_with_gaps_are_refused():

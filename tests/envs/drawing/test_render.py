@@ -214,7 +214,8 @@ def test_places_at_and_past_the_border_are_clipped(pose):
 
 @pytest.mark.parametrize("n_rays", [0, 1, 2, 3, 64])
 def test_any_number_of_rays_can_be_drawn(n_rays):
-    scene, pose = make_scene(), (250.0, 100.0, 0.0)
+    robot = RobotParams(n_rays=max(n_rays, 1), field_of_view_deg=360.0)
+    scene, pose = make_scene(robot=robot), (250.0, 100.0, 0.0)
     rays = (scene.frame(pose, np.full(n_rays, 50.0)) != scene.frame(pose)).any()
     assert rays == (n_rays > 0)
 

@@ -3,12 +3,10 @@
 Libraries find in them what Gymnasium's own vectors have.
 """
 
-import pickle
-
 import gymnasium as gym
 import numpy as np
 import pytest
-from batches import actions, assert_same
+from batches import actions, assert_goes_on, assert_same
 from gymnasium.vector import VectorEnv
 
 import tdac_envs  # noqa: F401 - registers the envs
@@ -117,14 +115,7 @@ def test_each_robot_may_have_its_own_place_and_options(name):
 def test_a_pickle_goes_on_where_the_batch_was(name):
     """Poses, tasks and random streams are kept."""
     batch = gym.make_vec(name, 3, variation="jitter", **NOISY[name]).unwrapped
-    batch.reset(seed=2)
-    script = actions(3, 40)
-    for action in script[:20]:
-        batch.step(action)
-    twin = pickle.loads(pickle.dumps(batch))
-    for action in script[20:]:
-        for a, b in zip(batch.step(action), twin.step(action), strict=True):
-            assert_same(a, b)
+    assert_goes_on(batch, 3)
 
 
 MASKS = {

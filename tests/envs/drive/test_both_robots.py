@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from simple_policies import drive
 from world_texts import text
 
 from tdac_envs import read_world
@@ -88,15 +89,6 @@ CASES = {
     ),
 }  # fmt: skip
 each_robot = pytest.mark.parametrize("case", CASES.values(), ids=CASES)
-
-
-def drive(env, action, steps=10_000):
-    """The last step of some with one action, up to the end of the episode."""
-    for _ in range(steps):
-        result = env.step(action)
-        if result[2] or result[3]:
-            break
-    return result
 
 
 @each_robot

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,11 +16,11 @@ from tdac_envs.drive.sliding import slide_velocity
 from tdac_envs.drive.stepping import AXLE, DT, MAX_SPEED
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.gaps import nearest_gap
-from tdac_envs.epuck.kernels import AXLE_LENGTH, WHEEL_RADIUS
-from tdac_envs.epuck.prisms import Prisms
+from tdac_envs.epuck.kernels import WHEEL_RADIUS
 from tdac_envs.epuck.pushing import CommandedArc, push
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.worlds.bodies import BODY_RADIUS
+from tdac_envs.worlds.materials import Contact
 from tdac_envs.worlds.wbt.reader import read_world
 
 RADIUS = 9.0
@@ -263,7 +264,7 @@ class TestAmongSolids:
         before, action = env.pose(), np.array([-0.125, 1.0], np.float32)
         assert env.step(action)[4]["collision"]
         speed = env.nominal.max_wheel_speed * WHEEL_RADIUS * env.nominal.dt
-        turn = 1.125 * speed / AXLE_LENGTH
+        turn = 1.125 * speed / env.task.axle_length
         assert env.pose()[2] - before[2] == pytest.approx(turn, abs=1e-6)
         for _ in range(60):
             info = env.step(action)[4]
@@ -276,18 +277,19 @@ class TestAmongSolids:
         pytest.importorskip("pymunk")
         world = read_world(
             "#VRML_SIM R2023b utf8\nE-puck { }\n"
-            "Wall { translation 0.3 0 0 size 0.2 9 .1 }",
+            "Wall { translation 0.3 0 0 size 0.2 9 .1 }\n"
+            'Floor { contactMaterial "rubber" }',  # on which the tyres have a grip of 1
             goal=(-0.1, 0.0),
         )
-        env = EPuckEnv(world)
-        solid: Prisms = env.nominal.ground.solid
+        world = replace(world, contacts=(Contact(friction=friction),))
+        ground = EPuckEnv(world).nominal.ground
         state, speed = np.array([0.16, 0.0, heading]), np.zeros(3)
-        none, forward = np.zeros((0, 2)), 0.1 * 0.032
+        forward = 0.1 * 0.032
         ys = []
         for _ in range(60):
             push(
-                solid, solid, none, np.zeros(0), state, speed, np.zeros((0, 6)),
-                CommandedArc(forward, 0.0, 0.032), friction,
+                ground.solid, ground, state, speed, np.zeros((0, 6)),
+                CommandedArc(forward, 0.0, 0.032),
             )  # fmt: skip
             ys.append(state[1])
         _, expected = slide_velocity(forward, heading, 0.0, friction, WALL)

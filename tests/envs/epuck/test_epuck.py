@@ -9,6 +9,7 @@ import sys
 import gymnasium as gym
 import numpy as np
 import pytest
+from simple_policies import drive
 from world_texts import text
 
 from tdac_envs import TaskError, WorldError, bundled_worlds, read_world
@@ -16,7 +17,7 @@ from tdac_envs.epuck.env import EPuckEnv
 
 FULL = np.ones(2, np.float32)
 LEFT_TURN = np.array([-1.0, 1.0], np.float32)
-SPEED, RATE = 6.28 * 0.02, 2 * 6.28 * 0.02 / 0.052
+SPEED, RATE = 6.28 * 0.02, 2 * 6.28 * 0.02 / 0.057
 TEN_SECONDS = 313
 
 
@@ -33,13 +34,17 @@ def walled_env(thickness=0.002, **options):
     return open_env(wall, **options)
 
 
-def drive(env, action, steps=10_000):
-    """The last step of some with one action, up to the end of the episode."""
-    for _ in range(steps):
-        result = env.step(action)
-        if result[2] or result[3]:
-            break
-    return result
+def drive_square(env, axle, side):
+    """Drives sides and left turns by wheel angles alone, with an axle as believed."""
+    angles, step = env.reset(seed=0)[0]["wheel_positions"], 6.28 * env.task.dt
+    for leg in range(8):
+        turns = leg % 2
+        goal = (math.pi / 4 * axle if turns else side) / 0.02  # of the right wheel
+        begin = angles[1]
+        while (left := goal - (angles[1] - begin)) > 1e-4:
+            right = min(left / step, 1.0)
+            action = np.array([-right if turns else right, right], np.float32)
+            angles = env.step(action)[0]["wheel_positions"]
 
 
 class TestMotion:
@@ -62,8 +67,8 @@ class TestMotion:
     def test_arc(self, wheels):
         """A circle of radius axle / 2 (right + left) / (right - left)."""
         left, right = wheels
-        rate = (right - left) * SPEED / 0.052
-        radius = 0.026 * (right + left) / (right - left)
+        rate = (right - left) * SPEED / 0.057
+        radius = 0.0285 * (right + left) / (right - left)
         env = open_env(start=(1.0, 1.0, 0.3))
         env.reset(seed=0)
         for k in range(1, TEN_SECONDS + 1):
@@ -96,6 +101,35 @@ class TestMotion:
             observation, *_ = env.step(np.array([0.5, -0.25], np.float32))
         turned = 100 * 0.032 * 6.28 * np.array([0.5, -0.25])
         np.testing.assert_allclose(observation["wheel_positions"], turned, rtol=1e-6)
+
+    @pytest.mark.parametrize(
+        ("fields", "degrees"), [("", 250.5), ("kinematic TRUE", 274.6)]
+    )
+    def test_a_spin_of_one_second(self, fields, degrees):
+        """Full opposite speeds turn it as in Webots: on the rims of its wheels.
+
+        Without physics, Webots moves it by the distance of the joints.
+        """
+        env = EPuckEnv(read_world(text(f"E-puck {{ {fields} }}"), goal=(1.0, 1.0)))
+        env.reset(seed=0)
+        turned = 0.0
+        for _ in range(31):  # 0.992 s: whole steps of 32 ms
+            before = env.pose()[2]
+            env.step(LEFT_TURN)
+            turned += math.remainder(env.pose()[2] - before, 2 * math.pi)
+        assert math.degrees(turned) == pytest.approx(degrees, abs=1.0)
+
+    @pytest.mark.parametrize(("axle", "returns"), [(0.057, True), (0.052, False)])
+    def test_a_square_by_dead_reckoning(self, axle, returns):
+        """Who believes in the effective axle gets back, who believes in 52 mm does not.
+
+        Back is within 20 mm and 6° of the start, after four sides of 0.3 m.
+        """
+        env = open_env(start=(0.0, 0.0, 0.0))
+        drive_square(env, axle, side=0.3)
+        x, y, heading = env.pose()
+        back = math.hypot(x, y) < 0.02 and abs(math.degrees(heading)) < 6.0
+        assert back == returns
 
     def test_an_epuck_of_version_2_is_faster(self):
         world = read_world(text('E-puck { version "2" }'), goal=(1.0, 1.0))

@@ -11,6 +11,7 @@ from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.vector import EPuckVectorEnv
 from tdac_envs.ladder.plate_worlds import PlatesSpec, make_plates
 from tdac_envs.ladder.random_stream import world_key
+from tdac_envs.worlds.materials import Contact
 
 OPTIONS = {
     "goal_tolerance": 0.08,
@@ -26,10 +27,12 @@ OPTIONS = {
 
 
 def world(index):
-    """A generated world; their sizes and frictions differ."""
+    """A generated world; their sizes, frictions and axles differ."""
     key = world_key(b"source", "0" * 64, "test", index, "world")
     made = make_plates(PlatesSpec(), key).world
-    return replace(made, friction=0.5 + 0.1 * index)
+    robot = replace(made.robot, kinematic=index == 2)
+    contact = Contact(friction=0.5 + 0.1 * index)
+    return replace(made, robots=(robot,), contacts=(contact,))
 
 
 def alone(index):

@@ -28,7 +28,7 @@ def engine_with(box):
 
 def engine_step(space, robot, left, right):
     """One step with the chord velocity of the arc of two wheels."""
-    forward, turn = 0.5 * (left + right) * STEP, (right - left) * STEP / 0.052
+    forward, turn = 0.5 * (left + right) * STEP, (right - left) * STEP / 0.057
     half = 0.5 * turn
     chord = forward * (math.sin(half) / half if half else 1.0)
     middle = robot.angle + half

@@ -71,7 +71,7 @@ def go_to(env, point):
     """Turns in place, then drives straight to a point; the info at the end."""
     task = env.task
     info = {"is_success": False, "collisions": 0}
-    full_turn = 2 * task.full_step / 0.052
+    full_turn = 2 * task.full_step / task.axle_length
     while not info["is_success"]:
         x, y, heading = env.pose()
         way = math.dist((x, y), point)
@@ -95,6 +95,29 @@ def pushing_env(*nodes, mass=0.05, **options):
     box = f"""WoodenBox {{ translation 0.2 0 0.05 size 0.1 0.1 0.1 mass {mass} }}"""
     world = read_world(text("E-puck { }", box, *nodes), goal=(0.0, 1.0))
     return EPuckEnv(world, on_collision="block", **options)
+
+
+def contact(material, friction):
+    """The friction of a material with the default one."""
+    fields = f'material1 "{material}" coulombFriction {friction}'
+    return f"contactProperties ContactProperties {{ {fields} }}"
+
+
+def box_env(robot, mass, *nodes, more="", info=""):
+    """A box of 10 cm with a mass, just ahead of a robot, and further nodes."""
+    fields = f"translation 0.1 0 0.05 size 0.1 0.1 0.1 {more}"
+    box = f"SolidBox {{ {fields} physics Physics {{ density -1 mass {mass} }} }}"
+    world = read_world(text(robot, box, *nodes, info=info), goal=(0.0, 1.0))
+    return EPuckEnv(world, on_collision="block")
+
+
+def pushed(robot, mass, *nodes, **more):
+    """How far the box of `box_env` gets in 3 s at full speed, m."""
+    env = box_env(robot, mass, *nodes, **more)
+    env.reset(seed=0)
+    for _ in range(94):
+        env.step(FULL)
+    return box_pose(env)[0] - 0.1
 
 
 def box_pose(env):
@@ -138,6 +161,44 @@ class TestPushing:
             env.step(FULL)
         assert np.abs(box_pose(env) - (0.2, 0, 0)).max() < 1e-3
         assert env.pose()[0] == pytest.approx(0.15 - 0.037, abs=1e-3)
+
+    @pytest.mark.parametrize(
+        ("version", "mass", "moves"),
+        [
+            ("1", 0.155, True),
+            ("1", 0.165, False),
+            ("2", 0.135, True),
+            ("2", 0.145, False),
+        ],
+    )
+    def test_it_pushes_what_is_lighter_than_itself(self, version, mass, moves):
+        """With Webots' default friction of 1 for tyres and objects alike."""
+        assert (pushed(f'E-puck {{ version "{version}" }}', mass) > 0.05) == moves
+
+    @pytest.mark.parametrize(("friction", "moves"), [(0.25, True), (0.4, False)])
+    def test_the_ground_friction_is_that_of_the_materials(self, friction, moves):
+        """0.5 kg on ice slide if the friction is below 0.16 / 0.5."""
+        info = contact("ice", friction)
+        found = pushed("E-puck { }", 0.5, info=info, more='contactMaterial "ice"')
+        assert (found > 0.05) == moves
+
+    def test_a_slippery_floor_stalls_the_tyres(self):
+        """On ice the robot pushes less than on the floor, if the box does not slip."""
+        ice = 'RectangleArena { floorSize 4 4 contactMaterial "ice" }'
+        info = contact("ice", 0.25)
+        rubber = 'contactMaterial "rubber"'
+        assert pushed("E-puck { }", 0.1, ice, info=info) > 0.05
+        assert pushed("E-puck { }", 0.1, ice, info=info, more=rubber) < 0.01
+
+    @pytest.mark.parametrize(("friction", "slides"), [(0.0, True), (1.0, False)])
+    def test_the_friction_of_the_body_is_that_of_the_materials(self, friction, slides):
+        """A robot that drives askew at a heavy box slides along it if it is slick."""
+        robot, info = "E-puck { rotation 0 0 1 0.3 }", contact("slick", friction)
+        env = box_env(robot, 9.0, info=info, more='contactMaterial "slick"')
+        env.reset(seed=0)
+        for _ in range(40):
+            env.step(FULL)
+        assert (env.pose()[1] > 0.02) == slides
 
     @pytest.mark.slow
     def test_a_box_against_a_wall_stays(self):

@@ -22,6 +22,7 @@ from tdac_envs.ladder.random_stream import RandomStream, world_key
 from tdac_envs.ladder.worlds import LadderWorld, WorldSpec, make_world
 from tdac_envs.map2d.task import make_task
 from tdac_envs.mapping.params import RobotParams
+from tdac_envs.mapping.ray_angles import fan
 
 NAMES = sorted(GENERATORS)
 GOLDEN = {
@@ -245,7 +246,7 @@ def test_a_world_is_pickled():
     assert digest(pickle.loads(pickle.dumps(world))) == digest(world)
 
 
-SENSOR = RangeSensor(18, math.radians(110), 60.0)
+SENSOR = RangeSensor(fan(110.0, 18), 60.0)
 
 
 def test_a_blind_alley_is_a_dead_end():
@@ -266,5 +267,5 @@ def test_a_blind_alley_is_a_dead_end():
     lured = dead_ends(world, spec.radius, SENSOR)
     assert 0.1 < lured.depth < 0.5
     assert lured.excess > lured.depth
-    all_seeing = dead_ends(world, spec.radius, RangeSensor(720, 2 * math.pi, 400.0))
+    all_seeing = dead_ends(world, spec.radius, RangeSensor(fan(360.0, 720), 400.0))
     assert all_seeing.depth < lured.depth

@@ -129,6 +129,7 @@ def test_what_it_cannot_show_is_refused():
         GoalView(gym.make("TDAC-Map2D-v0"), contact_cost=-1.0)
 
 
+@pytest.mark.slow
 def test_hindsight_replay_trains_on_it():
     """With Stable-Baselines3's buffer: relabelled steps reach their goals."""
     sb3 = pytest.importorskip("stable_baselines3")

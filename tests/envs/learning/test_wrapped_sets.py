@@ -199,14 +199,14 @@ def test_a_set_may_observe_less(few):
 
 def test_wheel_angles_add_up_to_a_pose():
     """The same pose as the odometry of the same steps."""
-    reckoned, wheels = DeadReckoning(), WheelReckoning()
+    reckoned, wheels = DeadReckoning(), WheelReckoning(0.057)
     angles = np.zeros(2)
     random = np.random.default_rng(4)
     for step in range(50):
         turned = random.uniform(-0.6, 0.6, 2) if step else np.zeros(2)
         angles = angles + turned
         left, right = 0.02 * turned
-        odometry = [(left + right) / 2, (right - left) / 0.052]
+        odometry = [(left + right) / 2, (right - left) / 0.057]
         ahead = wheels.ahead(angles)
         pose = wheels.follow(angles, step)
         np.testing.assert_allclose(pose, reckoned.follow(odometry, step), atol=1e-12)

@@ -17,8 +17,9 @@ from tdac_envs.map2d import kernels
 from tdac_envs.map2d.contact import first_contact
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.kernels import advance, path_distance
-from tdac_envs.map2d.rays import cast_ray, cast_rays, fan, leaps_of, sees
+from tdac_envs.map2d.rays import cast_ray, cast_rays, directions_of, leaps_of, sees
 from tdac_envs.map2d.terrain import Terrain
+from tdac_envs.mapping.ray_angles import fan
 
 ANGLES = [k * math.pi / 4 for k in range(-3, 5)]
 exact = settings(derandomize=True, deadline=None, max_examples=150)
@@ -131,7 +132,7 @@ class TestRays:
         """Looking right along +x, a wall above on the picture is at the left."""
         leaps = leaps_of(open_map(100, 100, np.s_[:30, :]))
         out = np.zeros(5, np.float32)
-        cast_rays(leaps, fan(math.pi, out.size), 50.0, 50.0, 0.0, 40.0, out)
+        cast_rays(leaps, directions_of(fan(180.0, 5)), 50.0, 50.0, 0.0, 40.0, out)
         assert out[0] == 20.5 - 0.0
         assert out[-1] == 40.0
 
@@ -139,16 +140,15 @@ class TestRays:
         cells, _ = some_map(8)
         leaps = leaps_of(open_map(30, 30) | np.pad(cells, 8)[:30, :30])
         out = np.zeros(7, np.float32)
-        cast_rays(leaps, fan(1.9, out.size), 4.0, 4.0, 0.4, 25.0, out)
+        cast_rays(leaps, directions_of(fan(95.0, 7)), 4.0, 4.0, 0.4, 25.0, out)
         for i, measured in enumerate(out):
-            angle = 0.4 - 0.95 + i * 1.9 / 6
+            angle = 0.4 + math.radians(-47.5 + i * 95.0 / 6)
             assert measured == np.float32(cast_ray(leaps, 4.0, 4.0, angle, 25.0))
 
     def test_a_single_ray_points_ahead(self):
         out = np.zeros(1, np.float32)
-        cast_rays(
-            leaps_of(open_map(30, 30)), fan(2.0, out.size), 10.0, 10.0, 0.0, 99.0, out
-        )
+        ahead = directions_of(fan(110.0, 1))
+        cast_rays(leaps_of(open_map(30, 30)), ahead, 10.0, 10.0, 0.0, 99.0, out)
         assert out[0] == 19.5
 
     @pytest.mark.slow

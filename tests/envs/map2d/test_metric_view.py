@@ -96,7 +96,7 @@ def test_left_is_left(plan):
     file, units = plan
     env = Map2DEnv(file, **in_metres(units))
     before = env.reset(seed=0)[0]
-    after = env.step(np.float32([-0.2, 0.2]))[0]
+    after = env.step(np.float32([-1.0, 1.0]))[0]
     turn = math.remainder(float(after["pose"][2] - before["pose"][2]), math.tau)
     assert turn > 0.01
     pixels = Map2DEnv(file, **TASK).reset(seed=0)[0]

@@ -14,6 +14,11 @@ from tdac_envs import load_world
 from tdac_envs.core.errors import WorldError
 from tdac_envs.worlds.bodies import at_body_height, bodies, floor_under
 from tdac_envs.worlds.footprint import Disc, Rectangle
+from tdac_envs.worlds.materials import (
+    INFINITE_FRICTION,
+    Contact,
+    friction_between,
+)
 from tdac_envs.worlds.wbt.frames import Y_UP_TO_Z_UP
 from tdac_envs.worlds.wbt.reader import read_world
 from tdac_envs.worlds.world import World, check_modelled
@@ -324,7 +329,7 @@ def test_the_robots_arena_is_the_one_around_it():
 
 @pytest.mark.parametrize("version", ["1", "2"])
 def test_an_epuck(version):
-    """Pose, version, wheel limit and controller."""
+    """Pose, version, wheel limit, mass with wheels, axle and controller."""
     world = read_world(
         text(
             'E-puck { translation 0.1 -0.2 0.003 rotation 0 0 -1 1 name "rob" '
@@ -335,6 +340,15 @@ def test_an_epuck(version):
     assert robot.pose == pytest.approx((0.1, -0.2, -1.0))
     assert (robot.name, robot.version, robot.controller) == ("rob", version, "c")
     assert robot.max_wheel_speed == {"1": 6.28, "2": 7.536}[version]
+    assert robot.mass == pytest.approx({"1": 0.15, "2": 0.13}[version] + 2 * 0.005)
+    assert robot.axle_length == pytest.approx(0.052 + 0.005)
+
+
+def test_a_kinematic_epuck_has_the_axle_of_its_joints():
+    """Webots then moves it without physics; a Robot node has no such field."""
+    assert read_world(text("E-puck { kinematic TRUE }")).robot.axle_length == 0.052
+    node = 'Robot { model "GCtronic e-puck" kinematic TRUE }'
+    assert read_world(text(node)).robot.axle_length == 0.057
 
 
 @pytest.mark.parametrize(
@@ -429,6 +443,44 @@ def test_the_goal_can_be_given():
     assert not any(thing.is_goal for thing in world.obstacles)
     assert read_world(text(), goal=(1, 2)).goal == (1, 2)
     assert read_world(text()).goal is None
+
+
+def test_frictions_are_those_of_pairs_of_materials():
+    """The first of a pair, in either order; 1 if the file does not list it."""
+    world = read_world(
+        text(
+            'Floor { contactMaterial "ice" }',
+            'Solid { contactMaterial "wax" boundingObject Box { } }',
+            "WoodenBox { }",
+            info="""contactProperties [
+              ContactProperties { material1 "wax" material2 "ice" coulombFriction 0.1 }
+              ContactProperties { material1 "ice" material2 "wax" coulombFriction 0.2 }
+              ContactProperties { material2 "ice" coulombFriction [ 0.3, 0.5 ] }
+              ContactProperties { material1 "wax" coulombFriction -1 }
+              ContactProperties { material1 "wax" material2 "wax" }
+            ]""",
+        )
+    )
+    assert [thing.material for thing in world.obstacles] == ["wax", "default"]
+    assert world.arenas[0].material == "ice"
+    pairs = {
+        ("ice", "wax"): 0.1,
+        ("default", "ice"): 0.3,
+        ("default", "wax"): INFINITE_FRICTION,
+        ("wax", "wax"): 1.0,
+        ("default", "default"): 1.0,
+        ("ice", "ice"): 1.0,
+    }
+    for (one, other), friction in pairs.items():
+        assert friction_between(world.contacts, one, other) == friction
+        assert friction_between(world.contacts, other, one) == friction
+
+
+@pytest.mark.parametrize("friction", [-0.1, 1001.0, math.nan])
+def test_a_contact_has_a_possible_friction(friction):
+    """From 0 to the coefficient for infinite friction."""
+    with pytest.raises(WorldError, match="expected a friction from 0 to 1000, got"):
+        Contact(friction=friction)
 
 
 def test_the_time_step():

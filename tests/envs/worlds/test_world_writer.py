@@ -12,6 +12,7 @@ from world_texts import ARENA, EPUCK, EVERYTHING, OLD, mutated, text
 from tdac_envs import load_world, read_world, write_world
 from tdac_envs.core.errors import WorldError
 from tdac_envs.worlds.footprint import Disc, Polygon, Rectangle
+from tdac_envs.worlds.materials import Contact
 from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part, Unmodelled, World
 
 metres = st.floats(-50, 50, allow_nan=False)
@@ -47,6 +48,7 @@ parts = st.builds(
     metres,
     sizes,
 )
+materials = st.just("default") | names
 pieces = st.lists(parts, max_size=2).map(tuple)
 obstacles = st.builds(
     Obstacle,
@@ -58,6 +60,7 @@ obstacles = st.builds(
     visible=pieces,
     mass=st.none() | st.floats(0.001, 1e4),
     reflectance=st.floats(0.2, 1),
+    material=materials,
 ).filter(lambda thing: "goal" not in thing.name.lower())
 arenas = st.one_of(
     st.builds(
@@ -67,6 +70,7 @@ arenas = st.one_of(
         sizes,
         metres,
         st.integers(8, 200),
+        material=materials,
     ),
     st.builds(
         Arena, st.builds(Rectangle, metres, metres, angles, sizes, sizes), sizes, sizes
@@ -74,7 +78,11 @@ arenas = st.one_of(
     st.builds(Arena, st.builds(Rectangle, metres, metres, angles, sizes, sizes)),
 )
 robots = st.builds(
-    EPuck, names, metres, metres, angles, metres, st.sampled_from(["1", "2"]), names
+    EPuck, names, metres, metres, angles, metres, st.sampled_from(["1", "2"]), names,
+    st.booleans(),
+)  # fmt: skip
+frictions = st.builds(
+    Contact, materials, materials, st.floats(0, 1000, allow_nan=False)
 )
 
 
@@ -92,6 +100,7 @@ def worlds(draw):
         arenas=tuple(draw(st.lists(arenas, max_size=2))),
         obstacles=tuple(things),
         time_step=draw(st.floats(1, 100)),
+        contacts=tuple(draw(st.lists(frictions, max_size=2))),
     )
 
 

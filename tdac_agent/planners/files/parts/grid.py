@@ -90,7 +90,7 @@ class Grid:
         if len(self.points):
             dx, dy = self.points[:, 0] - x, self.points[:, 1] - y
             off = np.remainder(np.arctan2(dy, dx) - heading + math.pi, math.tau)
-            ray = np.floor((off - math.pi + VIEW / 2.0) / VIEW * (RAYS - 1)).astype(int)
+            ray = np.floor((off - math.pi - FAN[0]) / VIEW * (RAYS - 1)).astype(int)
             inside = (ray >= 0) & (ray < RAYS - 1)
             ray = np.clip(ray, 0, RAYS - 2)
             free = np.minimum(ranges[ray], ranges[ray + 1])

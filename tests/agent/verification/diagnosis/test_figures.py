@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from planted import PLANTS, fail
+from script import AHEAD
 
 from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.prompting.feedback import render_feedback
@@ -19,8 +20,6 @@ from tdac_envs.drawing.backdrop import CLOSE_UP
 from tdac_envs.drawing.canvas import TRAIL
 from tdac_envs.drawing.closeup import COLUMN, EVENT, MARGIN, run_picture
 from tdac_envs.map2d.run_picture import Background
-
-WALL = "def policy(obs):\n    return 1.0, 1.0\n"
 
 
 def episode_of(rollout, **changes):
@@ -114,7 +113,7 @@ def test_any_failure_can_be_drawn(number):
 
 def test_a_failed_verification_leaves_pictures(small_task, warm, good_source, tmp_path):
     """One for each failed episode; a later, passing one removes them."""
-    report = verify(WALL, small_task, profile="policy", judge=warm, out=tmp_path)
+    report = verify(AHEAD, small_task, profile="policy", judge=warm, out=tmp_path)
     kept = sorted(path.name for path in (tmp_path / "trajectories").iterdir())
     assert kept == ["nominal.npz", "nominal.png"]
     picture = cv2.imread(str(tmp_path / "trajectories" / "nominal.png"))
@@ -167,25 +166,23 @@ def recorded(task):
     )
 
 
-def test_verify_out(tdac, tmp_path):
+def test_verify_out(rejected, tmp_path):
     """The command says where the report and each picture are."""
-    (tmp_path / "controller.py").write_text(WALL)
+    (tmp_path / "controller.py").write_text(AHEAD)
     folder = tmp_path / "seen"
-    code, out, _ = tdac(
+    out = rejected(
         "verify", tmp_path / "controller.py", "--task", "rooms", "--profile",
         "policy", "--out", folder,
     )  # fmt: skip
-    assert code == 1
     assert f"picture: {folder}/trajectories/nominal.png" in out
     assert f"report: {folder}/report.json" in out
     assert (folder / "trajectories" / "nominal.png").is_file()
 
 
-def test_verify_out_that_cannot_be_written(tdac, tmp_path):
+def test_verify_out_that_cannot_be_written(refused, tmp_path):
     """One clear line, before anything is run."""
-    (tmp_path / "controller.py").write_text(WALL)
-    code, _, err = tdac(
+    (tmp_path / "controller.py").write_text(AHEAD)
+    err = refused(
         "verify", tmp_path / "controller.py", "--out", tmp_path / "controller.py"
     )
-    assert code == 2
     assert err.splitlines()[-1].startswith("error: cannot write to ")

@@ -6,6 +6,7 @@ import itertools
 import numpy as np
 import pytest
 from PIL import Image
+from script import AHEAD
 from skimage.color import rgb2lab
 
 from tdac_agent import load_task
@@ -14,7 +15,6 @@ from tdac_agent.verification.verify import load_trajectories, verify
 from tdac_envs.drawing.canvas import FREE, GREEN, MOVER, TRAIL, WALL
 from tdac_envs.drawing.closeup import EVENT
 
-BUMP = "def policy(obs):\n    return 1.0, 1.0\n"
 # Machado, Oliveira and Fernandes 2009, severity 1, for linear RGB.
 VISION = {
     "normal": np.eye(3),
@@ -41,7 +41,7 @@ def failed(small_task, tmp_path_factory, warm):
     """A task, the report on a failure, and the trajectories."""
     out = tmp_path_factory.mktemp("failed")
     task = small_task.with_profile("policy")
-    report = verify(BUMP, task, out=out, judge=warm)
+    report = verify(AHEAD, task, out=out, judge=warm)
     return task, report, load_trajectories(out / "trajectories")
 
 
@@ -91,7 +91,7 @@ def test_an_episode_that_did_not_drive_is_not_drawn(failed):
 def test_a_picture_fits_and_is_the_same_each_time(name, tmp_path, warm):
     """Its shorter side has three quarters of the longer one at least."""
     task = load_task(name).with_profile("policy")
-    report = verify(BUMP, task, out=tmp_path, judge=warm)
+    report = verify(AHEAD, task, out=tmp_path, judge=warm)
     known = load_trajectories(tmp_path / "trajectories")
     one, other = (failure_picture(task, report, known, 1024) for _ in range(2))
     assert one.png == other.png

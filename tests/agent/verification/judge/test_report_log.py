@@ -6,6 +6,7 @@ import pytest
 from damage import altered_json, shuffled, torn
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from script import STILL
 
 from tdac_agent.environments.map2d.entry import MAP2D
 from tdac_agent.errors import Fault
@@ -27,7 +28,6 @@ FEW = settings(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
 )
 MANY = settings(FEW, max_examples=10_000)
-NOTHING = "def policy(obs):\n    return 0.0, 0.0\n"
 # Every kind of record that pytest writes of a test.
 ODD_SUITE = '''
 import warnings
@@ -106,7 +106,7 @@ def results(small_task, good_source, warm, tmp_path_factory):
     odd = good_source + 'NAME = "\\ud800\\x1b[31m"\n'
     return {
         "good": judged(warm, small_task, base / "good", good_source),
-        "bad": judged(warm, small_task, base / "bad", NOTHING),
+        "bad": judged(warm, small_task, base / "bad", STILL),
         "odd": judged(warm, small_task, base / "odd", odd, suite),
     }
 
@@ -199,22 +199,6 @@ def check_log(results, folder, data):
         assert proven(raw, findings.expected)
 
 
-@pytest.mark.slow
-@FEW
-@given(st.data())
-def test_a_damaged_log(results, tmp_path_factory, data):
-    """It is a fault or a verdict; a pass needs a proof that is still in the log."""
-    check_log(results, tmp_path_factory.getbasetemp(), data)
-
-
-@pytest.mark.slow
-@MANY
-@given(st.data())
-def test_many_damaged_logs(results, tmp_path_factory, data):
-    """The same, often."""
-    check_log(results, tmp_path_factory.getbasetemp(), data)
-
-
 def test_a_log_that_was_cut(results, tmp_path):
     """Wherever a passing log ends too soon, it has not passed."""
     raw, path = log_of(results, "good"), tmp_path / "report.jsonl"
@@ -246,19 +230,12 @@ def check_findings(results, folder, data):
 
 
 @pytest.mark.slow
-@FEW
-@given(st.data())
-def test_damaged_findings(results, tmp_path_factory, data):
-    """They are a fault, or a verdict about all of the tests."""
-    check_findings(results, tmp_path_factory.getbasetemp(), data)
-
-
-@pytest.mark.slow
+@pytest.mark.parametrize("check", [check_log, check_findings])
 @MANY
 @given(st.data())
-def test_many_damaged_findings(results, tmp_path_factory, data):
-    """The same, often."""
-    check_findings(results, tmp_path_factory.getbasetemp(), data)
+def test_damaged_results(results, tmp_path_factory, check, data):
+    """They are a fault or a verdict; a pass needs a proof that is still in them."""
+    check(results, tmp_path_factory.getbasetemp(), data)
 
 
 @pytest.mark.parametrize("content", [None, b"", b"\xff", b"[]", b"[" * 10**5, "folder"])

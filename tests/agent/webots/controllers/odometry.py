@@ -5,7 +5,7 @@ import math
 
 from controller import Robot
 
-WHEEL, AXLE = 0.02, 0.052
+WHEEL, AXLE = 0.02, 0.057
 robot = Robot()
 dt = int(robot.getBasicTimeStep())
 sensors = [robot.getDevice(f"{side} wheel sensor") for side in ("left", "right")]

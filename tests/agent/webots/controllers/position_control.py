@@ -4,7 +4,7 @@ import math
 
 from controller import Robot
 
-WHEEL, AXLE = 0.02, 0.052
+WHEEL, AXLE = 0.02, 0.057
 robot = Robot()
 timestep = int(robot.getBasicTimeStep())
 motors = [robot.getDevice("left wheel motor"), robot.getDevice("right wheel motor")]

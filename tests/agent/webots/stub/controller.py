@@ -4,7 +4,7 @@ import json
 import math
 import sys
 
-WHEEL, AXLE, STEP = 0.02, 0.052, 32
+WHEEL, AXLE, STEP = 0.02, 0.057, 32
 
 
 class _Motor:

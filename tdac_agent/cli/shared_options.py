@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from tdac_agent.cli.typed_options import typed_fields
-from tdac_agent.options import option
+from tdac_agent.option_fields import option
+from tdac_agent.synthesis.options import SUITE
 
 if TYPE_CHECKING:
     from tdac_agent.tasks.disturbance import Disturbance
+    from tdac_agent.tasks.task import Task
 
 VARIATION = (
     "Start poses: the task's own (nominal), within a body radius of it (jitter), "
@@ -32,6 +34,17 @@ WHEEL_GAINS = (
 )
 AXLE_ERROR = "Largest hidden relative error of the axle length, constant in an episode."
 RANGE_DROPOUT = "Probability that a ray reads its maximum range; only on maps."
+WHEEL_RADII = "Largest hidden relative error of each wheel's radius."
+POSE_NOISE = (
+    "Standard deviation of the observed x and y, px or m as the task; this and the "
+    "following only on maps."
+)
+HEADING_NOISE = "Standard deviation of the observed heading, rad."
+POSE_CORRELATION = "Time constant of the errors of the pose, s."
+POSE_JUMPS = "Jumps of the observed pose in a minute, to errors three times as large."
+POSE_DELAY = "Number of steps by which the pose is late."
+SCAN_DELAY = "Number of steps by which the ranges are late."
+MESSAGE_DROP = "Probability that the pose and ranges of a step are lost."
 DISTURBED = "Disturbance of verify --robust and play --seed"
 BUDGET, MODELS = "Budget", "Models"
 Profile = Literal["policy", "paper"]
@@ -45,9 +58,7 @@ tier_option = partial(
     option, "auto", "Sandbox tier; `tdac doctor` lists them.", metavar="NAME"
 )
 out_option = partial(option, None, metavar="DIR")
-suite_option = partial(
-    option, None, "Folder with additional test_*.py files to run.", metavar="DIR"
-)
+suite_option = partial(option, None, SUITE, metavar="DIR")
 trust_option = partial(
     option,
     False,
@@ -107,15 +118,48 @@ class NoiseFlags:
     range_dropout: float | None = option(
         None, f"{RANGE_DROPOUT}  [default: 0]", panel=DISTURBED
     )
+    wheel_radius_error: float | None = option(
+        None, f"{WHEEL_RADII}  [default: the task's, else 0]", panel=DISTURBED
+    )
+    pose_noise: float | None = option(
+        None, f"{POSE_NOISE}  [default: the task's, else 0]", panel=DISTURBED
+    )
+    heading_noise: float | None = option(
+        None, f"{HEADING_NOISE}  [default: the task's, else 0]", panel=DISTURBED
+    )
+    pose_correlation: float | None = option(
+        None, f"{POSE_CORRELATION}  [default: the task's, else 0]", panel=DISTURBED
+    )
+    pose_jumps: float | None = option(
+        None, f"{POSE_JUMPS}  [default: the task's, else 0]", panel=DISTURBED
+    )
+    pose_delay: int | None = option(
+        None, f"{POSE_DELAY}  [default: the task's, else 0]", panel=DISTURBED
+    )
+    scan_delay: int | None = option(
+        None, f"{SCAN_DELAY}  [default: the task's, else 0]", panel=DISTURBED
+    )
+    message_drop: float | None = option(
+        None, f"{MESSAGE_DROP}  [default: the task's, else 0]", panel=DISTURBED
+    )
 
-    def disturbance(self) -> Disturbance:
-        """The disturbance: the typed values, defaults for the others.
+    @classmethod
+    def of(cls, disturbance: Disturbance) -> NoiseFlags:
+        """The flags to type for a disturbance: what differs from the defaults."""
+        usual, wanted = asdict(type(disturbance)()), asdict(disturbance)
+        return cls(**{name: v for name, v in wanted.items() if v != usual[name]})
+
+    @property
+    def sizes(self) -> dict[str, Any]:
+        """The typed values, by name."""
+        return {each.name: getattr(self, each.name) for each in typed_fields(self)}
+
+    def disturbance(self, task: Task) -> Disturbance:
+        """The disturbance: the typed values, those of the task for the others.
 
         Raises:
-            TaskError: A value is out of range.
+            TaskError: A value is out of range, or the task's environment lacks it.
         """
-        from tdac_agent.tasks.disturbance import Disturbance
-
-        return Disturbance(
-            **{each.name: getattr(self, each.name) for each in typed_fields(self)}
-        )
+        own = task.own_disturbance(**self.sizes)
+        task.disturbed_options(own)
+        return own

@@ -30,6 +30,11 @@ class Flag:
         argument: Whether it is a word of its own, without a flag.
         needs: Another flag, without which it has no effect, as in `--robust N`.
         scope: `task` or `set` if only a single task or only a task set has it.
+        identity: Whether a run with another value is another run; a resumed run then
+            has the recorded value, and no other.
+        recorded: Whether the record of a run keeps the value as it is, which must then
+            be one of JSON. A resumed run takes it from the record, whoever made that;
+            so an option that a user has to permit must not be recorded here.
     """
 
     help: str
@@ -42,6 +47,8 @@ class Flag:
     argument: bool = False
     needs: str = ""
     scope: str = ""
+    identity: bool = False
+    recorded: bool = True
 
 
 def option(default: Any, help: str, *names: str, **look: Any) -> Any:  # noqa: A002

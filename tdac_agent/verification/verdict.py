@@ -1,0 +1,97 @@
+"""The words of verdicts, and what a confirmation showed."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from tdac_agent.runs.run_record import Run
+from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.diagnosis.gap import gap_figure, too_close_text
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.confirming import ConfirmingTest
+
+Word = Literal["verified", "passed", "not verified"]
+COLOURS = {
+    "verified": "green",
+    "passed": "cyan",
+    "selected": "blue",
+    "not verified": "red",
+}
+"""Colour of each word; green is for `verified` alone."""
+
+
+def word_of(report: EpisodeReport) -> Word:
+    """The verdict of a confirmation.
+
+    What arrives, but in too many drives with less than the required gap, has passed.
+    """
+    if not report.passed:
+        return "not verified"
+    return (
+        "verified" if report.too_close <= _test_of(report).most_failures else "passed"
+    )
+
+
+def _test_of(report: EpisodeReport) -> ConfirmingTest:
+    assert report.sequential is not None
+    test = report.sequential.test
+    assert isinstance(test, ConfirmingTest)
+    return test
+
+
+def confirmed_text(report: EpisodeReport) -> str:
+    """What a confirmation showed, such as `arrives ≥ 95 % (0 of 93 failed)`."""
+    test, failed = _test_of(report), report.count - report.successes
+    if word_of(report) == "passed":
+        assert report.smallest_gap is not None
+        near = too_close_text(report.smallest_gap, UNITS[report.provenance.unit])
+        return f"{report.too_close} of {report.count} blind drives came {near}"
+    if report.passed:
+        return f"arrives ≥ {100 * test.least:g} % ({failed} of {report.count} failed)"
+    return (
+        f"{failed} of {report.count} blind drives failed; at most "
+        f"{test.most_failures} of {test.limit} may"
+    )
+
+
+def verified_text(report: EpisodeReport) -> str:
+    """The verdict of a confirmation in one line, with what it does not cover."""
+    text, gap = confirmed_text(report), report.smallest_gap
+    if word_of(report) != "verified":
+        return text
+    if gap is not None:
+        text += f", smallest gap {gap_figure(gap.gap, UNITS[report.provenance.unit])}"
+    text += f", sandbox {report.provenance.sandbox}"
+    return f"{text}; not covered: {not_covered(report)}"
+
+
+def not_covered(report: EpisodeReport) -> str:
+    """What the drives of a confirmation cannot show."""
+    drove_with, missing = report.provenance.disturbance, ["other worlds"]
+    if drove_with is not None:
+        wheels = drove_with.wheel_gains or drove_with.wheel_radius_error
+        delay = drove_with.delay or drove_with.pose_delay or drove_with.scan_delay
+        parts = {
+            "delays": delay,
+            "unequal wheels": wheels,
+            "a wrong pose": drove_with.pose_noise,
+        }
+        missing += [name for name, size in parts.items() if not size]
+    return ", ".join([*missing, "other physics"])
+
+
+def delivered_text(run: Run) -> str:
+    """Where a run found its controller, and how much it tried for it."""
+    confirmed = run.confirmations[-1] if run.verified else None
+    at = run.tau if confirmed is None else confirmed.k
+    return f"in iteration {at} ({tried_text(run)})"
+
+
+def tried_text(run: Run) -> str:
+    """How many candidates and confirmations a run needed."""
+    tried = sum(each.valid and not each.unchanged for each in run.attempts)
+    confirmed = len(run.confirmations)
+    text = f"{tried} candidate{'' if tried == 1 else 's'}"
+    if confirmed:
+        text += f", {confirmed} confirmation{'' if confirmed == 1 else 's'}"
+    return text

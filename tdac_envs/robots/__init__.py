@@ -1,0 +1,1 @@
+"""Robots by name: a file for each, with the source of every figure."""

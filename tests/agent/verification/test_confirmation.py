@@ -1,0 +1,202 @@
+"""Blind confirmations: what they accept, and that nobody can know their starts."""
+
+import xml.etree.ElementTree as ET
+
+import pytest
+from script import Script, code
+
+import tdac_agent
+from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.verification.confirmation import (
+    DISTURBANCE,
+    confirm,
+    confirming_seeds,
+    kept_confirmation,
+    read_confirmation,
+)
+from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.verdict import (
+    confirmed_text,
+    delivered_text,
+    verified_text,
+)
+
+SOMETIMES = """
+
+_drive = policy
+
+
+def policy(obs):
+    x, y, heading = (float(value) for value in obs["pose"])
+    if not policy.seen:
+        policy.seen = True
+        if int(1e6 * (x + y + heading)) % 100 < {percent}:
+            raise ValueError("on purpose")
+    return _drive(obs)
+
+
+policy.seen = False
+"""
+"""What makes a controller fail in a share of all drives, which its start decides."""
+
+
+UNLESS_IT_SLIPS = """
+
+import math
+
+_steer, _last, _first = policy, [], []
+
+
+def policy(obs):
+    pose, speeds = [float(v) for v in obs["pose"]], obs["wheel_speeds"]
+    mean = float(speeds[0] + speeds[1]) / 2
+    if _last and mean > 0.3:
+        moved = math.hypot(pose[0] - _last[0], pose[1] - _last[1]) / mean
+        _first.append(moved)
+        if abs(moved - _first[0]) > 0.005 * moved:
+            raise ValueError("it slipped")
+    _last[:] = pose
+    return _steer(obs)
+"""
+"""What makes a controller fail if its wheels slip, which no test of the suite does."""
+
+
+def failing(source, percent):
+    """A controller that fails on purpose in so many percent of all drives."""
+    return source + SOMETIMES.format(percent=percent)
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "run"
+
+
+def test_a_good_controller_is_confirmed(small_task, good_source, warm, tmp_path):
+    """All drives reach the goal; the report names plan, disturbance and sandbox."""
+    seen = []
+    report = confirm(
+        good_source,
+        small_task,
+        out=tmp_path,
+        judge=warm,
+        watch=lambda *n: seen.append(n),
+    )
+    assert report.passed
+    assert report.count == 93
+    assert report.provenance.disturbance == DISTURBANCE
+    assert report.scores is None  # it was selected by the test
+    assert confirmed_text(report).startswith("arrives ≥ 95 % (")
+    assert "not covered: other worlds, delays" in verified_text(report)
+    assert seen[-1] == (93, report.successes)
+    kept = EpisodeReport.model_validate_json((tmp_path / "episodes.json").read_text())
+    assert kept == report
+
+
+def test_it_ends_with_the_second_failure(small_task, good_source, warm):
+    """A controller that fails in 40 % of all drives needs few of them."""
+    report = confirm(failing(good_source, 40), small_task, judge=warm)
+    assert not report.passed
+    assert report.count - report.successes == 2
+    assert report.count < 40
+    assert "2 of " in confirmed_text(report)
+    assert "on purpose" in report.failures[0].error
+
+
+def test_starts_follow_from_the_controller_and_a_secret(small_task, monkeypatch):
+    """The same file has the same starts; another number, file or secret has others."""
+    seeds = confirming_seeds(b"a", small_task, 1)
+    assert seeds == confirming_seeds(b"a", small_task, 1)
+    others = [
+        confirming_seeds(b"b", small_task, 1),
+        confirming_seeds(b"a", small_task, 2),
+    ]
+    secret = "tdac_agent.tasks.installation.lasting_secret"
+    monkeypatch.setattr(secret, lambda: b"another")
+    others.append(confirming_seeds(b"a", small_task, 1))
+    for other in others:
+        assert set(seeds).isdisjoint(other)
+    assert min(seeds) > 2**35  # those of a search are smaller
+
+
+def test_a_kept_confirmation_is_that_of_one_controller_and_number(
+    small_task, good_source, warm, tmp_path
+):
+    """Nothing else is answered from it."""
+    source = failing(good_source, 40).encode()
+    report = confirm(source, small_task, 1, out=tmp_path, judge=warm)
+    assert kept_confirmation(tmp_path, source, small_task, 1) == report
+    assert kept_confirmation(tmp_path, source, small_task, 2) is None
+    assert kept_confirmation(tmp_path, b"other", small_task, 1) is None
+    assert kept_confirmation(tmp_path / "none", source, small_task, 1) is None
+
+
+def test_verify_tells_passed_from_verified(tdac, good, good_source, tmp_path):
+    """`--no-confirm` and `--paper` end at passed; a failed confirmation exits 1."""
+    file, junit = good / "controller.py", tmp_path / "junit.xml"
+    file.write_text(good_source + UNLESS_IT_SLIPS)
+    words = ("verify", file, "--task", good)
+    for flag in ("--no-confirm", "--paper"):
+        code, out, _ = tdac(*words, flag)
+        assert code == 0
+        assert "passed: " in out
+        assert "verified" not in out
+    code, out, _ = tdac(*words, "--junit", junit)
+    assert code == 1
+    assert "not verified: 2 of 2 blind drives failed; at most 1 of 93 may" in out
+    assert "replay the first of them: tdac play" in out
+    cases = {case.get("name"): case for case in ET.parse(junit).iter("testcase")}
+    assert cases["blind drives"].find("failure") is not None
+
+
+def test_a_run_goes_on_after_a_failed_confirmation(small_task, good_source, warm, out):
+    """Its failures are told to the model; the next confirmation has more drives."""
+    model = Script(code(good_source + UNLESS_IT_SLIPS), code(good_source))
+    run = tdac_agent.synthesize(small_task, model, out=out, iterations=1, judge=warm)
+    assert (run.status, run.verified, run.passed) == ("verified", True, True)
+    assert [each.passed for each in run.confirmations] == [False, True]
+    assert run.confirmations[1].episodes == 125
+    assert [each.confirmed for each in run.attempts] == [False, True]
+    assert all(each.passed for each in run.attempts)
+    told = model.requests[1]
+    assert "All tests passed. Then it drove blind" in told.prompt
+    assert "it slipped" in told.prompt
+    assert read_confirmation(out).passed
+    assert delivered_text(run) == "in iteration 1 (2 candidates, 2 confirmations)"
+
+
+def test_a_run_that_is_never_confirmed(small_task, good_source, warm, out):
+    """It delivers what passed, and says what the blind drives showed."""
+    model = Script(code(good_source + UNLESS_IT_SLIPS))
+    once = {"iterations": 1, "patience": 0, "refine": False}
+    run = tdac_agent.synthesize(small_task, model, out=out, judge=warm, **once)
+    assert (run.status, run.verified, run.passed) == ("not verified", False, True)
+    assert run.reason == "2 of 2 blind drives failed; at most 1 of 110 may"
+    assert run.controller.is_file()
+
+
+def test_what_passed_is_confirmed_later(small_task, good_source, warm, out):
+    """By the same command without `--no-confirm`; nothing is asked or tested again."""
+    given = {"out": out, "iterations": 1, "judge": warm}
+    model = Script(code(good_source))
+    run = tdac_agent.synthesize(small_task, model, confirm=False, **given)
+    assert (run.status, run.confirmations) == ("passed", [])
+    run = tdac_agent.synthesize(small_task, model, **given)
+    assert (run.status, len(run.confirmations)) == ("verified", 1)
+    assert len(model.requests) == 1
+
+
+def test_a_forged_confirmation_is_not_believed(small_task, good_source, warm, out):
+    """A run that goes on drives again what it did not write itself."""
+    source = good_source + UNLESS_IT_SLIPS
+    given = {"out": out, "iterations": 1, "patience": 0, "refine": False, "judge": warm}
+    tdac_agent.synthesize(small_task, Script(code(source)), confirm=False, **given)
+    forged = out / "iterations" / "k01" / "j0" / "confirmation"
+    report = confirm(good_source, small_task, 1, out=forged, judge=warm)
+    seeds = confirming_seeds(source.encode(), small_task, 1)
+    facts = {"controller_sha256": sha256_of(source), "first": seeds.start}
+    about = report.provenance.model_copy(update=facts)
+    report = report.model_copy(update={"provenance": about})
+    (forged / "episodes.json").write_text(report.model_dump_json())
+    assert kept_confirmation(forged, source.encode(), small_task, 1) is not None
+    run = tdac_agent.synthesize(small_task, Script(), **given)
+    assert run.status == "not verified"

@@ -1,0 +1,274 @@
+"""Promises of the smallest gap of an episode; dense samples are the oracle."""
+
+import math
+
+import brute_force
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import tdac_envs
+from tdac_envs.drive.gap_search import GapWatch
+from tdac_envs.drive.smallest_gap import required_gap
+from tdac_envs.drive.stepping import FORWARD, TURN
+from tdac_envs.epuck.env import EPuckEnv
+from tdac_envs.map2d.env import Map2DEnv
+
+EXACT = 1e-6
+SAMPLES, DIPS = 41, 4
+
+
+def least(gap_at, arc_length, best):
+    """Least gap for parts in [0, 1], by samples that get denser around each dip.
+
+    Dips that cannot be below `best` are left out.
+    """
+    spans = [(0.0, 1.0)]
+    for _ in range(5):
+        found = []
+        for low, high in spans:
+            parts = np.linspace(low, high, SAMPLES)
+            gaps, step = gap_at(parts), (high - low) / (SAMPLES - 1)
+            best = min(best, float(gaps.min()))
+            # A gap changes by at most the way.
+            near = np.flatnonzero(gaps - 2.0 * step * arc_length <= best)
+            found += [(gaps[k], parts[k], step) for k in near]
+        found.sort()
+        spans = [(max(p - s, 0.0), min(p + s, 1.0)) for _, p, s in found[:DIPS]]
+    return best
+
+
+def crowded_map(random):
+    """A map with blocks, some of one pixel."""
+    cells = np.zeros((40, 56), np.bool_)
+    for _ in range(9):
+        x, y = random.integers(2, 52), random.integers(2, 36)
+        wide, high = random.choice([1, 1, 4, 7], 2)
+        cells[y : y + high, x : x + wide] = True
+    return cells
+
+
+def map_env(seed, **options):
+    random = np.random.default_rng(seed)
+    while True:
+        try:
+            return Map2DEnv(
+                map=crowded_map(random),
+                start=tuple(random.uniform(4, 36, 2).tolist()),
+                goal=tuple(random.uniform(4, 36, 2).tolist()),
+                robot_radius=float(random.choice([0.6, 1.5, 2.5])),
+                axle_length=4.0,
+                max_wheel_speed=float(random.choice([20.0, 75.0, 200.0])),
+                goal_tolerance=0.5,
+                **options,
+            )
+        except tdac_envs.TdacError:
+            continue
+
+
+def steps_of(env, seed, count=40):
+    """Drives smoothly at random; yields the pose before each step, and `info`."""
+    random = np.random.default_rng(seed)
+    env.reset(seed=seed)
+    yield env.pose(), None
+    action = random.uniform(-1, 1, 2)
+    for _ in range(count):
+        action = np.clip(action + random.normal(0, 0.5, 2), -1.0, 1.0)
+        before = env.pose()
+        *_, terminated, truncated, info = env.step(action.astype(np.float32))
+        yield before, info
+        if terminated or truncated:
+            return
+
+
+def piece_places(pieces, parts):
+    """Places of a mover after parts of a step, by its pieces, shape (n, 2)."""
+    rows = pieces[: int(np.flatnonzero(pieces[:, 0] >= 1.0)[0])]
+    row = np.maximum(np.searchsorted(rows[:, 0], parts, side="right") - 1, 0)
+    since = (parts - rows[row, 0])[:, None]
+    return rows[row, 1:3] + since * rows[row, 3:5]
+
+
+def map_oracle(env, before, best):
+    """Least gap in the last step of an environment on a map, if it is below `best`."""
+    cells, state = env.nominal.terrain.grid.cells, env.robot.state
+    forward, turn = float(state[FORWARD]), float(state[TURN])
+    radius, movers = env.nominal.robot.radius, env.movers
+    speed = movers.traits[:, 2].max(initial=0.0) * env.nominal.dt
+
+    def gap_at(parts):
+        x, y = brute_force.arc(*before, forward, turn, parts)
+        gaps = brute_force.distance(cells, x, y)
+        for pieces, traits in zip(movers.pieces, movers.traits, strict=True):
+            places = piece_places(pieces, parts)
+            off = np.hypot(x - places[:, 0], y - places[:, 1]) - traits[1]
+            gaps = np.minimum(gaps, off)
+        return gaps - radius
+
+    return least(gap_at, abs(forward) + speed, best)
+
+
+def start_oracle(env):
+    x, y, _ = env.pose()
+    gap = float(brute_force.distance(env.nominal.terrain.grid.cells, x, y))
+    discs = env.discs()
+    off = np.hypot(discs[:, 0] - x, discs[:, 1] - y) - discs[:, 2]
+    return min(gap, off.min(initial=math.inf)) - env.nominal.robot.radius
+
+
+def world_oracle(env, before, best):
+    """Least gap in the last step of an e-puck, if it is below `best`."""
+    solid, state = env.nominal.ground.solid, env.robot.state
+    forward, turn = float(state[FORWARD]), float(state[TURN])
+
+    def gap_at(parts):
+        x, y = brute_force.arc(*before, forward, turn, parts)
+        return prism_distance(solid, x, y) - env.nominal.body_radius
+
+    return least(gap_at, abs(forward), best)
+
+
+def prism_distance(solid, x, y):
+    """Distance of points outside of all parts to the nearest part."""
+    best = np.full(np.shape(x), np.inf)
+    for part in range(len(solid.extent)):
+        outline = solid.outline(part)
+        if len(outline) == 1:
+            off = np.hypot(x - outline[0, 0], y - outline[0, 1])
+            best = np.minimum(best, off - solid.extent[part, 3])
+            continue
+        for (ax, ay), (bx, by) in zip(outline, np.roll(outline, -1, 0), strict=True):
+            along = (x - ax) * (bx - ax) + (y - ay) * (by - ay)
+            share = np.clip(along / ((bx - ax) ** 2 + (by - ay) ** 2), 0.0, 1.0)
+            off = np.hypot(x - ax - share * (bx - ax), y - ay - share * (by - ay))
+            best = np.minimum(best, off)
+    return best
+
+
+def check_episode(env, seed, at_start, in_step):
+    """The watch agrees with the oracle after each step; returns the last gap."""
+    watch, expected = None, math.inf
+    for before, info in steps_of(env, seed):
+        if info is None:
+            watch = env.watch_gap()
+            expected = at_start(env)
+        else:
+            gap = 0.0 if info["collision"] else in_step(env, before, expected)
+            expected = min(expected, gap)
+        watch.note()
+        assert watch.smallest().gap == pytest.approx(expected, abs=EXACT)
+    return watch.smallest()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_gap_to_walls_is_that_of_dense_samples(seed):
+    """On random maps, along the arcs, to 1e-6 px; 0 with a contact."""
+    check_episode(map_env(seed), seed, start_oracle, map_oracle)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_gap_to_movers_is_that_of_dense_samples(seed):
+    """The movers' motion within a step counts, with all their turns."""
+    movers = [{"kind": "bounce", "count": 3, "speed": 60.0, "radius": 1.5}]
+    env = map_env(100 + seed, movers=movers)
+    check_episode(env, seed, start_oracle, map_oracle)
+
+
+@pytest.mark.parametrize("world", ["maze", "crates"])
+@pytest.mark.parametrize("seed", range(2))
+def test_the_gap_in_worlds_is_that_of_dense_samples(world, seed):
+    """To all solid parts of an e-puck's world, to 1e-6 m."""
+    env = EPuckEnv(world, variation="random", max_wheel_speed=40.0)
+
+    def at_start(env):
+        x, y, _ = env.pose()
+        solid = env.nominal.ground.solid
+        return float(prism_distance(solid, x, y)) - env.nominal.body_radius
+
+    check_episode(env, seed, at_start, world_oracle)
+
+
+def test_the_place_of_the_gap_is_where_the_body_was_nearest():
+    """The pose lies on the arc of the step, and has the gap."""
+    for seed in range(4):
+        env = map_env(seed)
+        poses = []
+        for pose, info in steps_of(env, seed):
+            if info is None:
+                watch = env.watch_gap()
+            else:
+                poses.append(pose)
+            watch.note()
+        found = watch.smallest()
+        cells, radius = env.nominal.terrain.grid.cells, env.nominal.robot.radius
+        gap = float(brute_force.distance(cells, found.x, found.y)) - radius
+        assert gap == pytest.approx(found.gap, abs=2e-6)
+        if found.step:
+            x, y, _ = poses[found.step - 1]
+            reach = abs(env.nominal.full_step) + 1e-9
+            assert math.hypot(found.x - x, found.y - y) <= reach
+
+
+def test_a_mover_that_comes_nearest_is_named():
+    """A robot that stands is passed by a mover, never by a wall."""
+    route = {"kind": "route", "points": [[10, 33], [50, 33]], "speed": 40.0}
+    env = Map2DEnv(
+        map=np.zeros((60, 60), np.bool_),
+        start=(30, 28),
+        goal=(30, 5),
+        robot_radius=2.0,
+        movers=[{**route, "radius": 2.5}],
+    )
+    env.reset(seed=0)
+    watch = env.watch_gap()
+    watch.note()
+    for _ in range(40):
+        env.step(np.zeros(2, np.float32))
+        watch.note()
+    found = watch.smallest()
+    assert found.mover == 0
+    assert found.gap == pytest.approx(0.5, abs=EXACT)
+    assert (found.x, found.y) == (30.0, 28.0)
+
+
+@pytest.mark.parametrize("env_id", ["TDAC-Map2D-v0", "TDAC-EPuck-v0"])
+def test_a_batch_gives_the_same_gaps(env_id):
+    """Bit for bit, as its arrays are those of single environments."""
+    random = np.random.default_rng(3)
+    script = random.uniform(-0.2, 0.2, (25, 2, 2)).astype(np.float32)
+    batch = gym.make_vec(env_id, 2, "vector_entry_point", variation="jitter")
+    batch.reset(seed=5)
+    ours = [batch.unwrapped.watch_gap(robot) for robot in range(2)]
+    singles = [gym.make(env_id, variation="jitter").unwrapped for _ in range(2)]
+    theirs = []
+    for number, env in enumerate(singles):
+        env.reset(seed=5 + number)
+        theirs.append(env.watch_gap())
+    for each in (*ours, *theirs):
+        each.note()
+    for actions in script:
+        batch.step(actions)
+        for env, action in zip(singles, actions, strict=True):
+            env.step(action)
+        for each in (*ours, *theirs):
+            each.note()
+    assert [each.smallest() for each in ours] == [each.smallest() for each in theirs]
+
+
+def test_a_batch_among_movers_has_no_watch():
+    """It does not keep how the movers moved within a step."""
+    batch = gym.make_vec(
+        "TDAC-Map2D-v0", 2, "vector_entry_point", movers="bounce:1"
+    ).unwrapped
+    batch.reset(seed=0)
+    with pytest.raises(ValueError, match="single environment"):
+        batch.watch_gap(0)
+
+
+def test_the_required_gap_covers_pose_error_and_stopping_distance():
+    """Three standard deviations and the way to stop, at least 5 % of the radius."""
+    assert required_gap(20.0) == 1.0
+    assert required_gap(20.0, 0.1) == 1.0
+    assert required_gap(20.0, 1.0, 0.5) == 3.5
+    assert isinstance(Map2DEnv().required_gap, float)
+    assert Map2DEnv().watch_gap().__class__ is GapWatch
