@@ -24,7 +24,8 @@ from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.episode_job import row_of
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.set_files import write_files
-from tdac_agent.verification.judge.worlds import SetEpisodes, SetWorlds
+from tdac_agent.verification.judge.set_worlds import SetEpisodes, open_set
+from tdac_agent.verification.judge.worlds import SetWorlds
 
 
 class Imported:
@@ -84,7 +85,7 @@ class Drives:
     def _drive(self, source: str, split: str, index: int) -> EpisodeRow:
         if split not in self._worlds:
             own = SetWorlds(set_file=Path(self._level), split=split)
-            self._worlds[split] = own.opened()
+            self._worlds[split] = open_set(own)
         worlds, began = self._worlds[split], time.process_time()
         env, record = worlds.env, worlds.record(index)
         with tempfile.TemporaryDirectory(prefix="tdac-drive-") as name:

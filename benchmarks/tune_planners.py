@@ -36,8 +36,8 @@ from tdac_agent.planners.planner import (
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.set_files import write_files
+from tdac_envs.drive.scores import time_score
 from tdac_envs.ladder.env import make
-from tdac_envs.ladder.scores import time_score
 
 FIRST = 100
 """The first of the worlds."""

@@ -15,7 +15,8 @@ from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import part_of
 from tdac_agent.evaluation.policies import Entrant
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.drive_episodes import drive
 from tdac_agent.verification.episode_report import EpisodeReport, named

@@ -42,7 +42,7 @@ from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
-from tdac_envs.ladder.source import read_salt
+from tdac_envs.core.salt import read_salt
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 WORLDS = 100

@@ -20,7 +20,8 @@ from tdac_agent.evaluation.policies import (
     prepared,
 )
 from tdac_agent.planners.names import planner_names
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.drive_episodes import Request
 from tdac_envs.core.errors import TaskError

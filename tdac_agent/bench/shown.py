@@ -21,8 +21,8 @@ from tdac_agent.storage.locks import LOCK_FILE, own_folder
 from tdac_agent.verification.salt import SEALED
 from tdac_envs.core.errors import TaskError, one_line_reason
 from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.core.salt import read_salt
 from tdac_envs.ladder.set_file import set_names
-from tdac_envs.ladder.source import read_salt
 
 _COMPARED = {
     "sha256": "version",

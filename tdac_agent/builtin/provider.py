@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Generic
+from typing import TYPE_CHECKING, Any, Generic
 
-from tdac_agent.builtin.level import LevelController
 from tdac_agent.builtin.repair import learn_bounds, read_rules, repair, write_rules
 from tdac_agent.builtin.template import P, Template, read_parameters
 from tdac_agent.builtin.variation import varied, varied_parameters
@@ -14,7 +13,9 @@ from tdac_agent.models.choice import Options
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import Setting
-from tdac_envs.ladder.task_sets import TaskSet
+
+if TYPE_CHECKING:
+    from tdac_agent.builtin.level import LevelController
 
 
 def make_builtin(words: str, options: Options) -> Builtin[Any] | LevelController:
@@ -25,10 +26,13 @@ def make_builtin(words: str, options: Options) -> Builtin[Any] | LevelController
     """
     if words:
         raise ProviderError(f"'builtin' takes no model name; got 'builtin:{words}'")
-    if isinstance(options.setting, TaskSet):
-        return LevelController(options.setting)
     assert options.setting is not None
-    return Builtin(template_of(options.setting))
+    if isinstance(options.setting, Setting):
+        return Builtin(template_of(options.setting))
+    # Task sets need much that a task does not.
+    from tdac_agent.builtin.level import LevelController
+
+    return LevelController(options.setting)
 
 
 def template_of(setting: Setting) -> Template[Any]:

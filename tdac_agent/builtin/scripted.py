@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import zlib
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -27,7 +27,9 @@ from tdac_agent.tasks.setting import Setting
 from tdac_envs.core.errors import hint
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 from tdac_envs.core.strict_model import StrictModel
-from tdac_envs.ladder.task_sets import TaskSet
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
 
 _KINDS: tuple[Kind, ...] = ("generate", "edit")
 
@@ -152,7 +154,7 @@ def _source(choice: Choice, script: Path, setting: Setting | TaskSet) -> str:
 def _filled_in(
     values: dict[str, float], script: Path, setting: Setting | TaskSet
 ) -> str:
-    if isinstance(setting, TaskSet):
+    if not isinstance(setting, Setting):
         raise ProviderError(
             f"{script}: a task set has no template; name files with `file:` instead"
         )

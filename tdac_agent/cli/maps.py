@@ -14,7 +14,7 @@ from tdac_agent.cli.sentences import print_plain, print_sentences
 from tdac_agent.cli.task_changes import in_pixels
 from tdac_agent.cli.task_choice import check_values, in_own_units
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.environments.map2d.setting import robot_text
+from tdac_agent.environments.map2d.task_robot import robot_text
 from tdac_envs.core.errors import PicturedError, TaskError
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid

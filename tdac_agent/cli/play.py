@@ -27,14 +27,15 @@ from tdac_agent.environments.map2d.pictures import MapPictures
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted
 from tdac_agent.evaluation.replay import check_shown, drive_episode
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.storage.plain import one_line
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task import Task, write_workdir
-from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.episode_job import Driven
 from tdac_agent.verification.judge.judge import Judge
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.suite.starts import JITTERS
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.errors import TaskError

@@ -11,13 +11,12 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_command, print_sentences
 from tdac_agent.tasks.units import Units
-from tdac_agent.verification.episode_report import (
-    EpisodeReport,
-    Interval,
+from tdac_agent.verification.decision import (
     SequentialResult,
     decision_text,
     percent,
 )
+from tdac_agent.verification.episode_report import EpisodeReport, Interval
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.verdict import COLOURS, verified_text, word_of
 

@@ -13,12 +13,9 @@ from tdac_agent.cli.console import Console
 from tdac_agent.cli.robust_view import error_rates, rate_text
 from tdac_agent.cli.sentences import print_command, print_plain, print_sentences
 from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.decision import decision_text
 from tdac_agent.verification.diagnosis.report import OWN
-from tdac_agent.verification.episode_report import (
-    EpisodeReport,
-    HiddenCount,
-    decision_text,
-)
+from tdac_agent.verification.episode_report import EpisodeReport, HiddenCount
 from tdac_agent.verification.judge.episode_row import Scores
 from tdac_agent.verification.store import REPORT_FILE, TRAJECTORIES
 from tdac_agent.verification.verdict import COLOURS

@@ -16,7 +16,7 @@ from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.sentences import print_plain, print_sentences
 from tdac_agent.cli.sets_flags import ShowSetOptions
 from tdac_agent.verification.judge.sequential import MARGIN
-from tdac_agent.verification.judge.worlds import movers_of
+from tdac_agent.verification.judge.set_worlds import movers_of
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.epuck.infrared import RANGE

@@ -24,8 +24,7 @@ from tdac_agent.tasks.setting import JudgedEnv
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.gap_search import GapWatch
 from tdac_envs.drive.smallest_gap import SmallestGap
-from tdac_envs.drive.task import Pose
-from tdac_envs.ladder.observed import AT_START
+from tdac_envs.drive.task import AT_START, Pose
 
 # An episode is stopped if the mean policy call takes longer than this many steps.
 SLOW_FACTOR = 2.0

@@ -31,7 +31,8 @@ from tdac_agent.evaluation.policies import (
     knowledge,
     prepared,
 )
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic

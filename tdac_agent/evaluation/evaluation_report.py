@@ -18,8 +18,8 @@ from tdac_agent.metrics.exact import sign_test
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.units import Place
 from tdac_agent.verification.episode_report import EpisodeReport, Interval
-from tdac_agent.verification.judge.drivers import Kind
 from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores
+from tdac_agent.verification.judge.policy_spec import Kind
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -22,13 +22,14 @@ from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.controller_file import check_controller
 from tdac_agent.planners.names import planner_names
 from tdac_agent.planners.planner import planner_on
-from tdac_agent.problems.episodes import episodes_of, planner_sha256
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.set_episodes import planner_sha256
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file
-from tdac_agent.verification.judge.drivers import Kind, PolicySpec
+from tdac_agent.verification.judge.policy_spec import Kind, PolicySpec
 from tdac_agent.verification.judge.set_files import write_set
 from tdac_agent.verification.verify import read_source
 from tdac_agent.verification.verify_episodes import written_by

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from tdac_agent.errors import Fault
 from tdac_agent.evaluation.policies import Entrant
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.sandbox import SandboxError
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task

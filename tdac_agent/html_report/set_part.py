@@ -11,7 +11,6 @@ from pathlib import Path
 
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.models.picture import MEDIA_TYPE
-from tdac_agent.runs.episode_pictures import failure_pictures
 from tdac_agent.runs.history import RunHistory
 from tdac_agent.runs.ownership import remark_on
 from tdac_agent.runs.run_record import candidate_at
@@ -21,6 +20,7 @@ from tdac_agent.runs.selection_record import (
     read_hidden,
     read_selection,
 )
+from tdac_agent.runs.world_pictures import world_pictures
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.store import read_report
@@ -127,6 +127,6 @@ def _drawn(tasks: TaskSet, driven: list[_Driven]) -> Iterator[DrawnFailure]:
     for folder, named in driven:
         causes = {name: str(each.cause or each.outcome) for name, each in named}
         place = folder / "trajectories"
-        for name, picture in failure_pictures(tasks, named, place, SIDE):
+        for name, picture in world_pictures(tasks, named, place, SIDE):
             address = data_address(picture.png, MEDIA_TYPE)
             yield DrawnFailure(name, causes[name], address)

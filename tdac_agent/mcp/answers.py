@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from pydantic import BaseModel, Field
 
-from tdac_agent.verification.episode_report import EpisodeReport, decision_text
+from tdac_agent.verification.decision import decision_text
+from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.verdict import verified_text, word_of
 
 

@@ -11,7 +11,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.mcp.answers import Refused
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.problems.problem import Problem
-from tdac_agent.runs.episode_pictures import failure_pictures
+from tdac_agent.runs.world_pictures import world_pictures
 from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import file_stem
@@ -72,7 +72,7 @@ def _of_world(tasks: TaskSet, submission: Candidate, episode: str) -> bytes:
         f"world {figures.number}",
         submission.folder / FEEDBACK / TRAJECTORIES,
     )
-    failed = failure_pictures(tasks, [(name, figures)], folder, LARGEST_SIDE)
+    failed = world_pictures(tasks, [(name, figures)], folder, LARGEST_SIDE)
     drawn = next((picture.png for _, picture in failed), None)
     if drawn is not None:
         return drawn

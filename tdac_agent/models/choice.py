@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pkgutil import resolve_name
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from tdac_agent.errors import ProviderError
@@ -16,7 +16,9 @@ from tdac_agent.models.provider import Provider, missing_for
 from tdac_agent.models.vendors import VENDORS, forms, vendor_of
 from tdac_agent.tasks.setting import Setting
 from tdac_envs.core.errors import hint
-from tdac_envs.ladder.task_sets import TaskSet
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
 
 GROUP = "tdac.providers"
 # A provider and the packages it needs are imported only when it is chosen.

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from tdac_agent.prompting.prompt import FULL, PromptTemplate
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.tasks.setting import Setting
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import Profile
-from tdac_envs.ladder.task_sets import TaskSet
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
 
 Poll = Callable[[], None]
 """Called repeatedly while the judge works; an error that it raises ends the work."""

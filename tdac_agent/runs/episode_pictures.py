@@ -1,10 +1,9 @@
-"""Pictures of failed episodes: disturbed ones of a task, or on worlds of `dev`."""
+"""Pictures of failed episodes: disturbed ones of a task, or on worlds of a set."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tdac_agent.episodes.trajectory import Rollout, Trajectory
@@ -18,14 +17,34 @@ from tdac_agent.verification.diagnosis.model_picture import (
     picture_of_event,
 )
 from tdac_agent.verification.judge.episode_row import EpisodeRow
-from tdac_agent.verification.judge.worlds import shown_units
 from tdac_envs.drawing.backdrop import Backdrop
-from tdac_envs.ladder.picture import backdrop_of
-from tdac_envs.ladder.task_sets import TaskSet
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Where an episode took place.
+
+    Attributes:
+        task: Its task.
+        units: Units of its diagnosis.
+        backdrop: The background of its picture.
+        axes: Headings of the axes of the frame of the diagnosis, if it is the robot's
+            at its start.
+    """
+
+    task: Nominal
+    units: Units
+    backdrop: Backdrop
+    axes: tuple[float, float] | None = None
+
+
+def scene_of(task: Task) -> Scene:
+    """The scene of all episodes of a task."""
+    return Scene(task.nominal, task.setting.units, task.pictures().backdrop())
 
 
 def failure_pictures(
-    problem: Task | TaskSet,
+    scene: Callable[[int], Scene],
     episodes: Iterable[tuple[str, EpisodeRow]],
     trajectories: Path,
     side: int,
@@ -33,8 +52,8 @@ def failure_pictures(
     """Yields names and pictures of failed episodes that drove and have a diagnosis.
 
     Args:
-        problem: The task or the task set.
-        episodes: Episodes, on worlds of `dev`, each with the name that is printed.
+        scene: Returns the scene of an episode, by its number.
+        episodes: Episodes, each with the name that is printed.
         trajectories: Folder of their trajectories.
         side: Most width and height, px.
     """
@@ -44,36 +63,25 @@ def failure_pictures(
             continue
         trajectory = Trajectory.load(file)
         if trajectory.steps:
-            yield name, _drawn(problem, name, episode, trajectory, side)
+            yield name, _drawn(scene(episode.number), name, episode, trajectory, side)
 
 
 def _drawn(
-    problem: Task | TaskSet,
+    scene: Scene,
     name: str,
     episode: EpisodeRow,
     trajectory: Trajectory,
     side: int,
 ) -> FailurePicture:
-    task, units, backdrop = _scene(problem, episode.number)
+    task, units = scene.task, scene.units
     rollout = _rollout(task, name, episode, trajectory)
     distances = rollout.distances().tolist()
     figures = EpisodeFigures(name, rollout.outcome, distances[0], min(distances))
     found = diagnose(rollout, task, units)
     event = event_of(task, trajectory, figures, found, units)
-    if isinstance(problem, TaskSet) and problem.file.frame == "start":
-        heading = task.start.heading
-        # Headings turn from x to y, on maps and in worlds.
-        event = replace(event, axes=(heading, heading + math.pi / 2.0))
-    return picture_of_event(backdrop, trajectory, event, units, side)
-
-
-def _scene(problem: Task | TaskSet, number: int) -> tuple[Nominal, Units, Backdrop]:
-    """The task of an episode, the units of its diagnosis, and the background."""
-    if isinstance(problem, Task):
-        setting = problem.setting
-        return problem.nominal, setting.units, problem.pictures().backdrop()
-    task = problem.task("dev", number)
-    return task, shown_units(problem.file, task), backdrop_of(task)
+    if scene.axes is not None:
+        event = replace(event, axes=scene.axes)
+    return picture_of_event(scene.backdrop, trajectory, event, units, side)
 
 
 def _rollout(

@@ -26,7 +26,7 @@ from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.verify import verify
 from tdac_agent.verification.verify_episodes import JUDGED, verify_episodes
 from tdac_envs.core.arguments import one_of, whole_number
-from tdac_envs.ladder.source import read_salt
+from tdac_envs.core.salt import read_salt
 from tdac_envs.ladder.task_sets import load_set
 
 FEEDBACK_WORLDS = 8

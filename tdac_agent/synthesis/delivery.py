@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tdac_agent.metrics.paired import paired_change
 from tdac_agent.runs.improvement_record import (
@@ -23,7 +23,9 @@ from tdac_agent.verification.diagnosis.figures import draw_trajectories
 from tdac_agent.verification.judge.episode_row import scores_of
 from tdac_agent.verification.verify import load_trajectories
 from tdac_envs.core.intake import IMAGE_BYTES, read_file
-from tdac_envs.ladder.task_sets import TaskSet
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
 
 Compare = Callable[[Candidate], dict[str, list[float]]]
 """Drives the episodes of the comparison; returns scores of each, by name."""

@@ -7,7 +7,7 @@ from statistics import fmean
 
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.prompting.feedback import Feedback, cut
-from tdac_agent.runs.episode_pictures import failure_pictures
+from tdac_agent.runs.episode_pictures import failure_pictures, scene_of
 from tdac_agent.runs.improvement_record import goals_text
 from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.hashes import number_of
@@ -22,7 +22,7 @@ from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.store import TRAJECTORIES
 from tdac_agent.verification.verdict import confirmed_text
-from tdac_envs.ladder.scores import time_score
+from tdac_envs.drive.scores import time_score
 
 PURPOSES = ("improve", "comparison")
 """What the episodes are for, in the order of their seeds."""
@@ -136,5 +136,6 @@ def failed_picture(
     """A picture of the first failed episode that drove; None if there is none."""
     numbered = enumerate(driven.episodes, 1)
     episodes = ((named(number), each) for number, each in numbered)
-    found = failure_pictures(task, episodes, folder / TRAJECTORIES, LARGEST_SIDE)
+    place = folder / TRAJECTORIES
+    found = failure_pictures(lambda _: scene_of(task), episodes, place, LARGEST_SIDE)
     return next((picture for _, picture in found), None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.synthesis.candidates import Candidate
@@ -12,7 +12,9 @@ from tdac_agent.tasks.task import Task
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.store import REPORT_FILE, kept_report
 from tdac_agent.verification.verify_episodes import verify_episodes
-from tdac_envs.ladder.task_sets import TaskSet
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
 
 
 def drive_candidate(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
@@ -14,7 +15,9 @@ from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.salt import SEALED, drawn_salt
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
-from tdac_envs.ladder.task_sets import TaskSet
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
 
 
 def hidden_report(tasks: TaskSet, candidate: Candidate, terms: Terms) -> EpisodeReport:

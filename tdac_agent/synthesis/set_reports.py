@@ -7,7 +7,7 @@ from statistics import fmean
 
 from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.prompting.feedback import Feedback, cut
-from tdac_agent.runs.episode_pictures import failure_pictures
+from tdac_agent.runs.world_pictures import world_pictures
 from tdac_agent.synthesis.candidates import Figures
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.episode_report import EpisodeReport
@@ -82,5 +82,5 @@ def world_picture(
     if report.provenance.split != "dev":
         raise ValueError(f"expected worlds of dev, got {report.provenance.split}")
     named = ((f"world {each.number}", each) for each in report.episodes)
-    found = failure_pictures(tasks, named, folder / TRAJECTORIES, LARGEST_SIDE)
+    found = world_pictures(tasks, named, folder / TRAJECTORIES, LARGEST_SIDE)
     return next((picture for _, picture in found), None)

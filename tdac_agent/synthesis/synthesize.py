@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.models.budget import Budget
@@ -42,7 +42,9 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.ladder.task_sets import TaskSet
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
 
 
 def synthesize(

@@ -11,7 +11,6 @@ from tdac_agent.synthesis.archive import Archive, Member
 from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.suite_trials import SuiteTrials
 from tdac_agent.synthesis.terms import Chosen, Terms
-from tdac_agent.synthesis.world_trials import WorldTrials
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.verdict import confirmed_text, word_of
@@ -121,6 +120,9 @@ def trials_of(problem: Problem, terms: Terms) -> Trials:
     if problem.task is not None:
         return SuiteTrials(problem.task, terms)
     assert problem.tasks is not None
+    # Task sets need much that a task does not.
+    from tdac_agent.synthesis.world_trials import WorldTrials
+
     return WorldTrials(problem.tasks, terms, problem.suite)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from gymnasium import Space
@@ -158,6 +158,7 @@ class Original(NamedTuple):
     file: Path
 
 
+@runtime_checkable
 class Setting(Protocol):
     """Map or world, start, goal and robot: `Map2DSetting` or `EPuckSetting`."""
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.hashes import sha256_of
@@ -15,7 +16,7 @@ from tdac_agent.tasks.task import Task
 from tdac_agent.verification.drive_episodes import Request, drive
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.confirming import confirming_test
-from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.run_episodes import Watch
 from tdac_agent.verification.store import read_report

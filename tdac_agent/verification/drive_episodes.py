@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from tdac_agent.problems.episodes import Episodes, Part
+from tdac_agent.problems.part import Episodes, Part
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.storage.files import write_atomic
@@ -22,12 +22,11 @@ from tdac_agent.verification.episode_report import (
     summarise,
 )
 from tdac_agent.verification.judge.confirming import EndingTest
-from tdac_agent.verification.judge.drivers import PolicySpec
 from tdac_agent.verification.judge.episode_job import EpisodeJob
-from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks
+from tdac_agent.verification.judge.policy_spec import PolicySpec
+from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks, checks_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.ledger import SEQUENTIAL, HiddenEvaluation, on_record
-from tdac_agent.verification.own_tests import checks_of
 from tdac_agent.verification.run_episodes import Watch, run_episodes
 from tdac_agent.verification.store import (
     ROWS_FILE,

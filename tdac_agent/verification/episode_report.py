@@ -6,7 +6,7 @@ import contextlib
 import math
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import AliasChoices, ConfigDict, Field, model_validator
@@ -16,6 +16,7 @@ from tdac_agent.metrics.rates import rate_of_runs
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.units import Place, Units
+from tdac_agent.verification.decision import SequentialResult, result_of
 from tdac_agent.verification.diagnosis.gap import (
     TOO_CLOSE,
     Gap,
@@ -25,18 +26,15 @@ from tdac_agent.verification.diagnosis.gap import (
 )
 from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores, scores_of
-from tdac_agent.verification.judge.sequential import (
-    Characteristics,
-    Decision,
-    SequentialTest,
-)
 from tdac_agent.verification.judge.set_checks import Checks
 from tdac_agent.verification.suite.contract import (
     ParseError,
     parse_source,
     reads_clock,
 )
-from tdac_envs.ladder.set_file import CpuSpec
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.set_file import CpuSpec
 
 LEAST_GROUP = 5
 """Least number of hidden worlds of a generator whose scores reveal no single world."""
@@ -103,28 +101,6 @@ class Interval(StrictRecord):
     high: float
     confidence: float
     method: Literal["Clopper-Pearson", "bootstrap over worlds"] = "Clopper-Pearson"
-
-
-class ContactResult(StrictRecord):
-    """What a sequential test found about contacts."""
-
-    contacts: int = Field(description="Episodes in which something was touched.")
-    decision: Decision
-    at_refused_rate: Characteristics
-    at_accepted_rate: Characteristics
-
-
-class SequentialResult(StrictRecord):
-    """The decision of a test that may end the episodes, and its error rates."""
-
-    decision: Decision
-    test: EndingTest
-    refuse_at: float = Field(description="Success rate that the test should reject.")
-    at_refused_rate: Characteristics
-    at_accepted_rate: Characteristics
-    contact: ContactResult | None = Field(
-        None, description="Of drives without a contact, on a task set."
-    )
 
 
 class HiddenCount(StrictRecord):
@@ -378,54 +354,3 @@ def clock_dependence(
     if over == 0:
         return None
     return f"in {over} of {len(used)} episodes it used over half of its CPU budget"
-
-
-def result_of(test: EndingTest, episodes: Sequence[EpisodeRow]) -> SequentialResult:
-    """The decision of a test, with its error rates."""
-    successes = sum(each.success for each in episodes)
-    touched = sum(each.touched for each in episodes)
-    contact = test.contact if isinstance(test, SequentialTest) else None
-    return SequentialResult(
-        contact=None if contact is None else _of_contacts(contact, touched, episodes),
-        decision=test.decide(successes, len(episodes) - successes, touched),
-        test=test,
-        refuse_at=test.refuse_at,
-        at_refused_rate=test.characteristics(test.refuse_at),
-        at_accepted_rate=test.characteristics(test.accept_at),
-    )
-
-
-def _of_contacts(
-    test: SequentialTest, touched: int, episodes: Sequence[EpisodeRow]
-) -> ContactResult:
-    return ContactResult(
-        contacts=touched,
-        decision=test.decide(len(episodes) - touched, touched),
-        at_refused_rate=test.characteristics(test.refuse_at),
-        at_accepted_rate=test.characteristics(test.accept_at),
-    )
-
-
-def decision_text(result: SequentialResult) -> str:
-    """What a sequential test decided."""
-    contact = result.contact
-    if result.decision == "accepted":
-        text = f"accepted at {percent(result.test.accept_at)}"
-        if contact is None:
-            return text
-        most = percent(1.0 - contact.at_refused_rate.rate)
-        return f"{text}, contacts below {most}"
-    if contact is not None and contact.decision == "rejected":
-        most = percent(1.0 - contact.at_refused_rate.rate)
-        return f"rejected, since {contact.contacts} contacts are too many for {most},"
-    if result.decision == "rejected":
-        return f"rejected at {percent(result.test.accept_at)}"
-    return "undecided, therefore not accepted,"
-
-
-def percent(share: float) -> str:
-    """A percentage with one decimal; with three if it would round to 0 or 100 %."""
-    rounded = f"{100 * share:.1f}"
-    if rounded in ("0.0", "100.0") and 0.0 < share < 1.0:
-        rounded = f"{100 * share:.3f}"
-    return f"{rounded} %"

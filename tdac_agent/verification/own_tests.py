@@ -14,11 +14,10 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.problems.episodes import OfSet
+from tdac_agent.problems.set_episodes import OfSet
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.links import refuse_links
-from tdac_agent.storage.plain import plain
 from tdac_agent.tasks.installation import seed_from
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.diagnosis.report import (
@@ -30,7 +29,7 @@ from tdac_agent.verification.diagnosis.report import (
 )
 from tdac_agent.verification.judge.jobs import Findings, Job
 from tdac_agent.verification.judge.report_log import verdict_of
-from tdac_agent.verification.judge.set_checks import STABLE, Checks
+from tdac_agent.verification.judge.set_checks import id_of
 from tdac_agent.verification.judge.set_files import write_files, write_set
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.judge.worlds import public_split
@@ -46,8 +45,6 @@ from tdac_agent.verification.verify import (
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import TaskSet
 
-STATIC, CONTRACT = "test_static.py", "test_end_to_end.py"
-"""Files that have these tests in the suite of a task."""
 LEVEL = "set"
 """Name of the tests that all controllers for task sets must pass."""
 
@@ -116,7 +113,7 @@ def run_own_tests(
         job.task.mkdir()
         write_files(job.task, tasks.file, tasks.task(split, 0))
         found, tests, failures = judged(job, source, suites, warm, meanwhile)
-        names = {name: _id_of(name) for name in found.checks}
+        names = {name: id_of(name) for name in found.checks}
         checked = {names[n]: _outcome(why) for n, why in found.checks.items()}
         tests = checked | tests
         refused = [
@@ -150,28 +147,6 @@ def kept_tests(
         "versions": versions(),
     }
     return report_in(folder, wanted)
-
-
-def checks_of(report: Report) -> Checks:
-    """Why each test of a report failed, or None; with what happened in its episode."""
-    found: dict[str, str | None] = {_name_of(test): None for test in report.tests}
-    for failure in report.failures:
-        text, diagnosis = failure.message, failure.diagnosis
-        if diagnosis is not None:
-            quoted = plain(text) in diagnosis.text
-            text = diagnosis.text if quoted else f"{text}; {diagnosis.text}"
-        found[_name_of(failure.test)] = text
-    return Checks(results=found)
-
-
-def _name_of(test: str) -> str:
-    """The name of a test in reports on episodes: that of an own one with its file."""
-    file, _, name = test.partition("::")
-    return name if file in (STATIC, CONTRACT) else test
-
-
-def _id_of(name: str) -> str:
-    return f"{CONTRACT if name == STABLE else STATIC}::{name}"
 
 
 def _outcome(why: str | None) -> str:

@@ -7,10 +7,11 @@ import itertools
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tdac_agent.errors import RunError
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.hashes import sha256_of
@@ -19,7 +20,7 @@ from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.drive_episodes import Request, drive
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.sequential import (
     CLEAN,
     MARGIN,
@@ -27,13 +28,14 @@ from tdac_agent.verification.judge.sequential import (
     SequentialTest,
 )
 from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.own_tests import run_own_tests
 from tdac_agent.verification.run_episodes import Watch
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
-from tdac_envs.ladder.source import read_salt
-from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.core.salt import read_salt
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.task_sets import TaskSet
 
 EPISODES = 200
 """Default number of disturbed episodes of a task."""
@@ -121,13 +123,16 @@ def verify_episodes(
     source, own_tests = read_source(controller), None
     if seed is not None and suite is None:
         raise TaskError(SEED_ON_SETS)
-    if isinstance(problem, TaskSet):
+    if not isinstance(problem, Task):
         if disturbance is not None:
             raise TaskError("a task set has its own disturbances")
         part, test = part_of_set(
             problem, split, episodes, first, salt_file, accept_at, margin
         )
         if suite is not None:
+            # Task sets need much that a task does not.
+            from tdac_agent.verification.own_tests import run_own_tests
+
             tests = partial(run_own_tests, source, problem, suite, seed=seed)
             own_tests = partial(tests, tier=tier, out=out, judge=judge)
     else:
@@ -141,7 +146,7 @@ def verify_episodes(
         begin = seed_of(source, problem) if first is None else first
         part = Part(range(begin, begin + count), disturbance=disturbance)
         test = None if accept_at is None else SequentialTest(accept_at, count, margin)
-    keeps = isinstance(problem, TaskSet) if trajectories is None else trajectories
+    keeps = not isinstance(problem, Task) if trajectories is None else trajectories
     request = Request(
         PolicySpec("controller"),
         sha256_of(source),

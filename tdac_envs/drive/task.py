@@ -18,6 +18,9 @@ JITTER_HEADING = 0.5
 MAX_FULL_STEP = 1e6
 """Longest distance of one step at full speed, px or m: a longer arc takes seconds."""
 MAX_DRAWS = 1000
+AT_START = ("world_index", "generator", "difficulty")
+"""Entries of the `info` of `reset` on a task set, in the splits `train` and `dev`, for
+the user alone: no controller sees them."""
 FAR_OFF = 2.0
 """A goal tolerance above this many body radii is pointed out."""
 _TOLERANCE = "the tolerance"

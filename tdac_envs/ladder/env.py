@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.core.salt import read_salt
 from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.epuck.env import EPuckEnv
@@ -19,7 +20,7 @@ from tdac_envs.ladder.observed import SetView
 from tdac_envs.ladder.pool import MOST_PLATES
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import find_set_file
-from tdac_envs.ladder.source import SetSource, read_salt
+from tdac_envs.ladder.source import SetSource
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.setup import Map2DSetup

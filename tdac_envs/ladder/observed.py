@@ -17,9 +17,6 @@ Seen = dict[str, NDArray[np.float32]]
 
 ALWAYS, AT_END = ("collisions", "clipped"), ("is_success", "collision")
 """Entries of `info`: in every step, and in the last one of an episode."""
-AT_START = ("world_index", "generator", "difficulty")
-"""Entries of the `info` of `reset` in the splits `train` and `dev`, for the user alone:
-no controller sees them."""
 ANCHOR = 7
 """Numbers of an anchor; see `SetView.anchor`."""
 

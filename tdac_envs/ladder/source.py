@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tdac_envs.core.arguments import number_up_to, whole_number
-from tdac_envs.core.errors import TaskError, one_line_reason
-from tdac_envs.core.intake import read_file
+from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import Pose
 from tdac_envs.ladder.pool import PlatePool, TrainingPool
 from tdac_envs.ladder.set_file import HorizonSpec
-from tdac_envs.ladder.task_sets import MOST_SALT, AnyTask, AnyWorld, TaskSet
+from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.state import SPEED
 
@@ -120,22 +118,6 @@ class SetSource:
         if self._split == "train":
             return task, random
         return task, self._set.noise(self._split, number, self._salt)
-
-
-def read_salt(path: str | Path) -> bytes:
-    """The salt in a file: its bytes, or in a file `*.hex` those that it spells.
-
-    Raises:
-        TaskError: The file cannot be read.
-    """
-    spelt = Path(path).suffix == ".hex"
-    try:
-        raw = read_file(path, 2 * MOST_SALT + 1 if spelt else MOST_SALT)
-        return bytes.fromhex(raw.decode()) if spelt else raw
-    except OSError as error:
-        raise TaskError(f"salt file {path}: {one_line_reason(error)}") from None
-    except ValueError:
-        raise TaskError(f"salt file {path}: expected hexadecimal digits") from None
 
 
 def nearer_task(

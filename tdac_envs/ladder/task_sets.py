@@ -12,6 +12,8 @@ import numpy as np
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.core.intake import printable
+from tdac_envs.core.salt import LEAST_SALT, MOST_SALT
+from tdac_envs.drive.task import AT_START
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.task import EPuckTask, make_task
 from tdac_envs.ladder.difficulty import Difficulty
@@ -19,7 +21,6 @@ from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.ladder.files.opened import FileWorlds, opened
 from tdac_envs.ladder.files.placed import placed_world
 from tdac_envs.ladder.moving import draw_movers
-from tdac_envs.ladder.observed import AT_START
 from tdac_envs.ladder.orca_driver import drive_by_orca
 from tdac_envs.ladder.plate_worlds import PlatesWorld, make_plates
 from tdac_envs.ladder.random_stream import world_key
@@ -31,9 +32,6 @@ from tdac_envs.map2d.task import Map2DTask
 
 SPLITS = get_args(Split)
 """`train`; `dev` for feedback and selection; `test` is public; `hidden` ranks."""
-LEAST_SALT = 16
-"""Least length of the salt of a hidden split, bytes."""
-MOST_SALT = 4096
 AnyWorld = LadderWorld | PlatesWorld
 """A world of maps, or of plates for the e-puck."""
 AnyTask = Map2DTask | EPuckTask
@@ -191,7 +189,7 @@ class TaskSet:
     def with_facts(
         self, task: TaskType, split: str, index: int, difficulty: Difficulty
     ) -> TaskType:
-        """The task of a world with what `info` says about it; see `observed.AT_START`.
+        """The task of a world with what `info` says about it; see `AT_START`.
 
         For the splits `train` and `dev` alone: the others are to be unknown.
         """

@@ -6,13 +6,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
-
 from tdac_agent.environments.map2d.moving import as_option, check_movers
+from tdac_agent.environments.map2d.task_robot import (
+    check_robot_image,
+    further,
+    further_written,
+    robot_in_pixels,
+    robot_text,
+    with_robot,
+    with_robot_file,
+)
 from tdac_agent.tasks.setting import Original, Setting
-from tdac_agent.tasks.task_file import RobotSpec, TaskFile, check_frame
+from tdac_agent.tasks.task_file import TaskFile, check_frame
 from tdac_agent.tasks.units import PIXELS, Units
-from tdac_envs.core.errors import MapError, RefusedError, TaskError
+from tdac_envs.core.errors import RefusedError, TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose, with_tolerance_note
@@ -23,22 +30,18 @@ from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.metric_input import movers_in, movers_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
 from tdac_envs.map2d.picture import ROBOT_IMAGE
-from tdac_envs.map2d.robot_options import RAYS, options_of
-from tdac_envs.map2d.source import metric_units, prepare, units_of
+from tdac_envs.map2d.source import prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.mapping.fault import fault_of
-from tdac_envs.mapping.image import picture_size, read_bytes
+from tdac_envs.mapping.image import read_bytes
 from tdac_envs.mapping.map_folder import preview_of, write_grid
-from tdac_envs.mapping.params import MapParams, ReadingOptions, RobotParams
+from tdac_envs.mapping.params import MapParams, ReadingOptions
 from tdac_envs.mapping.preprocessing import as_image
 from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
 from tdac_envs.movers.spec import AnySpec
-from tdac_envs.robots.bundled import load_robot
 
 DT = 0.05
-ROBOT_IMAGE_BYTES = 16_000_000
-ROBOT_IMAGE_PIXELS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,7 +138,7 @@ class Map2DSetting:
         nominal, robot = self.nominal, self.nominal.robot
         return {
             **as_option(self.movers),
-            **_further(robot),
+            **further(robot),
             "map": nominal.terrain.grid.cells,
             "start": tuple(nominal.start),
             "goal": nominal.goal,
@@ -201,7 +204,7 @@ class Map2DSetting:
             **({} if self.view is None else {"frame": self.params.frame}),
             "map": ".",
             "robot": {
-                **_written(robot, units),
+                **further_written(robot, units),
                 "radius": length(robot.radius),
                 "axle": length(robot.axle_length),
                 "max_wheel_speed": length(robot.max_wheel_speed),
@@ -252,7 +255,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     typed = None if spec.start is None else (spec.start[0], spec.start[1])
     units = units_of(source, spec.frame, spec.resolution).with_typed(typed, spec.goal)
     spec = _in_pixels(spec, units)
-    spec, disturbances = _with_file(spec, source, base, units)
+    spec, disturbances = with_robot_file(spec, source, base, units)
     prepared = prepare(
         source,
         spec.start,
@@ -263,7 +266,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         resolution=spec.resolution,
         units=units,
     )
-    params = _with_robot(prepared.params, spec.robot)
+    params = with_robot(prepared.params, spec.robot)
     params = params.model_copy(update={"frame": spec.frame})
     try:
         nominal = _feasible(prepared.grid, params, spec, units)
@@ -284,7 +287,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
     if not robot_image.is_file():
         raise TaskError(f"no robot image {str(robot_image)!r}: no such file")
     if spec.robot.image is not None:
-        _check_robot_image(robot_image)
+        check_robot_image(robot_image)
     name = spec.map if bundled else Path(spec.map).stem
     setting = Map2DSetting(
         params,
@@ -297,15 +300,6 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         disturbances,
     )
     return name, setting
-
-
-def robot_text(robot: RobotParams, units: MapUnits) -> str:
-    """The robot's size and speed on a map, and how to change them."""
-    return (
-        f"robot: radius {units.length(robot.radius)}, full speed "
-        f"{units.length(robot.max_wheel_speed)}/s (to change them: --radius, "
-        "--max-speed)"
-    )
 
 
 def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
@@ -321,103 +315,9 @@ def _in_pixels(spec: TaskFile, units: MapUnits) -> TaskFile:
         changes["goal"] = units.pixels(spec.goal)
     if spec.tolerance is not None:
         changes["tolerance"] = units.length_in_pixels(spec.tolerance)
-    names = ("radius", "axle", "max_wheel_speed", "range_max", *_FURTHER_LENGTHS)
-    lengths = {name: getattr(spec.robot, name) for name in names}
-    robot: dict[str, Any] = {
-        name: units.length_in_pixels(length)
-        for name, length in lengths.items()
-        if length is not None
-    }
-    if spec.robot.ray_angles is not None:
-        robot["ray_angles"] = tuple(0.0 - angle for angle in spec.robot.ray_angles)
-    if spec.robot.scanner_offset is not None:
-        ahead, left = map(units.length_in_pixels, spec.robot.scanner_offset)
-        robot["scanner_offset"] = (ahead, 0.0 - left)
-    changes["robot"] = spec.robot.model_copy(update=robot)
+    changes["robot"] = robot_in_pixels(spec.robot, units)
     changes["movers"] = movers_in_pixels(spec.movers, units)
     return spec.model_copy(update=changes)
-
-
-FURTHER = (
-    *("ray_angles", "range_min", "below_min", "scanner_offset", "max_speed"),
-    *("max_turn_rate", "max_acceleration", "max_turn_acceleration"),
-)
-"""Properties of a robot that not every robot has."""
-_FURTHER_LENGTHS = "range_min", "max_speed", "max_acceleration"
-_NAMES = {"robot_radius": "radius", "axle_length": "axle"}
-
-
-def _further(robot: RobotParams) -> dict[str, Any]:
-    """Those of `FURTHER` that a robot has."""
-    own = {name: getattr(robot, name) for name in FURTHER}
-    return {name: value for name, value in own.items() if value is not None}
-
-
-def _written(robot: RobotParams, units: MapUnits) -> dict[str, Any]:
-    """The same for a task file in these units."""
-    own = _further(robot)
-    for name in _FURTHER_LENGTHS:
-        if name in own:
-            own[name] = units.written_length(own[name])
-    up = units.frame is not None
-    if "ray_angles" in own:
-        own["ray_angles"] = [0.0 - a if up else a for a in own["ray_angles"]]
-    if "scanner_offset" in own:
-        ahead, aside = map(units.written_length, own["scanner_offset"])
-        own["scanner_offset"] = [ahead, 0.0 - aside if up else aside]
-    return own
-
-
-def _with_file(
-    spec: TaskFile, source: str, base: Path, units: MapUnits
-) -> tuple[TaskFile, dict[str, Any]]:
-    """The task file, in px, with the robot of its robot file; its disturbances.
-
-    What the task file says of the robot overrides its robot file.
-    """
-    name = spec.robot.file
-    if name is None:
-        return spec, {}
-    file = load_robot(base / name if name.lower().endswith((".yaml", ".yml")) else name)
-    metric = metric_units(source, spec.resolution)
-    # The task is in px by now; a robot in px is refused for one in metres.
-    in_metres = units.frame is not None and file.units == "pixels"
-    own = options_of(file, metric, in_metres, disturbed=False)
-    dt = own.pop("dt")
-    own = {_NAMES.get(key, key): value for key, value in own.items()}
-    typed = spec.robot.model_dump(exclude_none=True)
-    if typed.keys() & set(RAYS):
-        own = {key: value for key, value in own.items() if key not in RAYS}
-    robot = RobotSpec.model_validate({**own, **typed})
-    errors = file.disturbances()
-    if file.units == "metres" and units.frame is None and "pose_noise" in errors:
-        assert metric is not None
-        errors["pose_noise"] = metric.length_in_pixels(errors["pose_noise"])
-    changes = {"robot": robot, "dt": dt if spec.dt is None else spec.dt}
-    return spec.model_copy(update=changes), errors
-
-
-def _check_robot_image(file: Path) -> None:
-    try:
-        width, height = picture_size(read_bytes(file, ROBOT_IMAGE_BYTES), file.name)
-    except MapError as error:
-        raise TaskError(f"the robot image: {error}") from error
-    if not cv2.haveImageReader(str(file)):
-        raise TaskError(f"the robot image {str(file)!r} is not a PNG or JPEG")
-    if width * height > ROBOT_IMAGE_PIXELS:
-        raise TaskError(
-            f"the robot image {str(file)!r} has {width} x {height} pixels; the limit "
-            f"is {ROBOT_IMAGE_PIXELS / 1e6:g} megapixels: scale it down"
-        )
-
-
-def _with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
-    values = spec.model_dump(exclude={"radius", "image", "file"}, exclude_none=True)
-    fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
-    changes = {fields.get(key, key): value for key, value in values.items()}
-    if "ray_angles" in changes:
-        changes["n_rays"] = len(changes["ray_angles"])
-    return params.model_copy(update={"robot": params.robot.changed(**changes)})
 
 
 def _feasible(

@@ -27,7 +27,7 @@ def shortest_path_length(task: Nominal) -> float:
 def least_steps(task: Nominal, length: float | None = None) -> float:
     """OT of a task: its shortest path at full speed, up to the goal's tolerance.
 
-    No drive needs fewer steps; see `tdac_envs.ladder.scores`.
+    No drive needs fewer steps; see `tdac_envs.drive.scores`.
 
     Args:
         task: The task.

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tdac_agent.sandbox import Child, ControllerOverdrawn
 from tdac_envs.drive.env import Observation
-from tdac_envs.ladder.set_file import CpuSpec
+
+if TYPE_CHECKING:
+    from tdac_envs.ladder.set_file import CpuSpec
 
 EVERY = 10
 """Steps between two looks at the CPU time; each takes about 0.1 ms."""

@@ -1,12 +1,10 @@
-"""Policies of an evaluation: controllers, learned policies and four baselines."""
+"""Drivers of the policies that run in the judge's process: learned ones, baselines."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -14,53 +12,17 @@ from tdac_agent.episodes.episode import Driver
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_agent.tasks.units import Point
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.suite.reference import steer
 from tdac_envs.drive.env import Observation
 from tdac_envs.learning.guidance import GuidedRoute, route_to_goal
 from tdac_envs.learning.wrappers import Frame
 
-Kind = Literal[
-    "controller",
-    "sb3",
-    "reference",
-    "random",
-    "go-to-goal",
-    "follow-guidance",
-    "privileged",
-]
 # Duration of a random action, s: jittering wheels would not move the robot.
 HOLD = 1.0
 _ARRIVED = 1e-4  # distance at which a waypoint is reached, body radii
 # Bearing above which it turns on the spot, rad; gain, wheel fraction per rad.
 _ON_THE_SPOT, _GAIN = 0.7, 1.2
-
-
-@dataclass(frozen=True, slots=True)
-class PolicySpec:
-    """Which policy a job lets drive.
-
-    Attributes:
-        kind: Kind of policy.
-        file: File of a controller, or of a policy of stable-baselines3.
-        wrappers: Names of the observation wrappers of such a policy.
-        on_level: Whether a controller reads the files of a task set on a task, too.
-    """
-
-    kind: Kind
-    file: Path | None = None
-    wrappers: tuple[str, ...] = ()
-    on_level: bool = False
-
-    @property
-    def knows(self) -> str:
-        """Label of the information it may use; `sensors` includes pose and goal."""
-        if self.kind == "controller":
-            return "+ map"
-        if self.kind == "follow-guidance" or "guidance" in self.wrappers:
-            return "+ guidance"
-        if self.kind == "reference":
-            return "privileged"
-        return "nothing" if self.kind == "random" else "sensors"
 
 
 class ReferenceDriver:

@@ -9,7 +9,7 @@ from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -19,11 +19,12 @@ from tdac_agent.sandbox import Child, ControllerFault, Limits, SandboxError
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.setting import JudgedEnv
+from tdac_agent.tasks.task import read_task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.confirming import EndingTest
-from tdac_agent.verification.judge.drivers import PolicySpec, driver_of
 from tdac_agent.verification.judge.episode_row import EpisodeRow, driven_row
 from tdac_agent.verification.judge.in_order import in_order
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.set_checks import (
     CHECKED_STEPS,
     CHECKS_FILE,
@@ -31,17 +32,19 @@ from tdac_agent.verification.judge.set_checks import (
     Checks,
     static_checks,
 )
+from tdac_agent.verification.judge.task_world import TaskEpisodes
 from tdac_agent.verification.judge.worlds import (
     FOREVER,
-    SetEpisodes,
     SetWorlds,
-    TaskEpisodes,
     TaskWorld,
     Worlds,
     public_split,
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
+
+if TYPE_CHECKING:
+    from tdac_agent.verification.judge.set_worlds import SetEpisodes
 
 EPISODES_FILE, ENDING_FILE = "episodes.jsonl", "ending.json"
 MOST_ROW_BYTES = 512 << 20
@@ -144,7 +147,17 @@ class EpisodeRun:
         """Opens the worlds, and reads the controller."""
         file = job.policy.file if job.policy.kind == "controller" else None
         source = b"" if file is None else read_file(file, RECORD_BYTES)
-        return cls(job, child_pool, job.worlds.opened(), source)
+        return cls(job, child_pool, opened(job.worlds), source)
+
+
+def opened(worlds: TaskWorld | SetWorlds) -> TaskEpisodes | SetEpisodes:
+    """Opens the worlds of a job."""
+    if isinstance(worlds, TaskWorld):
+        return TaskEpisodes(read_task(worlds.task), worlds)
+    # Task sets need much that a task does not; the server imports it in advance.
+    from tdac_agent.verification.judge.set_worlds import open_set
+
+    return open_set(worlds)
 
 
 def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
@@ -229,13 +242,13 @@ def _checked(run: EpisodeRun) -> tuple[Checks, str]:
     results, job, worlds = static_checks(run.source), run.job, run.worlds
     if len(results) == 1:  # it does not parse
         return Checks(results=results), job.tier
-    assert isinstance(worlds, SetEpisodes)
+    assert not isinstance(worlds, TaskEpisodes)
     # A public world, so that a failure tells nothing of hidden ones.
     own = worlds.worlds
     split = public_split(worlds.tasks) or own.split
     shown = own.model_copy(update={"split": split, "salt_file": None})
     # Here and not in a worker pool, so that its processes share what this loads.
-    drive = partial(_drive, replace(run, worlds=shown.opened()), 0, CHECKED_STEPS)
+    drive = partial(_drive, replace(run, worlds=opened(shown)), 0, CHECKED_STEPS)
     rollout, _, _, tier = drive()
     if rollout.is_retryable:
         rollout, _, _, tier = drive()
@@ -255,7 +268,7 @@ def _work(run: EpisodeRun, number: int, skip: bool) -> EpisodeSummary:
     """Drives or skips an episode, and returns what is kept of it."""
     job = run.job
     if job.policy.kind == "privileged":
-        assert isinstance(run.worlds, SetEpisodes)
+        assert not isinstance(run.worlds, TaskEpisodes)
         row = run.worlds.planned(number)
         return EpisodeSummary(row, UNSANDBOXED, late=False, is_retryable=False)
     driven = _skipped(run, number) if skip else drive_number(run, number)
@@ -291,6 +304,9 @@ def _drive(
         run_policy, record=record, name=name, held_out=False, deadline=math.inf
     )
     if policy.kind != "controller":
+        # Wrappers and guidance, which controllers do without.
+        from tdac_agent.verification.judge.drivers import driver_of
+
         began = time.process_time()
         try:
             rollout = drive(driver_of(policy, record.env, number))

@@ -18,7 +18,7 @@ from tdac_agent.verification.diagnosis.gap import Gap
 from tdac_agent.verification.diagnosis.measures import spectral_arc_length
 from tdac_agent.verification.diagnosis.nearest import gap_of
 from tdac_agent.verification.diagnosis.report import Cause
-from tdac_envs.ladder.scores import barn_score, path_score, time_score
+from tdac_envs.drive.scores import barn_score, path_score, time_score
 
 _DIGITS = 6
 _FAILURE = {"cause", "step", "x", "y", "side", "text"}

@@ -13,10 +13,14 @@ from tdac_agent.tasks.setting import JudgedEnv, Nominal
 from tdac_agent.tasks.task import progress_steps
 from tdac_agent.tasks.task_file import ProgressSpec
 from tdac_agent.tasks.units import Units
-from tdac_agent.verification.judge.judge import FIRST_WORLD
+from tdac_agent.verification.judge.level import FIRST_WORLD, Level
 from tdac_agent.verification.judge.set_files import level_params
-from tdac_agent.verification.judge.suite_episode import Level
-from tdac_agent.verification.judge.worlds import SetEpisodes, SetWorlds, shown_units
+from tdac_agent.verification.judge.set_worlds import (
+    SetEpisodes,
+    open_set,
+    shown_units,
+)
+from tdac_agent.verification.judge.worlds import SetWorlds
 from tdac_envs.drive.env import Observation
 from tdac_envs.ladder.set_file import SetFile
 
@@ -50,8 +54,8 @@ class FirstWorld:
 
     @cached_property
     def _worlds(self) -> SetEpisodes:
-        worlds = SetWorlds(set_file=self.level.set_file, split=self.level.split)
-        return worlds.opened()
+        level = self.level
+        return open_set(SetWorlds(set_file=level.set_file, split=level.split))
 
     @property
     def spec(self) -> SetFile:

@@ -23,10 +23,10 @@ from tdac_agent.sandbox import (
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.blame import faults_of_judge
 from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.level import FIRST_WORLD, Level
 from tdac_agent.verification.judge.remote import Unit
 from tdac_agent.verification.judge.suite_episode import (
     EpisodeRequest,
-    Level,
     SuitePool,
     SuiteTask,
     VerificationSettings,
@@ -45,8 +45,6 @@ NAMES = ("nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1)))
 # Number of episodes in a suite: nominal, jittered, and three of `run_episode`.
 EPISODES = 1 + JITTERS + 3
 WALL_SECONDS = 600.0
-FIRST_WORLD = 0
-"""Number of the world of a task set in which suites drive."""
 
 Key = tuple[str, int | None, str]
 NOMINAL: Key = ("nominal", None, "policy")

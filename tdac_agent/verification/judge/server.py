@@ -31,7 +31,7 @@ import numpy as np
 from tdac_agent.episodes.episode import Record, run_policy
 from tdac_agent.sandbox.inner.decode import decode
 from tdac_agent.sandbox.inner.encode import encode
-from tdac_agent.tasks.registry import DEFAULT, environment, own_environments
+from tdac_agent.tasks.registry import DEFAULT, OWN, environment
 from tdac_agent.tasks.task import read_task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.jobs import SUITE, Job
@@ -51,6 +51,11 @@ LOADED_LATE = (
     "tdac_agent.verification.judge.findings",
     "tdac_agent.verification.judge.episode_job",
 )
+# The same, unless the judge is for a task: its controllers need neither.
+LOADED_FOR_ALL = (
+    "tdac_agent.verification.judge.drivers",
+    "tdac_agent.verification.judge.set_worlds",
+)
 
 
 def serve(child_pool: ChildPool | None = None, known: Path | None = None) -> None:
@@ -62,7 +67,7 @@ def serve(child_pool: ChildPool | None = None, known: Path | None = None) -> Non
     Args:
         child_pool: Child pool of the first worker, whose job is due at once. By default
             the server makes one, and first loads everything that a job needs.
-        known: Folder of a task to read in advance; only used without `child_pool`.
+        known: Folder of the task of most jobs; only used without `child_pool`.
     """
     # OpenCV's threads would not survive the fork.
     cv2.setNumThreads(1)
@@ -70,9 +75,7 @@ def serve(child_pool: ChildPool | None = None, known: Path | None = None) -> Non
     np.set_printoptions(threshold=16, edgeitems=1)
     if child_pool is None:
         child_pool = ChildPool()
-        _warm_up()
-        if known is not None:
-            read_task(known)
+        _warm_up(known)
         gc.collect()
     # Keeps the memory of existing objects shared with the workers.
     gc.freeze()
@@ -175,12 +178,18 @@ def _read_line(descriptor: int) -> str:
     return line[:-1].decode()
 
 
-def _warm_up() -> None:
-    """Loads compiled code, and everything that pytest needs for a suite."""
-    for name in LOADED_LATE:
+def _warm_up(known: Path | None) -> None:
+    """Loads compiled code, and everything that pytest needs for a suite.
+
+    Args:
+        known: Folder of the task of most jobs, if there is one; what others need is
+            left out.
+    """
+    for name in LOADED_LATE if known else LOADED_LATE + LOADED_FOR_ALL:
         importlib.import_module(name)
+    used = [read_task(known).setting.nominal.env_id] if known else [*OWN]
     # Without compiling: a job would wait for an environment that it may not use.
-    for one in own_environments():
+    for one in (environment(env_id) for env_id in used if env_id in OWN):
         if has_code(one.kernels):
             _warm_up_episode(one.small_env())
     _run_empty_suite()

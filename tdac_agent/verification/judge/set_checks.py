@@ -8,8 +8,9 @@ from functools import partial
 
 from pydantic import ConfigDict
 
+from tdac_agent.storage.plain import plain
 from tdac_agent.storage.printable_record import PrintableRecord
-from tdac_agent.verification.diagnosis.report import MAX_MESSAGE
+from tdac_agent.verification.diagnosis.report import MAX_MESSAGE, Report
 from tdac_agent.verification.judge.time_limit import CPU, time_limit
 from tdac_agent.verification.suite.contract import (
     ParseError,
@@ -26,6 +27,8 @@ SECONDS = 60.0
 """CPU time of the static tests together; most take milliseconds."""
 PARSES, STABLE = "test_source_parses", f"test_short_rollout_is_stable[{CHECKED_STEPS}]"
 """Tests have the names that they have in `suite/every_task.py`."""
+STATIC, CONTRACT = "test_static.py", "test_end_to_end.py"
+"""Files that have these tests in the suite of a task."""
 
 
 class Checks(PrintableRecord):
@@ -46,6 +49,29 @@ class Checks(PrintableRecord):
         """`passed` or `failed` for each test."""
         results = self.results.items()
         return {name: "passed" if why is None else "failed" for name, why in results}
+
+
+def checks_of(report: Report) -> Checks:
+    """Why each test of a report failed, or None; with what happened in its episode."""
+    found: dict[str, str | None] = {_name_of(test): None for test in report.tests}
+    for failure in report.failures:
+        text, diagnosis = failure.message, failure.diagnosis
+        if diagnosis is not None:
+            quoted = plain(text) in diagnosis.text
+            text = diagnosis.text if quoted else f"{text}; {diagnosis.text}"
+        found[_name_of(failure.test)] = text
+    return Checks(results=found)
+
+
+def _name_of(test: str) -> str:
+    """The name of a test in reports on episodes: that of an own one with its file."""
+    file, _, name = test.partition("::")
+    return name if file in (STATIC, CONTRACT) else test
+
+
+def id_of(name: str) -> str:
+    """The name of a test, as in the reports of suites."""
+    return f"{CONTRACT if name == STABLE else STATIC}::{name}"
 
 
 def static_checks(source: bytes) -> dict[str, str | None]:

@@ -6,7 +6,7 @@ import functools
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from tdac_agent.episodes.episode import Driver, Record, run_own_loop, run_policy
 from tdac_agent.episodes.trajectory import Outcome, Rollout
@@ -20,30 +20,17 @@ from tdac_agent.sandbox import (
 from tdac_agent.tasks.task import Task, read_task
 from tdac_agent.verification.judge.blame import faults_of_judge
 from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.cpu_budget import Budgeted
+from tdac_agent.verification.judge.level import Level
 from tdac_agent.verification.judge.worker_pool import WorkerPool
 from tdac_envs.drive.task import Pose
 
 if TYPE_CHECKING:
     from tdac_agent.verification.judge.first_world import FirstWorld
-    from tdac_envs.ladder.set_file import CpuSpec
 
 SuiteTask: TypeAlias = "Task | FirstWorld"
 """Where a suite drives: on a task, or in the first world of a task set."""
 SHOWN_JITTERS = 2
-
-
-class Level(NamedTuple):
-    """A task set whose first world is there instead of a task.
-
-    Attributes:
-        set_file: Its set file.
-        split: Split of the world.
-        cpu: CPU budget of a controller.
-    """
-
-    set_file: Path
-    split: str
-    cpu: CpuSpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +115,7 @@ def task_of(workdir: Path, level: Level | None) -> SuiteTask:
     """The task in a folder, or the first world of a task set."""
     if level is None:
         return read_task(workdir)
-    # Imported late: tasks do without it.
+    # Task sets need much that a task does not.
     from tdac_agent.verification.judge.first_world import FirstWorld
 
     return FirstWorld(level)
@@ -191,8 +178,6 @@ def _loaded(child: Child, settings: VerificationSettings) -> Driver:
     if settings.level is None:
         load_controller(child, settings)
         return child
-    from tdac_agent.verification.judge.cpu_budget import Budgeted  # as in `task_of`
-
     child.copy_files(settings.workdir, settings.source)
     driver = Budgeted(child, settings.level.cpu)
     driver.load()

@@ -11,7 +11,8 @@ from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.jobs import Job
 from tdac_agent.verification.judge.judge import Judge
-from tdac_agent.verification.judge.suite_episode import Level, SuitePool, task_of
+from tdac_agent.verification.judge.level import Level
+from tdac_agent.verification.judge.suite_episode import SuitePool, task_of
 
 
 def judge_suite(

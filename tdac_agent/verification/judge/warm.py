@@ -48,7 +48,8 @@ class WarmJudge:
         child_pool: Pool that the caller has started and will end. The server is then
             forked from this process, which should have a single thread, and shares its
             imports. By default the server is a new interpreter.
-        task: Task of most jobs, which a new interpreter reads in advance.
+        task: Task of most jobs, for which a new interpreter prepares; for others, it
+            loads later what they need.
         turn: File that is locked during a job, so that judges that share it run one job
             at a time.
         watch: Called repeatedly during each job; an exception from it ends the job.

@@ -11,8 +11,8 @@ from hypothesis.extra.numpy import arrays
 
 from tdac_agent.episodes.episode import Record, late, run_policy
 from tdac_agent.sandbox import ControllerFault
+from tdac_envs.drive.task import AT_START
 from tdac_envs.ladder.env import make
-from tdac_envs.ladder.observed import AT_START
 from tdac_envs.map2d.env import Map2DEnv
 
 TIMES = st.floats(0.0, 1e4)

@@ -33,7 +33,7 @@ from tdac_agent.evaluation.overlay import COLOURS
 from tdac_agent.evaluation.policies import Entrant, entrants_of
 from tdac_agent.evaluation.replay import drive_episode
 from tdac_agent.metrics.exact import sign_test
-from tdac_agent.problems.episodes import Part
+from tdac_agent.problems.part import Part
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.storage.locks import LOCK_FILE, hold
@@ -41,7 +41,7 @@ from tdac_agent.verification.diagnosis.measures import (
     shortest_path_length,
     spectral_arc_length,
 )
-from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.store import ROWS_FILE, UNFINISHED
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import MOVER
@@ -158,7 +158,8 @@ def test_the_frame_is_tidy(ours):
     told = row(ours, "reference")
     assert reference["success"].sum() == told.successes
     assert reference["path_ratio"].median() == pytest.approx(told.path_ratio)
-    assert reference["clearance_min"].min() == told.clearance_min
+    gaps = [each["gap"] for each in reference["smallest_gap"]]
+    assert min(gaps) == told.clearance_min
     assert set(ours.timing_frame()["policy"]) == set(frame["policy"])
 
 

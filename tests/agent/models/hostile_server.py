@@ -7,6 +7,7 @@ kind of the fault, and what its message says.
 import gzip
 import json
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from fault_server import ANTHROPIC, begins, events, raw
@@ -42,20 +43,30 @@ def endless(start, piece, status=200, content="text/event-stream", **headers):
     return lambda vendor: play
 
 
+@cache
+def packed():
+    """Two hundred megabytes as two hundred kilobytes."""
+    return gzip.compress(b'{"error": "' + b"0" * 200_000_000 + b'"}')
+
+
 def bomb(status):
-    """Two hundred megabytes that are sent as two hundred kilobytes."""
-    packed = gzip.compress(b'{"error": "' + b"0" * 200_000_000 + b'"}')
+    """An answer that is `packed`."""
 
-    def play(line):
-        line.start(
-            status,
-            "application/json" if status >= 400 else "text/event-stream",
-            content_encoding="gzip",
-            content_length=str(len(packed)),
-        )
-        pour(line, "", packed, most=1)
+    def attack(vendor):
+        content = packed()
 
-    return lambda vendor: play
+        def play(line):
+            line.start(
+                status,
+                "application/json" if status >= 400 else "text/event-stream",
+                content_encoding="gzip",
+                content_length=str(len(content)),
+            )
+            pour(line, "", content, most=1)
+
+        return play
+
+    return attack
 
 
 def reports(tokens):

@@ -35,9 +35,6 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.learning.wrappers import wrap
 from tdac_envs.learning.wrapping import FOR_RL
 
-pytest.importorskip("stable_baselines3")
-pytest.importorskip("torch")
-
 WRAPPERS = ("goal-relative", "guidance", "flatten")
 ENVS = ("TDAC-Map2D-v0", "TDAC-EPuck-v0")
 SMALL = {

@@ -20,9 +20,6 @@ from tdac_agent.training.train import train
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 
-pytest.importorskip("stable_baselines3")
-pytest.importorskip("torch")
-
 SMALL = {"n_envs": 8, "n_steps": 16, "batch_size": 64, "n_epochs": 2}
 LOST = {
     "observed": ["odometry", "goal", "wheel_speeds", "ranges"],

@@ -14,9 +14,9 @@ from gymnasium.utils.env_checker import check_env
 
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
+from tdac_envs.core.salt import read_salt
 from tdac_envs.ladder.pool import TrainingPool, pool_folder
 from tdac_envs.ladder.set_file import set_names
-from tdac_envs.ladder.source import read_salt
 
 KEYS = {
     "known": {"pose", "goal", "wheel_speeds", "ranges"},

@@ -10,18 +10,16 @@ import pytest
 from tdac_envs.core.errors import TaskError
 from tdac_envs.map2d.env import Map2DEnv
 
-sb3 = pytest.importorskip("stable_baselines3")
-from stable_baselines3.common.evaluation import evaluate_policy  # noqa: E402
-from stable_baselines3.common.vec_env import (  # noqa: E402
-    DummyVecEnv,
-    VecMonitor,
-    VecVideoRecorder,
-)
 
-from tdac_envs.learning.sb3 import SB3VecEnv  # noqa: E402
+@pytest.fixture(autouse=True)
+def sb3():
+    """Stable-Baselines3, which collecting these tests does not load."""
+    return pytest.importorskip("stable_baselines3")
 
 
 def batch(count, **options):
+    from tdac_envs.learning.sb3 import SB3VecEnv
+
     return SB3VecEnv(
         gym.make_vec("TDAC-Map2D-v0", count, autoreset_mode="SameStep", **options)
     )
@@ -29,6 +27,8 @@ def batch(count, **options):
 
 def test_it_does_what_a_dummy_vector_does():
     """Equal seeds give equal observations, rewards, ends and last infos."""
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
     options = {"variation": "jitter", "range_noise": 0.1, "horizon": 30}
     one = DummyVecEnv([lambda: Map2DEnv(**options)] * 4)
     two = batch(4, **options)
@@ -76,8 +76,11 @@ def test_each_robot_may_have_a_seed_of_its_own():
     envs.close()
 
 
-def test_a_policy_is_trained_and_evaluated_on_it():
+def test_a_policy_is_trained_and_evaluated_on_it(sb3):
     """Episodes are counted by the monitor, with their success."""
+    from stable_baselines3.common.evaluation import evaluate_policy
+    from stable_baselines3.common.vec_env import VecMonitor
+
     torch = pytest.importorskip("torch")
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
@@ -103,11 +106,15 @@ def test_a_policy_is_trained_and_evaluated_on_it():
     ],
 )
 def test_other_environments_are_refused(made, message):
+    from tdac_envs.learning.sb3 import SB3VecEnv
+
     with pytest.raises(TaskError, match=message):
         SB3VecEnv(made())
 
 
 def test_robots_are_no_objects_of_their_own():
+    from stable_baselines3.common.vec_env import VecMonitor
+
     envs = batch(2)
     assert envs.get_attr("num_envs", [0]) == [2]
     assert envs.env_is_wrapped(VecMonitor) == [False, False]
@@ -130,6 +137,8 @@ def test_importing_the_environments_imports_neither_sb3_nor_torch():
 @pytest.mark.filterwarnings("default")
 def test_its_videos_show_all_robots(tmp_path):
     """In real time, by Stable-Baselines3's own recorder."""
+    from stable_baselines3.common.vec_env import VecVideoRecorder
+
     pytest.importorskip("moviepy")
     envs = batch(4, render_mode="rgb_array")
     envs = VecVideoRecorder(envs, str(tmp_path), lambda k: k == 0, video_length=5)
@@ -144,6 +153,10 @@ def test_its_videos_show_all_robots(tmp_path):
 
 def test_what_a_reset_says_of_a_world_is_plain():
     """Nested infos become nested dicts of plain numbers."""
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    from tdac_envs.learning.sb3 import SB3VecEnv
+
     options = {"level": "unknown", "split": "dev"}
     one = DummyVecEnv([lambda: gym.make("TDAC-Ladder-v0", **options).unwrapped] * 2)
     two = SB3VecEnv(

@@ -10,9 +10,11 @@ import json
 
 import pytest
 
-from tdac_agent.problems.episodes import Part, episodes_of
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part
 from tdac_agent.verification.judge.child_pool import ChildPool
-from tdac_agent.verification.judge.drivers import PolicySpec
+from tdac_agent.verification.judge.episode_job import opened
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_envs import load_set
 from tdac_envs.ladder.set_file import set_names
 
@@ -89,7 +91,7 @@ def watched(name, folder, child_pool, index):
     (folder / "a.salt").write_bytes(SALT)
     episodes = episodes_of(tasks)
     part = Part(WORLDS, "hidden", folder / "a.salt")
-    worlds = episodes.worlds(part, folder, PolicySpec("controller")).opened()
+    worlds = opened(episodes.worlds(part, folder, PolicySpec("controller")))
     child = child_pool.take("auto", episodes.limits)
     with contextlib.closing(child):
         worlds.supply(child, index, SPY)

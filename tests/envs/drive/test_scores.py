@@ -2,7 +2,7 @@
 
 import pytest
 
-from tdac_envs.ladder.scores import barn_score, path_score, time_score
+from tdac_envs.drive.scores import barn_score, path_score, time_score
 
 
 @pytest.mark.parametrize("score", [time_score, path_score, barn_score])
