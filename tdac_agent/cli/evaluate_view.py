@@ -20,6 +20,7 @@ from tdac_agent.evaluation.evaluation_report import (
 )
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
+from tdac_agent.verification.diagnosis.gap import TOO_CLOSE
 
 NONE = "–"
 # Least widths of long policy names, so that a table fits into 80 columns.
@@ -110,10 +111,8 @@ def _table(
         table.add_column(name, justify="right", no_wrap=True)
     for row in rows:
         timing = timings[row.task, row.policy]
-        gaps = [
-            units.scale * (gap or 0.0)
-            for gap in (row.clearance_min, row.clearance_mean)
-        ]
+        least = row.smallest_gap if row.smallest_gap is not None else row.clearance_min
+        gaps = [units.scale * (gap or 0.0) for gap in (least, row.clearance_mean)]
         assert row.interval is not None
         colour = "green" if row.rate == 1.0 else "red" if row.rate == 0.0 else "yellow"
         table.add_row(
@@ -137,6 +136,9 @@ def _notes(rows: Sequence[PolicyRow]) -> list[str]:
     for row in rows:
         if row.note is not None:
             lines.append(f"{row.policy}: {row.note}")
+        if row.too_close:
+            share = f"{row.too_close} of {row.successes} successes"
+            lines.append(f"{row.policy}: {share} came {TOO_CLOSE} to obstacles")
         for reason, count in row.reasons.items():
             lines.append(f"{row.policy}, {count} of {row.episodes}: {reason}")
     return lines

@@ -75,8 +75,14 @@ class PolicyRow(StrictRecord):
     smoothness: float | None = Field(
         description="Median over successes: spectral arc length of the speed (SPARC)."
     )
+    smallest_gap: float | None = Field(
+        None, description="Smallest gap between body and obstacles; 0 if touched."
+    )
+    too_close: int = Field(
+        0, description="Successes with a smaller gap than the required one."
+    )
     clearance_min: float | None = Field(
-        description="Smallest gap to the body; 0 if touched."
+        description="Smallest gap at the ends of steps, on the lattice of pixels."
     )
     clearance_mean: float | None = Field(
         description="Mean over the episodes' mean gaps."
@@ -180,6 +186,7 @@ class Evaluation(StrictRecord):
         for result in self.results:
             own = about[result.task]
             for number, episode in enumerate(result.episodes):
+                gap = episode.smallest_gap
                 yield {
                     "task": result.task,
                     "split": own.split,
@@ -188,7 +195,9 @@ class Evaluation(StrictRecord):
                     "unit": own.unit,
                     "episode": number,
                     "success": episode.success,
-                    **episode.model_dump(exclude={"cpu_seconds"}),
+                    **episode.model_dump(exclude={"cpu_seconds", "smallest_gap"}),
+                    "smallest_gap": gap and gap.gap,
+                    "too_close": gap and episode.too_close,
                 }
 
     def timing_frame(self) -> pd.DataFrame:
@@ -204,7 +213,8 @@ def row_of(result: Result) -> PolicyRow:
     successes = [episode for episode in episodes if episode.success]
     reasons = Counter(e.error for e in episodes if e.error is not None)
     spl = sum(1.0 / max(e.path_ratio or 1.0, 1.0) for e in successes)
-    gaps = [each.least_gap for each in episodes if each.least_gap is not None]
+    gaps = [each.clearance_min for each in episodes if each.clearance_min is not None]
+    exact = [each.smallest_gap.gap for each in episodes if each.smallest_gap]
     means = [e.clearance_mean for e in episodes if e.clearance_mean is not None]
     return PolicyRow(
         task=result.task,
@@ -223,6 +233,8 @@ def row_of(result: Result) -> PolicyRow:
         path_ratio=_median(e.path_ratio for e in successes),
         spl=round(spl / max(1, report.count), _DIGITS),
         smoothness=_median(e.smoothness for e in successes),
+        smallest_gap=min(exact, default=None),
+        too_close=report.too_close,
         clearance_min=min(gaps, default=None),
         clearance_mean=round(fmean(means), _DIGITS) if means else None,
         reasons=dict(reasons.most_common(MOST_REASONS)),

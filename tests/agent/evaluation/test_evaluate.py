@@ -158,8 +158,9 @@ def test_the_frame_is_tidy(ours):
     told = row(ours, "reference")
     assert reference["success"].sum() == told.successes
     assert reference["path_ratio"].median() == pytest.approx(told.path_ratio)
-    gaps = [each["gap"] for each in reference["smallest_gap"]]
-    assert min(gaps) == told.clearance_min
+    assert reference["clearance_min"].min() == told.clearance_min
+    assert reference["smallest_gap"].min() == told.smallest_gap
+    assert reference["too_close"].sum() == told.too_close
     assert set(ours.timing_frame()["policy"]) == set(frame["policy"])
 
 
