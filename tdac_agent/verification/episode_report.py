@@ -212,7 +212,7 @@ class EpisodeReport(StrictRecord):
         """Failures by time-out, which a busy machine may cause."""
         return self.causes.get("time-out", 0)
 
-    def gap_lines(self, units: Units) -> list[str]:
+    def gap_lines(self, units: Units, closest: str = "") -> list[str]:
         """What the episodes say of their gaps; nothing if none is on record.
 
         The place is told on a task alone: worlds of a set have other coordinates than
@@ -220,13 +220,15 @@ class EpisodeReport(StrictRecord):
 
         Args:
             units: Units of the texts.
+            closest: Name of the closest episode; by default its seed or its world.
         """
         gap, on_set = self.smallest_gap, self.provenance.split is not None
         if gap is None:
             return []
         text = f"smallest gap: {gap_text(gap, units, placed=not on_set)}"
         if self.closest is not None:
-            text += f", {'world' if on_set else 'seed'} {self.closest}"
+            number = f"{'world' if on_set else 'seed'} {self.closest}"
+            text += f", {closest or number}"
         if not self.too_close:
             return [text]
         what = f"{self.too_close} of the successes came {TOO_CLOSE} to obstacles"

@@ -25,7 +25,7 @@ def _drive() -> Any:
     return epuck
 
 
-ROBOT = CodePart(_drive, "tdac_envs.epuck", "infrared.sees", 11.0)
+ROBOT = CodePart(_drive, "tdac_envs.epuck", "infrared.sees", 13.0)
 
 
 def use_kernels() -> None:

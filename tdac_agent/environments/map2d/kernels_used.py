@@ -71,8 +71,8 @@ def _plan_among_movers() -> None:
     drive_by_orca(env.task, Disturbances(), np.random.default_rng(0))
 
 
-ROBOT = CodePart(_drive, "tdac_envs.map2d", "rays.sees", 7.0)
-MOVERS = CodePart(_drive_among_movers, "tdac_envs.map2d", "among.drive_among", 16.0)
+ROBOT = CodePart(_drive, "tdac_envs.map2d", "rays.sees", 9.0)
+MOVERS = CodePart(_drive_among_movers, "tdac_envs.map2d", "among.drive_among", 18.0)
 WORLDS = CodePart(_make_worlds, "tdac_envs.ladder", "dead_ends._look", 6.0)
 PLANNERS = CodePart(_plan_among_movers, "tdac_envs.ladder", "orca_driver._choose", 8.0)
 

@@ -73,7 +73,9 @@ class Robustness:
                 low, high = report.interval.low, report.interval.high
                 text += f" (95 % interval {low:.3f} to {high:.3f})"
             ui.label(f"{text}.")
-            for line in report.gap_lines(UNITS[report.provenance.unit]):
+            units, first = UNITS[report.provenance.unit], report.provenance.first
+            name = f"episode {(report.closest or first) - first + 1}"
+            for line in report.gap_lines(units, name):
                 ui.label(f"{line}.")
             with ui.row().classes("items-center gap-2"):
                 ui.label("Failures first, then the slowest; click one to watch it:")

@@ -60,8 +60,11 @@ def gap_text(gap: Gap, units: Units, *, placed: bool = True) -> str:
         article = "" if gap.thing.startswith("mover ") else "the "
         text += f" to {article}{gap.thing}"
     if placed and gap.x is not None and gap.y is not None:
-        text += f" at {units.place_text(gap.x, gap.y)}"
-    return text if gap.step is None else f"{text} in step {gap.step}"
+        (place,) = units.on_screen([(gap.x, gap.y)]).tolist()
+        text += f" at {units.point(*place)}"
+    if gap.step is None:
+        return text
+    return f"{text} in step {gap.step}" if gap.step else f"{text} at the start"
 
 
 def too_close_text(gap: Gap, units: Units) -> str:

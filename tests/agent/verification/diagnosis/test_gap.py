@@ -1,13 +1,16 @@
 """Promises of the smallest gap in records, reports and texts."""
 
 from dataclasses import replace
+from io import StringIO
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from driving import always, drive, judged
+from rich.console import Console
 
 from tdac_agent.cli.junit import write_set_junit
+from tdac_agent.cli.report_view import episode_table
 from tdac_agent.tasks.units import METRES, PIXELS
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.gap import (
@@ -17,7 +20,7 @@ from tdac_agent.verification.diagnosis.gap import (
     too_close_text,
 )
 from tdac_agent.verification.diagnosis.nearest import gap_of
-from tdac_agent.verification.diagnosis.report import Episode
+from tdac_agent.verification.diagnosis.report import Episode, Report
 from tdac_agent.verification.episode_report import EpisodeProvenance, summarise
 from tdac_agent.verification.judge.episode_row import EpisodeRow, driven_row
 from tdac_envs.grid.map_units import MapFrame, MapUnits
@@ -107,15 +110,45 @@ def test_records_of_before_have_no_gap_and_load():
     assert row.smallest_gap is None
     assert row.gap_left == 2.5
     assert not row.too_close
-    figures = dict.fromkeys(
-        ("d0", "d_min", "d0_euclidean", "d_min_euclidean", "call_ms_mean"), 0.0
+    assert not episode_in_report().too_close
+
+
+def episode_in_report(**changes):
+    """The figures of an episode that reached the goal."""
+    numbers = ("d0", "d_min", "d0_euclidean", "d_min_euclidean", "call_ms_mean")
+    flags = ("progress_passed", "progress_passed_euclidean")
+    fields = {
+        "name": "nominal",
+        "held_out": False,
+        "outcome": "reached",
+        "steps": 3,
+        "collisions": 0,
+        "call_ms_p99": 0.0,
+        **dict.fromkeys(numbers, 0.0),
+        **dict.fromkeys(flags, True),
+    }
+    return Episode(**fields | changes)
+
+
+def test_the_report_of_a_suite_names_the_closest_episode():
+    """In its properties, and in its table on the terminal."""
+    near, far = gap_in(0.125, step=4, x=41.0, y=20.0), gap_in(3.0)
+    episodes = (
+        episode_in_report(smallest_gap=far),
+        episode_in_report(name="jitter 1", smallest_gap=near),
+        episode_in_report(name="jitter 2"),
     )
-    flags = dict.fromkeys(("progress_passed", "progress_passed_euclidean"), True)
-    episode = Episode(
-        name="nominal", held_out=False, outcome="reached", steps=3, collisions=0,
-        call_ms_p99=0.0, **figures, **flags,
-    )  # fmt: skip
-    assert not episode.too_close
+    report = Report.model_construct(episodes=episodes)
+    assert report.closest == episodes[1]
+    assert report.smallest_gap == near
+    assert report.too_close == (episodes[1],)
+    console = Console(file=StringIO(), width=100)
+    console.print(episode_table(report, PIXELS))
+    nominal, first, second = console.file.getvalue().splitlines()[-4:-1]
+    assert "3 px" in nominal
+    assert "0.125 px" in first
+    assert "–" in second
+    assert Report.model_construct(episodes=()).smallest_gap is None
 
 
 def provenance(**changes):
@@ -148,7 +181,7 @@ def test_a_report_has_the_smallest_gap_of_its_episodes():
     assert report.too_close == 1
     first, second = report.gap_lines(PIXELS)
     assert first == (
-        "smallest gap: 0.125 px (2.5 % of the radius) to the wall at (41, 20) in "
+        "smallest gap: 0.125 px (2.5 % of the radius) to the wall at (41.0, 20.0) in "
         "step 4, seed 8"
     )
     assert second == "1 of the successes came too close to obstacles: less than 0.25 px"
@@ -179,6 +212,6 @@ def test_gaps_read_in_the_units_of_the_user():
     assert gap_figure(10.0, units) == "0.5 m"
     gap = gap_in(0.125, step=4, x=41.0, y=20.0, heading=0.0, thing="mover 2")
     assert gap_text(gap, PIXELS) == (
-        "0.125 px (2.5 % of the radius) to mover 2 at (41, 20) in step 4"
+        "0.125 px (2.5 % of the radius) to mover 2 at (41.0, 20.0) in step 4"
     )
     assert too_close_text(gap, PIXELS).endswith("; required 0.25 px")
