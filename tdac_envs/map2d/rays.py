@@ -149,7 +149,7 @@ def cast_rays(
     range_max: float,
     out: NDArray[np.float32],
 ) -> None:
-    """Fills `out` with the ranges of all rays; in their order.
+    """Fills `out` with the ranges of all rays, in their order.
 
     Args:
         leaps: From `leaps_of`.

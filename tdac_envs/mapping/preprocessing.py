@@ -164,7 +164,8 @@ def _radius(
         size = METRIC_RADIUS / resolution
         which = f"in px (--radius {size:g}, robot_radius={size:g}: {METRIC_RADIUS} m)"
     else:
-        which = f"in metres (--radius {METRIC_RADIUS}, robot_radius={METRIC_RADIUS})"
+        size = METRIC_RADIUS
+        which = f"in metres (--radius {size:g}, robot_radius={size:g})"
     raise TaskError(
         f"{source.name}: the map has a resolution: give the body's radius {which} or a "
         "robot (--robot NAME)"

@@ -120,10 +120,12 @@ def test_the_figures_are_those_of_the_task(prompt, small_task):
     nominal = small_task.nominal
     for figure in (nominal.horizon, small_task.progress_steps):
         assert f"within {figure} steps" in prompt
-    assert f"{nominal.goal_tolerance:.1f} px of the" in prompt
+    assert f"{nominal.goal_tolerance:.1f} px\n  (" in prompt
+    assert f"({nominal.goal_tolerance / 6.0:.1f} radii) of the goal" in prompt
     assert "disc of\n  6 px radius" in prompt
-    robot = small_task.params.robot.model_dump_json(indent=2)
+    robot = small_task.params.robot.model_dump_json(indent=2).removesuffix("\n}")
     assert robot.replace("\n", "\n  ") in prompt
+    assert '"ray_angles": [' in prompt
 
 
 def test_nothing_is_left_undefined(prompt, epuck_prompt):
@@ -159,7 +161,7 @@ def test_the_e_pucks_figures_are_those_of_the_task(tmp_path):
     assert "`TIME_STEP` (16, in ms)" in text
     assert "`MAX_WHEEL_SPEED`\n   (6.28, rad/s)" in text
     assert "`GOAL_TOLERANCE` (0.0125, m)" in text
-    assert "within 12.5 mm of the goal" in text
+    assert "within 12.5 mm\n  (0.3 radii) of the goal" in text
     assert "step of\n   0.016 s. " in text
     assert "`policy` 16 ms on average" in text
     for figure in (4321, task.progress_steps):

@@ -156,8 +156,8 @@ def hits(ranges, env):
     """The expected ranges: the first of wall and disc along each ray."""
     cells = env.task.terrain.grid.cells
     x, y, heading = env.pose()
-    fov = math.radians(env.task.robot.field_of_view_deg)
-    turns = np.linspace(-fov / 2, fov / 2, len(ranges))
+    assert env.task.robot.field_of_view_deg == 360.0
+    turns = -math.pi + math.tau / len(ranges) * np.arange(len(ranges))
     most = env.task.robot.range_max
     for turn in turns:
         angle = heading + turn
