@@ -149,7 +149,7 @@ def test_renamed_motors(tmp_path):
     commands += [(name, "velocity", speed) for name, speed in speeds]
     server.step((320, commands, None))
     x, _, heading = server.log.poses[-1]
-    assert heading == pytest.approx(2.0 * 0.02 / 0.052 * 0.32, rel=1e-5)
+    assert heading == pytest.approx(2.0 * 0.02 / 0.057 * 0.32, rel=1e-5)
     assert x > 0.01
 
 
