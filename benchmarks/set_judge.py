@@ -24,7 +24,7 @@ from typing import Any
 from benchmarks.timing import Bench, Effort, Row
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify_episodes import verify_episodes
-from tdac_envs.ladder.set_file import HorizonSpec
+from tdac_envs.ladder.set_limits import HorizonSpec
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 
 IDLE = "def policy(obs):\n    return 0.3, -0.3\n"

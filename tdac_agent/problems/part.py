@@ -13,7 +13,7 @@ from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.worlds import SetWorlds, TaskWorld
 
 if TYPE_CHECKING:
-    from tdac_envs.ladder.set_file import CpuSpec
+    from tdac_envs.ladder.set_limits import CpuSpec
 
 
 @dataclass(frozen=True, slots=True)

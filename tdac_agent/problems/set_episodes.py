@@ -20,7 +20,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.salt import read_salt
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.ladder import orca_driver, space_time
-from tdac_envs.ladder.set_file import CpuSpec
+from tdac_envs.ladder.set_limits import CpuSpec
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 

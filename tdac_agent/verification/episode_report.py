@@ -34,7 +34,7 @@ from tdac_agent.verification.suite.contract import (
 )
 
 if TYPE_CHECKING:
-    from tdac_envs.ladder.set_file import CpuSpec
+    from tdac_envs.ladder.set_limits import CpuSpec
 
 LEAST_GROUP = 5
 """Least number of hidden worlds of a generator whose scores reveal no single world."""

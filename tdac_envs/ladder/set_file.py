@@ -15,7 +15,6 @@ from pydantic import (
     model_validator,
 )
 
-from tdac_envs.core.arguments import MOST_STEPS
 from tdac_envs.core.errors import TaskError, first_problem, hint, one_line_reason
 from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
@@ -29,6 +28,7 @@ from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.plate_worlds import PlatesSpec
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_disturbances import ONLY_ON_MAPS, DisturbanceSpec
+from tdac_envs.ladder.set_limits import AdmissionSpec, CpuSpec, HorizonSpec
 from tdac_envs.ladder.set_robot import with_named_robot
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
@@ -63,51 +63,7 @@ def _distinct(keys: tuple[str, ...]) -> tuple[str, ...]:
     return keys
 
 
-class HorizonSpec(StrictModel):
-    """The horizon: `factor` times OT, within `least` and `most` steps."""
-
-    factor: float = Field(16.0, gt=0, le=1000)
-    least: int = Field(400, ge=1, le=MOST_STEPS)
-    most: int = Field(2000, ge=1, le=MOST_STEPS)
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        if self.least > self.most:
-            raise ValueError(
-                f"expected `least` to be at most `most`, got {self.least} and "
-                f"{self.most}"
-            )
-        return self
-
-    def steps(self, least_steps: float) -> int:
-        """The horizon of a world whose OT is `least_steps`."""
-        return min(max(math.ceil(self.factor * least_steps), self.least), self.most)
-
-
-class AdmissionSpec(StrictModel):
-    """What every world of the set must fulfil; see `docs/generated-worlds.md`."""
-
-    gap: float = Field(1.1, ge=1, le=10, description="Least gap.")
-    steps: float = Field(60.0, ge=1, le=MOST_STEPS, description="Least OT, steps.")
-    detour: float | None = Field(
-        None, ge=1, le=100, description="Least detour; by default the generator's."
-    )
-    tries: int = Field(200, ge=1, le=100_000, description="Most drafts of a world.")
-
-
 MOST_CONTACTS = 0.05
-
-
-class CpuSpec(StrictModel):
-    """CPU time (user and system) that a controller may use in an episode, s."""
-
-    start: float = Field(2.0, gt=0, le=600, description="Import and reset.")
-    step: float = Field(0.02, gt=0, le=10, description="Mean of a step.")
-    bank: float = Field(2.0, ge=0, le=600, description="What it may be ahead.")
-
-    def of_steps(self, steps: int) -> float:
-        """What the first `steps` steps may use together, s."""
-        return self.bank + self.step * steps
 
 
 def _robot_of(given: Any) -> Any:

@@ -12,7 +12,7 @@ from tdac_envs.core.arguments import number_up_to, whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.task import Pose
 from tdac_envs.ladder.pool import PlatePool, TrainingPool
-from tdac_envs.ladder.set_file import HorizonSpec
+from tdac_envs.ladder.set_limits import HorizonSpec
 from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.state import SPEED

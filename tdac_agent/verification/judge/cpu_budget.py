@@ -8,7 +8,7 @@ from tdac_agent.sandbox import Child, ControllerOverdrawn
 from tdac_envs.drive.env import Observation
 
 if TYPE_CHECKING:
-    from tdac_envs.ladder.set_file import CpuSpec
+    from tdac_envs.ladder.set_limits import CpuSpec
 
 EVERY = 10
 """Steps between two looks at the CPU time; each takes about 0.1 ms."""

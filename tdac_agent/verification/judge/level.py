@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from tdac_envs.ladder.set_file import CpuSpec
+    from tdac_envs.ladder.set_limits import CpuSpec
 
 FIRST_WORLD = 0
 """Number of the world of a task set in which suites drive."""

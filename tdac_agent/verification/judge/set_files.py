@@ -16,7 +16,8 @@ from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_disturbances import DisturbanceSpec
-from tdac_envs.ladder.set_file import CpuSpec, SetFile
+from tdac_envs.ladder.set_file import SetFile
+from tdac_envs.ladder.set_limits import CpuSpec
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 
