@@ -24,6 +24,7 @@ STATIC = {
     "map2d.contact.first_contact",
     *(f"map2d.kernels.{name}" for name in ("begin", "drive", "path_distance")),
     *(f"map2d.rays.{name}" for name in ("_fill_leaps", "sees")),
+    "map2d.smallest_gap.note_gap",
     "map2d.straight.is_straight_path_free",
     "map2d.terrain.may_start",
 }
