@@ -188,8 +188,8 @@ class SetFile(StrictModel):
         for name in ONLY_ON_MAPS:
             if epuck and getattr(self.disturbances, name):
                 raise ValueError(
-                    f"disturbances.{name}: for robots on maps; an e-puck has "
-                    "`robot.sensor_noise` and `robot.wheel_radius_error`"
+                    f"disturbances.{name}: an e-puck has no ranges and no localiser; "
+                    "expected `robot.sensor_noise` or `robot.wheel_radius_error`"
                 )
 
     @property

@@ -100,7 +100,7 @@ def test_an_e_puck_of_a_set_has_no_localiser(set_yaml):
         "goal_tolerance": 0.03,
         "disturbances": {"pose_noise": 0.1},
     }
-    with pytest.raises(TaskError, match=r"disturbances.pose_noise: for robots on maps"):
+    with pytest.raises(TaskError, match=r"disturbances.pose_noise: an e-puck has no"):
         find_set_file(set_yaml(**keys))
 
 
