@@ -500,7 +500,7 @@ def test_an_interrupt_leaves_nothing(good, no_traces):
     assert err.decode().strip().splitlines()[-1] == "interrupted"
     assert re.search(r"episodes reached the goal; no success rate", out.decode())
     assert (
-        f"{kept} contains the report of the suite, but no robust.json" in out.decode()
+        f"{kept} contains the report of the suite, but no episodes.json" in out.decode()
     )
     assert (kept / "report.json").is_file()
     assert not (kept / "episodes.json").exists()
