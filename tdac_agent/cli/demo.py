@@ -37,5 +37,6 @@ def run(out: Path | None, as_json: bool) -> int:
         patience=recorded.patience,
         seed=recorded.seed,
         prompt=recorded.prompt,
+        confirm=False,  # there is no recorded answer to a failed confirmation
     )
     return write(problem_of(task), out or next_folder("demo"), options, console)

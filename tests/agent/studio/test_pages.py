@@ -151,7 +151,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
     button = "//button[.//span[normalize-space()='Write and verify a controller']]"
     ActionChains(page).double_click(page.find_element(By.XPATH, button)).perform()
     wait(page, lambda b: "/run?" in b.current_url)
-    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.passed"))
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
     begun = [job.file.about for job in jobs(studio.place)]
     assert [about for about in begun if "plan" in about] == ["runs/plan-1"]
     assert "not begun here" not in text_of(page)
@@ -160,7 +160,7 @@ def test_from_a_dropped_image_to_a_verified_controller(page, studio, plan):
         clock = page.find_element(By.CSS_SELECTOR, ".player .clock")
         wait(page, lambda b: "reached" in clock.text)
     run = json.loads((studio.place / "runs/plan-1/run.json").read_text())
-    assert run["status"] == "passed"
+    assert run["status"] == "verified"
 
 
 @pytest.mark.slow
@@ -198,7 +198,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     says(page, "--from .studio/files/blind.py")
     says(page, "The controller is blind.py.")
     press(page, "Write and verify a controller")
-    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.passed"))
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
     with framed(page):
         wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "a.cell")) > 1)
         assert page.find_elements(By.CSS_SELECTOR, "a.cell.failed")
@@ -440,7 +440,7 @@ def test_a_killed_server_kills_no_run(browser, page, studio, plan):
     studio.start()
     assert studio.base == base  # though it was not told which port to take
     # The page goes on by itself.
-    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.passed"))
+    wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.verified"))
     assert page.current_url == f"{base}/run?at={at}"
     wait(page, lambda b: not b.find_element(By.ID, "lost").is_displayed())
     browser.get(f"{base}/runs")
