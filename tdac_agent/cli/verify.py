@@ -106,7 +106,7 @@ def _verify_on_task(
             robust = _measure(file, task, options, noise, judge)
         elif report.passed and options.confirm and not options.paper:
             confirmation = _confirm(file, task, options, judge)
-    if options.junit is not None:
+    if options.junit is not None and confirmation is not None:
         from tdac_agent.cli.junit import write_junit
 
         write_junit(report, options.junit, confirmation)
@@ -148,6 +148,10 @@ def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) ->
             judge=judge,
             meanwhile=spinner,
         )
+    if options.junit is not None:  # it is written again after blind drives
+        from tdac_agent.cli.junit import write_junit
+
+        write_junit(report, options.junit)
     if report.passed and not report.provenance.paper:
         about = report.provenance
         _print_marked(file, about.task_sha256, about.profile)

@@ -61,9 +61,9 @@ def export_webots(run_folder: Path, out: Path) -> Project:
         TaskError: The run's task cannot be read.
     """
     run = load_run(run_folder)
-    if not run.verified:
+    if not run.passed:
         raise RunError(
-            f"{run_folder} has no verified controller ({run.status}); only verified "
+            f"{run_folder} has no controller that passed ({run.status}); only such "
             "controllers can be exported"
         )
     task = load_task(run_folder)

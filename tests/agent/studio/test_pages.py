@@ -202,7 +202,7 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     with framed(page):
         wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "a.cell")) > 1)
         assert page.find_elements(By.CSS_SELECTOR, "a.cell.failed")
-    says(page, "The verified controller is another one, by the built-in template.")
+    says(page, "The controller that passed is another one, by the built-in template.")
 
 
 @pytest.mark.slow
@@ -367,7 +367,7 @@ def test_a_phone_shows_all_columns_of_a_run(page, studio):
     assert page.execute_script(OVERFLOW) <= 0
     found = page.find_elements(By.XPATH, cells)
     values = [cell.text for cell in found[1:]]
-    assert values[:4] == ["runs/on-a-phone", "maze", "manual:maze2", "verified"]
+    assert values[:4] == ["runs/on-a-phone", "maze", "manual:maze2", "passed"]
     label = "return getComputedStyle(arguments[0], '::before').content"
     labels = [page.execute_script(label, cell).strip('"') for cell in found[2:]]
     assert labels == ["task", "writer", "status", "progress", "cost", "started"]

@@ -277,7 +277,7 @@ def test_what_is_not_unpacked(tmp_path, files, message):
 def test_a_run_from_elsewhere_is_marked():
     """Such as the recorded run that `tdac demo` replays."""
     folder = Path(tdac_agent.__file__).parent / "runs" / "demo"
-    assert load_run(folder).status == "passed"
+    assert load_run(folder).status == "verified"
     assert "did not begin" in from_elsewhere(load_run(folder))
 
 
@@ -345,7 +345,7 @@ def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
     failed = len(run.attempts[0].failed_tests)
     text = initial_controller_text(load_run(folder))
     begin = (
-        f"Your controller failed {failed} tests: see iteration 1 below. The verified"
+        f"Your controller failed {failed} tests: see iteration 1 below. The controller"
     )
     assert text.startswith(begin)
     assert text.endswith("is another one, by the built-in template.")

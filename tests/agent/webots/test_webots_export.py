@@ -77,6 +77,7 @@ def make_run(folder, spec, source, status="verified"):
         patience=0,
         seed=0,
         status=status,
+        tau=1 if status == "verified" else None,
         started="2026-01-01T00:00:00",
     )
     (folder / "run.json").write_text(run.model_dump_json())
@@ -265,7 +266,7 @@ class TestRefused:
             json.dumps({**record, "status": "not verified"})
         )
         err = refused("export", "webots", verified, "--out", "project")
-        assert "has no verified controller (not verified)" in err
+        assert "has no controller that passed (not verified)" in err
         assert not Path("project").exists()
 
     def test_a_map(self, refused, tmp_path):
