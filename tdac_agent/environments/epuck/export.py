@@ -61,7 +61,7 @@ def export_webots(run_folder: Path, out: Path) -> Project:
         TaskError: The run's task cannot be read.
     """
     run = load_run(run_folder)
-    if not run.passed:
+    if not run.passed or run.status == "not verified":
         raise RunError(
             f"{run_folder} has no controller that passed ({run.status}); only such "
             "controllers can be exported"
