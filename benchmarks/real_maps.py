@@ -72,7 +72,7 @@ class Row:
 
 
 def verify_builtin(image: ColourImage, start: Point, goal: Point, radius: int) -> bool:
-    """Whether the builtin learner's controller is verified on the map."""
+    """Whether the builtin learner's controller passes its tests on the map."""
     from tdac_agent import load_task, synthesize
     from tdac_agent.tasks.task_file import RobotSpec, TaskFile
 
@@ -82,8 +82,9 @@ def verify_builtin(image: ColourImage, start: Point, goal: Point, radius: int) -
         spec = TaskFile(
             map=str(path), start=start, goal=goal, robot=RobotSpec(radius=radius)
         )
-        run = synthesize(load_task(spec), "builtin", out=Path(name) / "run")
-    return run.verified
+        task, out = load_task(spec), Path(name) / "run"
+        run = synthesize(task, "builtin", out=out, confirm=False)
+    return run.passed
 
 
 def select(entries: list[Entry], radius: str) -> list[tuple[Entry, int]]:
