@@ -21,7 +21,9 @@ app = typer.Typer()
 )
 @typed_options(without=ONLY_FOR_SYNTH)
 def verify(options: VerifyOptions, flags: TaskFlags, noise: NoiseFlags) -> int:
-    """Test a controller in the sandbox; exit 0 only if all tests pass.
+    """Test a controller in the sandbox; exit 0 only if it is verified.
+
+    It must pass all tests, and then at most one of 93 blind drives may fail.
 
     With --set, it drives on worlds that it has never seen; exit 0 only if a sequential
     test accepts it.
