@@ -15,6 +15,10 @@ from tdac_agent.tasks.setting import JudgedEnv
 _ROW = re.compile(r"^\| `(\w+)` \|(.*)\|$")
 
 
+OTHER_SCANNERS = "Other Scanners"
+"""Section of the remarks on rays that are no even fan."""
+
+
 class ManualError(ValueError):
     """An environment's docstring contradicts its spaces."""
 
@@ -42,9 +46,13 @@ def interface_of(env: JudgedEnv) -> Interface:
         ManualError: They contradict each other.
     """
     sections = _sections(type(env))
+    observation = _observation(env.observation_space, sections["Observation Space"])
+    if not getattr(env, "has_even_fan", True):
+        table, _, _ = observation.rpartition("|\n")
+        observation = f"{table}|\n\n{sections[OTHER_SCANNERS]}"
     return Interface(
         sections["Description"],
-        _observation(env.observation_space, sections["Observation Space"]),
+        observation,
         _action(env.action_space, sections["Action Space"]),
     )
 

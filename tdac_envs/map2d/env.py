@@ -36,6 +36,7 @@ from tdac_envs.map2d.sonar import NOISE
 from tdac_envs.map2d.source import MapSource, metric_units, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
+from tdac_envs.mapping.ray_angles import FULL_CIRCLE
 from tdac_envs.movers.spec import MoversOption, read_specs
 from tdac_envs.movers.state import Movers
 
@@ -71,11 +72,15 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     | `ranges` | (n_rays,) | px | distance to the first wall along each ray |
     | `odometry` | (2,) | px, rad | motion in the last step, with `odometry=True` |
 
-    Ray i points at `ray_angles[i]` from the heading (rad; also in `params.json`). An
-    even fan goes from the robot's left to its right: ray i at
-    `-field_of_view/2 + i * field_of_view/(n_rays - 1)`, and of a full circle, which
-    begins behind the robot, at `-180° + i * 360°/n_rays`. Rays start at the centre; no
-    hit gives `range_max`.
+    Ray i points at `-field_of_view/2 + i * field_of_view/(n_rays - 1)` from the
+    heading: `ranges[0]` is the robot's leftmost ray, `ranges[-1]` its rightmost.
+    Rays start at the centre; no hit gives `range_max`.
+
+    ## Other Scanners
+    Ray i points at `ray_angles[i]` from the heading (rad; also in `params.json`): of a
+    full circle, which begins behind the robot, at `-180° + i * 360°/n_rays`; of the
+    scanner of a robot's file, as the file says. Rays start at the centre, or at the
+    file's `scanner.offset`; no hit gives `range_max`.
 
     ## In metres
     With `frame="metres"`, for maps with a resolution (ROS `map.yaml`), all places,
@@ -458,6 +463,13 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     def observed_pose(self) -> NDArray[np.float64]:
         """The pose as it is observed, shape (3,): x, y (px), heading (rad)."""
         return self.pose() if self._receiver is None else self._receiver.pose.copy()
+
+    @property
+    def has_even_fan(self) -> bool:
+        """Whether rays go evenly from left to right, from the robot's centre."""
+        robot = self.nominal.robot
+        own = robot.ray_angles is not None or robot.scanner_offset is not None
+        return not own and robot.field_of_view_deg < FULL_CIRCLE
 
     def discs(self) -> NDArray[np.float64]:
         """The movers as they are now, shape (n, 3): x, y, radius, px."""

@@ -351,12 +351,12 @@ def test_task_files_that_cannot_be_used(tdac, good, name):
 
 @pytest.mark.slow
 def test_verify_says_yes_and_no(rejected, done, good):
-    """Exit 0 for a verified controller, 1 for another; a table for people."""
+    """Exit 0 for a controller that passes, 1 for another; a table for people."""
     out = done("verify", good, "--profile", "policy", "--paper")
-    assert "verified: 16 of 16 tests passed" in out
+    assert "passed: 16 of 16 tests passed" in out
     (good / "controller.py").write_text("def policy(obs):\n    return 1, 1\n")
     out = rejected("verify", good / "controller.py", "--profile", "policy")
-    assert "not verified" in out
+    assert "failed: " in out
     assert "collision in step" in out
 
 
@@ -458,7 +458,7 @@ def test_synth_writes_a_run(done, good):
     (good / "controller.py").unlink()
     out = done("synth", "--task", good, "--out", "a", "--json")
     run = json.loads(out)
-    assert run["status"] == "passed"
+    assert run["status"] == "verified"
     assert Path("a/controller.py").is_file()
 
 
