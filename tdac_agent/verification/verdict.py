@@ -82,8 +82,8 @@ def not_covered(report: EpisodeReport) -> str:
 
 def delivered_text(run: Run) -> str:
     """Where a run found its controller, and how much it tried for it."""
-    confirmed = run.confirmations[-1] if run.verified else None
-    at = run.tau if confirmed is None else confirmed.k
+    confirmed = [each.k for each in run.confirmations if each.passed]
+    at = confirmed[-1] if run.verified and confirmed else run.tau
     return f"in iteration {at} ({tried_text(run)})"
 
 

@@ -285,13 +285,13 @@ def test_an_interrupted_search_leaves_a_verified_run(
         assert (run.tau, [each.k for each in run.attempts]) == (1, [1, 7])
         assert run.controller.read_text() == good_source
         assert row_of(out)["status"] == "passed"
-        words = f"{out} is verified; to go on improving it: tdac synth --resume {out}"
+        words = f"{out} has passed; to go on improving it: tdac synth --resume {out}"
         assert words in tdac("runs", tmp_path)[1]
         page = make_page(out)
         assert page.verified == 0
         html = page.html.decode()
         assert "the search for a better one has not ended" in html
-        assert "The verified controller: controller.py" in html
+        assert "The controller that passed: controller.py" in html
         assert "Iteration 8</b>, a variation of what works" in html
 
     check()
@@ -316,10 +316,11 @@ def test_ctrl_c_in_a_search_tells_of_the_verified_controller(
     program.write_text(INTERRUPTING)
     learner = f"command:{sys.executable} {program}"
     words = ("synth", "--task", folder, "--learner", learner, "--improve", 32)
+    words = (*words, "--no-confirm")
     exit_code, told, err = tdac(*words, "--out", "run")
     assert (exit_code, err.splitlines()[-1]) == (130, "interrupted")
     assert told.splitlines()[-1] == (
-        "verified in iteration 1: run/controller.py; to go on improving it: "
+        "passed all tests in iteration 1: run/controller.py; to go on improving it: "
         "tdac synth --resume run"
     )
 
@@ -366,9 +367,10 @@ def test_the_command_improves_a_task(tdac, done, tmp_path, good_source):
     first, best = found.members[0], max(found.members, key=lambda each: each.time)
     said = f"time score {first.time:.3f}; the goal reached in 4 of 4 disturbed episodes"
     assert out.count(said) == 2  # before the variations, and in the table
-    assert re.search(r"improving: \d+ variations?, \d of them verified; ", out)
+    assert re.search(r"improving: \d+ variations?, \d of them passed; ", out)
     assert (found.k, found.j) == (best.k, best.j) != (1, 0)
-    assert f"verified in iteration 1, improved in iteration {best.k}, " in out
+    assert f"), improved in iteration {best.k}, " in out
+    assert f"verified in iteration {best.k} (" in out
     listed = tdac("runs", ".")[1]
     assert f"1/20 +{found.asked}" in listed
     assert "k: iterations begun / allowed, + variations of what works" in listed

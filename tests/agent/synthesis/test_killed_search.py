@@ -8,7 +8,7 @@ from few_worlds import write_set
 from killed_synthesis import finish, kill_again_and_again
 from small import write_small_task
 
-CLOCKS = {"started", "seconds", "id", "mark", "child_cpu_seconds"}
+CLOCKS = {"started", "seconds", "id", "mark", "child_cpu_seconds", "cpu_seconds"}
 CLOCKS |= {"call_ms_mean", "call_ms_p99"}
 ON_TASK = ("--task", "task")
 ON_SET = ("--set", "few.yaml", "--episodes", "4", "--feedback-episodes", "2")
