@@ -120,8 +120,8 @@ def _attempts(run: Run, search: TaskImprovement | None) -> Table:
         failed = "" if attempt.passed else list_tests(attempt.failed_tests, 4)
         if attempt.unchanged or not failed:
             failed = _remark(attempt)
-        if search is not None:
-            failed = failed or search.text_of(attempt.k, attempt.j)
+        if search is not None and (attempt.confirmed is not None or not failed):
+            failed = search.text_of(attempt.k, attempt.j) or failed
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
 
