@@ -47,7 +47,8 @@ def interface_of(env: JudgedEnv) -> Interface:
     """
     sections = _sections(type(env))
     observation = _observation(env.observation_space, sections["Observation Space"])
-    if not getattr(env, "has_even_fan", True):
+    robot = getattr(getattr(env, "nominal", None), "robot", None)
+    if robot is not None and not robot.has_even_fan:
         table, _, _ = observation.rpartition("|\n")
         observation = f"{table}|\n\n{sections[OTHER_SCANNERS]}"
     return Interface(

@@ -36,7 +36,6 @@ from tdac_envs.map2d.sonar import NOISE
 from tdac_envs.map2d.source import MapSource, metric_units, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
-from tdac_envs.mapping.ray_angles import FULL_CIRCLE
 from tdac_envs.movers.spec import MoversOption, read_specs
 from tdac_envs.movers.state import Movers
 
@@ -463,13 +462,6 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     def observed_pose(self) -> NDArray[np.float64]:
         """The pose as it is observed, shape (3,): x, y (px), heading (rad)."""
         return self.pose() if self._receiver is None else self._receiver.pose.copy()
-
-    @property
-    def has_even_fan(self) -> bool:
-        """Whether rays go evenly from left to right, from the robot's centre."""
-        robot = self.nominal.robot
-        own = robot.ray_angles is not None or robot.scanner_offset is not None
-        return not own and robot.field_of_view_deg < FULL_CIRCLE
 
     def discs(self) -> NDArray[np.float64]:
         """The movers as they are now, shape (n, 3): x, y, radius, px."""

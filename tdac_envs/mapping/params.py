@@ -23,7 +23,7 @@ from tdac_envs.core.errors import MapError, TaskError, first_problem
 from tdac_envs.core.intake import TEXT_BYTES, parse_json, read_file
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.grid.map_units import MapUnits
-from tdac_envs.mapping.ray_angles import fan
+from tdac_envs.mapping.ray_angles import FULL_CIRCLE, fan
 
 PIXELS_PER_METRE = 3779.52
 """Pixels per metre of the paper's 2-D setting (96 dpi)."""
@@ -129,6 +129,12 @@ class RobotParams(StrictModel):
     ) -> dict[str, Any]:
         """The fields; what is None is left out, so that hashes of sets stay."""
         return {key: own for key, own in handler(self).items() if own is not None}
+
+    @property
+    def has_even_fan(self) -> bool:
+        """Whether rays go evenly from left to right, from the robot's centre."""
+        own = self.ray_angles is not None or self.scanner_offset is not None
+        return not own and self.field_of_view_deg < FULL_CIRCLE
 
     def angles(self) -> NDArray[np.float64]:
         """Directions of the rays from the heading, rad, in the order of the ranges.
