@@ -137,7 +137,8 @@ def place(tmp_path_factory):
     (folder / "plans" / "kitchen" / "task.yaml").write_text(TASK)
     (folder / "my.yaml").write_text(CAMPAIGN)
     (folder / "my.salt").write_bytes(bytes(range(32)))
-    (folder / "mine.j2").write_text("Write controller.py. {{ env_description }}")
+    template = "Write controller.py. {{ env_description }} {{ rules_block }}"
+    (folder / "mine.j2").write_text(template)
     for name, world in (("maze", "maze"), ("my", "arena")):
         shutil.copy(world_file(world), folder / f"{name}.wbt")
     arena, _, _ = world_file("arena").read_text().partition("WoodenBox {")
