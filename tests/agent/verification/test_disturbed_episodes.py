@@ -430,7 +430,7 @@ def test_what_is_not_verified_is_not_disturbed(rejected, good):
     (good / "controller.py").write_text("def policy(obs):\n    return 0.0, 0.0\n")
     words = ["verify", good, "--profile", "policy", "--robust", 3]
     out = rejected(*words)
-    assert "robustness not measured: the controller is not verified" in out
+    assert "robustness not measured: the controller failed its tests" in out
     out = rejected(*words, "--json")
     assert json.loads(out)["robust"] is None
 
