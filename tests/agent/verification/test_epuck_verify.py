@@ -153,7 +153,7 @@ def test_command_line_verifies_in_a_world(tdac, done, controller, tmp_path):
     """`--task epuck-NAME` and `--world NAME` are the same; the table is in mm."""
     out = done("verify", controller, "--task", "epuck-crates")
     assert "Episodes as the environment recorded them (mm)" in out
-    assert "verified: 46 of 46" in out
+    assert "passed: 46 of 46" in out
     words = ("verify", controller, "--world", "crates", "--profile", "policy")
     code, out, _ = tdac(*words, "--start", "-0.6", "0.1", "0.2", "--json")
     report = json.loads(out)
