@@ -22,7 +22,7 @@ from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.ownership import is_own_folder, load_task, mark_anew
 from tdac_agent.runs.resume import existing_run
-from tdac_agent.runs.run_record import JOURNAL, RUN_FILE, Run, load_run
+from tdac_agent.runs.run_record import FINISHED, JOURNAL, RUN_FILE, Run, load_run
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import seed_from
@@ -105,7 +105,7 @@ class Outcome:
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
-        return self.status in ("verified", "passed", "not verified")
+        return self.status in FINISHED
 
     def to_json(self) -> dict[str, Any]:
         """The outcome as JSON, for another process."""

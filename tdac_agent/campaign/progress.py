@@ -10,6 +10,7 @@ from typing import Any
 from tdac_agent.campaign.perform import Outcome
 from tdac_agent.campaign.plan import Cell, Plan, PlannedRun, Shard
 from tdac_agent.executors.executor import Died, Ended, Reported, Started, Update
+from tdac_agent.runs.run_record import FINISHED
 
 RunEnded = Ended[PlannedRun, Outcome]
 RunUpdate = Update[PlannedRun, Outcome]
@@ -38,8 +39,7 @@ class Tally:
     @property
     def finished(self) -> int:
         """Number of runs with nothing left to do."""
-        ended = ("verified", "passed", "not verified")
-        return sum(self.ended[status] for status in ended)
+        return sum(self.ended[status] for status in FINISHED)
 
     @property
     def halted(self) -> int:

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.verification.verdict import confirmed_text, word_of
+from tdac_agent.verification.verdict import confirmed_text, is_verified
 
 if TYPE_CHECKING:
     from tdac_agent.verification.diagnosis.gap import Gap
@@ -23,9 +23,7 @@ def write_junit(
     messages = {failure.test: failure.message for failure in report.failures}
     cases = {name: messages.get(name) for name in report.tests}
     if confirmation is not None:
-        told = None
-        if word_of(confirmation) != "verified":
-            told = confirmed_text(confirmation)
+        told = None if is_verified(confirmation) else confirmed_text(confirmation)
         cases["confirmation::blind drives"] = told
     title, gap = f"tdac {report.provenance.task}", report.smallest_gap
     _write_cases(

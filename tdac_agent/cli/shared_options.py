@@ -95,53 +95,30 @@ key_over_http_option = partial(
 )
 
 
+def _part(text: str, default: str = "the task's, else 0") -> Any:
+    """A part of a disturbance; None if it is not typed."""
+    return option(None, f"{text}  [default: {default}]", panel=DISTURBED)
+
+
 @dataclass(frozen=True, slots=True)
 class NoiseFlags:
     """Sizes of the disturbances; None for a flag that is not typed."""
 
-    range_noise: float | None = option(
-        None, f"{RANGE_NOISE}  [default: 0.025]", panel=DISTURBED
-    )
-    wheel_slip: float | None = option(
-        None, f"{WHEEL_SLIP}  [default: 0.03]", panel=DISTURBED
-    )
-    motor_lag: float | None = option(
-        None, f"{MOTOR_LAG}  [default: 0]", panel=DISTURBED
-    )
-    delay: int | None = option(None, f"{DELAY}  [default: 1]", panel=DISTURBED)
-    wheel_gains: float | None = option(
-        None, f"{WHEEL_GAINS}  [default: 0]", panel=DISTURBED
-    )
-    axle_error: float | None = option(
-        None, f"{AXLE_ERROR}  [default: 0]", panel=DISTURBED
-    )
-    range_dropout: float | None = option(
-        None, f"{RANGE_DROPOUT}  [default: 0]", panel=DISTURBED
-    )
-    wheel_radius_error: float | None = option(
-        None, f"{WHEEL_RADII}  [default: the task's, else 0]", panel=DISTURBED
-    )
-    pose_noise: float | None = option(
-        None, f"{POSE_NOISE}  [default: the task's, else 0]", panel=DISTURBED
-    )
-    heading_noise: float | None = option(
-        None, f"{HEADING_NOISE}  [default: the task's, else 0]", panel=DISTURBED
-    )
-    pose_correlation: float | None = option(
-        None, f"{POSE_CORRELATION}  [default: the task's, else 0]", panel=DISTURBED
-    )
-    pose_jumps: float | None = option(
-        None, f"{POSE_JUMPS}  [default: the task's, else 0]", panel=DISTURBED
-    )
-    pose_delay: int | None = option(
-        None, f"{POSE_DELAY}  [default: the task's, else 0]", panel=DISTURBED
-    )
-    scan_delay: int | None = option(
-        None, f"{SCAN_DELAY}  [default: the task's, else 0]", panel=DISTURBED
-    )
-    message_drop: float | None = option(
-        None, f"{MESSAGE_DROP}  [default: the task's, else 0]", panel=DISTURBED
-    )
+    range_noise: float | None = _part(RANGE_NOISE, "0.025")
+    wheel_slip: float | None = _part(WHEEL_SLIP, "0.03")
+    motor_lag: float | None = _part(MOTOR_LAG, "0")
+    delay: int | None = _part(DELAY, "1")
+    wheel_gains: float | None = _part(WHEEL_GAINS, "0")
+    axle_error: float | None = _part(AXLE_ERROR, "0")
+    range_dropout: float | None = _part(RANGE_DROPOUT, "0")
+    wheel_radius_error: float | None = _part(WHEEL_RADII)
+    pose_noise: float | None = _part(POSE_NOISE)
+    heading_noise: float | None = _part(HEADING_NOISE)
+    pose_correlation: float | None = _part(POSE_CORRELATION)
+    pose_jumps: float | None = _part(POSE_JUMPS)
+    pose_delay: int | None = _part(POSE_DELAY)
+    scan_delay: int | None = _part(SCAN_DELAY)
+    message_drop: float | None = _part(MESSAGE_DROP)
 
     @classmethod
     def of(cls, disturbance: Disturbance) -> NoiseFlags:

@@ -126,9 +126,9 @@ def _verify_on_task(
     elif options.episodes is not None:
         console.print("robustness not measured: the controller failed its tests")
     if confirmation is not None:
-        from tdac_agent.verification.verdict import word_of
+        from tdac_agent.verification.verdict import is_verified
 
-        return 0 if word_of(confirmation) == "verified" else 1
+        return 0 if is_verified(confirmation) else 1
     return 0 if report.passed and (robust is None or robust.passed) else 1
 
 
@@ -208,7 +208,7 @@ def _measure(
 def _confirm(
     file: Path, task: Task, options: VerifyOptions, judge: WarmJudge
 ) -> EpisodeReport:
-    """Drives blind, with a progress bar; in a run folder, with the number there."""
+    """Drives blind, with a progress bar."""
     from tdac_agent.cli.console import Console
     from tdac_agent.cli.driving_bar import DrivingBar
     from tdac_agent.verification.confirmation import CONFIRMATION, confirm

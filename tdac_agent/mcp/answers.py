@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 
 from tdac_agent.verification.decision import decision_text
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.verdict import verified_text, word_of
+from tdac_agent.verification.verdict import is_verified, verified_text
 
 
 class Refused(Exception):
@@ -103,7 +103,7 @@ def blind_verdict(number: int, report: EpisodeReport) -> ChooseAnswer:
     """The verdict on a task: blind drives of what passed the suite."""
     return ChooseAnswer(
         submission=number,
-        verified=word_of(report) == "verified",
+        verified=is_verified(report),
         summary=verified_text(report),
         worlds=None,
         reached=None,

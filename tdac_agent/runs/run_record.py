@@ -27,6 +27,10 @@ Status = Literal[
     "fault",
     "budget",
 ]
+DELIVERED = ("verified", "passed", "selected")
+"""Status of a run that has ended with a controller, as far as was asked for."""
+FINISHED = (*DELIVERED, "not verified")
+"""Status of a run with nothing left to do."""
 LoopSetting = Literal["dual tier", "edit only", "prompt only", "best of N", "one shot"]
 Setting = LoopSetting | Literal["agent"]
 Agent = Literal["", "unconfined", "over HTTP"]
@@ -197,7 +201,7 @@ class Run(PrintableRecord):
     @property
     def finished(self) -> bool:
         """Whether there is nothing left to do."""
-        return self.status in {"verified", "passed", "not verified", "selected"}
+        return self.status in FINISHED
 
     @property
     def on_set(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 from tdac_agent.html_report.names import candidate_name
 from tdac_agent.library.listing import variations_text
 from tdac_agent.runs.ownership import is_own_folder, remark_on, suite_in, wishes_of
-from tdac_agent.runs.run_record import JOURNAL, Run, at_work, load_run
+from tdac_agent.runs.run_record import DELIVERED, JOURNAL, Run, at_work, load_run
 from tdac_agent.storage.journal import read_records
 from tdac_agent.studio.folder import lines_in
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
@@ -36,7 +36,7 @@ def progress_of(row: dict[str, Any], running: bool) -> str:
     if not row or "k" not in row:
         return "preparing the task …" if running else ""
     text, varied = f"iteration {row['k']}", variations_text(row)
-    if row["status"] in ("verified", "passed", "selected"):
+    if row["status"] in DELIVERED:
         text = f"in {text}{varied}, {row['seconds']:.0f} s"
     else:
         text += f" of at most {row['iterations']}{varied}"

@@ -19,7 +19,7 @@ from tdac_agent.verification.confirmation import (
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.store import REPORT_FILE
-from tdac_agent.verification.verdict import confirmed_text, word_of
+from tdac_agent.verification.verdict import confirmed_text, is_verified, word_of
 
 
 def drive_blind(
@@ -55,11 +55,6 @@ def drive_blind(
     return found
 
 
-def is_confirmed(report: EpisodeReport) -> bool:
-    """Whether a confirmation verifies its controller."""
-    return word_of(report) == "verified"
-
-
 def confirmed_result(
     tested: Result, report: Report, confirmation: EpisodeReport
 ) -> Result:
@@ -71,7 +66,7 @@ def confirmed_result(
         confirmation: The confirmation.
     """
     said = confirmed_text(confirmation)
-    failure, passed = tested.failure, is_confirmed(confirmation)
+    failure, passed = tested.failure, is_verified(confirmation)
     if not passed:
         failure = confirmation_feedback(report, confirmation)
     assert failure is not None

@@ -19,7 +19,6 @@ from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.confirming import (
     confirmed_result,
     drive_blind,
-    is_confirmed,
     keep_confirmation,
 )
 from tdac_agent.synthesis.delivery import (
@@ -50,7 +49,7 @@ from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
-from tdac_agent.verification.verdict import confirmed_text
+from tdac_agent.verification.verdict import confirmed_text, is_verified
 from tdac_agent.verification.verify import kept_report, load_trajectories, verify
 
 IMPROVE = "improve"
@@ -169,7 +168,7 @@ class SuiteTrials:
     def picture(self, candidate: Candidate) -> FailurePicture | None:
         """See `Trials`."""
         confirmation = candidate.confirmation
-        if confirmation is not None and not is_confirmed(confirmation):
+        if confirmation is not None and not is_verified(confirmation):
             folder = candidate.folder / CONFIRMATION
             return failed_picture(self.task, confirmation, folder)
         trajectories = load_trajectories(candidate.folder / "trajectories")
@@ -286,7 +285,7 @@ class SuiteTrials:
             return chosen
         found = self.confirm(chosen.candidate)
         known = first.confirmation
-        if is_confirmed(found) or known is None or not is_confirmed(known):
+        if is_verified(found) or known is None or not is_verified(known):
             return chosen
         stopped = f"the best variation was not confirmed: {confirmed_text(found)}"
         return replace(chosen, candidate=first, stopped=stopped)
@@ -305,7 +304,7 @@ class SuiteTrials:
                     j=candidate.j,
                     episodes=found.count,
                     failures=found.count - found.successes,
-                    passed=is_confirmed(found),
+                    passed=is_verified(found),
                 )
             )
             if candidate is self._secured:

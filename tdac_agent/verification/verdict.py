@@ -32,6 +32,11 @@ def word_of(report: EpisodeReport) -> Word:
     )
 
 
+def is_verified(report: EpisodeReport) -> bool:
+    """Whether a confirmation verifies its controller."""
+    return word_of(report) == "verified"
+
+
 def _test_of(report: EpisodeReport) -> ConfirmingTest:
     assert report.sequential is not None
     test = report.sequential.test
@@ -57,7 +62,7 @@ def confirmed_text(report: EpisodeReport) -> str:
 def verified_text(report: EpisodeReport) -> str:
     """The verdict of a confirmation in one line, with what it does not cover."""
     text, gap = confirmed_text(report), report.smallest_gap
-    if word_of(report) != "verified":
+    if not is_verified(report):
         return text
     if gap is not None:
         text += f", smallest gap {gap_figure(gap.gap, UNITS[report.provenance.unit])}"

@@ -12,7 +12,7 @@ from typing import Any
 from nicegui import ui
 
 from tdac_agent.library.listing import row_of
-from tdac_agent.runs.run_record import RUN_FILE, Run, load_run
+from tdac_agent.runs.run_record import DELIVERED, RUN_FILE, Run, load_run
 from tdac_agent.studio.folder import as_word, deployable, within
 from tdac_agent.studio.jobs import StudioJob, job_of, start
 from tdac_agent.studio.pages.layout import (
@@ -116,7 +116,7 @@ class RunPage(JobPage):
         continues = own and state.status != "running"
         self._show_status(state.status, running=state.running, continues=continues)
         self._follow.visible = state.running
-        self._download.visible = state.status in ("verified", "passed", "selected")
+        self._download.visible = state.status in DELIVERED
         self._judge.visible = state.status == "selected"
         self._remarks.clear()
         with self._remarks:

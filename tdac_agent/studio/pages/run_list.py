@@ -14,7 +14,7 @@ from nicegui import events, ui
 from tdac_agent.campaign.drive import CONFIG_FILE
 from tdac_agent.library.listing import folders_of, row_of, variations_text
 from tdac_agent.models.budget import format_usd
-from tdac_agent.runs.run_record import JOURNAL, RUN_FILE
+from tdac_agent.runs.run_record import DELIVERED, JOURNAL, RUN_FILE
 from tdac_agent.studio.folder import folders_with, within
 from tdac_agent.studio.jobs import StudioJob, jobs
 from tdac_agent.studio.pages.bench import show_benches
@@ -138,7 +138,7 @@ def _row(folder: Path) -> dict[str, Any]:
 def _cells(place: Path, row: dict[str, Any]) -> dict[str, Any]:
     run = str(Path(row["run"]).resolve().relative_to(place))
     iteration = f"iteration {row['k']}" if "k" in row else NONE
-    if row["status"] not in ("verified", "passed", "selected") and "k" in row:
+    if row["status"] not in DELIVERED and "k" in row:
         iteration += f" of {row['iterations']}"
     iteration += variations_text(row) if "k" in row else ""
     cost = row.get("cost")
