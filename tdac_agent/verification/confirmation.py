@@ -11,7 +11,6 @@ from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import SEED_BITS, seed_from
-from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.drive_episodes import Request, drive
 from tdac_agent.verification.episode_report import EpisodeReport
@@ -19,7 +18,7 @@ from tdac_agent.verification.judge.confirming import confirming_test
 from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.run_episodes import Watch
-from tdac_agent.verification.store import read_report
+from tdac_agent.verification.store import is_about, read_report
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.intake import RECORD_BYTES
 
@@ -103,18 +102,14 @@ def kept_confirmation(
     report = read_report(folder)
     if report is None or report.sequential is None:
         return None
-    known = report.provenance
     wanted = {
         "controller_sha256": sha256_of(source),
         "sha256": task.sha256(),
         "first": confirming_seeds(source, task, number).start,
         "disturbance": disturbance_of(task),
-        "versions": versions(),
     }
-    same = all(getattr(known, name) == value for name, value in wanted.items())
-    return (
-        report if same and report.sequential.test == confirming_test(number) else None
-    )
+    same = report.sequential.test == confirming_test(number)
+    return report if same and is_about(report, wanted) else None
 
 
 def confirming_seeds(source: bytes, task: Task, number: int) -> range:

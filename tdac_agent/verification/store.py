@@ -145,15 +145,25 @@ def kept_report(
     hidden = report is not None and report.provenance.salt_sha256 is not None
     if report is None or not is_marked(folder / REPORT_FILE, hidden=hidden):
         return None
-    own = report.provenance
-    same = own.versions == dict(versions()) and all(
-        getattr(own, name) == value for name, value in wanted.items()
-    )
+    own, same = report.provenance, is_about(report, wanted)
     driven = [each.number for each in report.episodes]
     whole = driven == list(numbers) or (
         own.salt_sha256 is not None and report.count == len(numbers)
     )
     return report if same and (report.refused or whole) else None
+
+
+def is_about(report: EpisodeReport, wanted: dict[str, Any]) -> bool:
+    """Whether a report has these fields of provenance, and these versions of packages.
+
+    Args:
+        report: The report.
+        wanted: Fields of its provenance, with their values.
+    """
+    own = report.provenance
+    return own.versions == dict(versions()) and all(
+        getattr(own, name) == value for name, value in wanted.items()
+    )
 
 
 def count_unfinished(out: Path) -> int:
