@@ -136,7 +136,7 @@ SUITE = r"run the tests in \S+ \(sha256 [0-9a-f]{12}\).* --suite \S+suite, or .*
 
 
 @attack(
-    r"task maze, not the bundled one \(map \w{8}, goal within 8 px\) of /",
+    r"task maze, not the bundled one \(map \w{8}, goal within [^)]+\) of /",
     code=0,
     works=None,
 )
@@ -314,33 +314,33 @@ leads_elsewhere("iterations")
 leads_elsewhere("blobs")
 
 
-@attack("claims to be verified: test it with tdac verify", works=False)
+@attack("claims to be (passed|verified): test it with tdac verify", works=False)
 def verdict_of_its_own(place: Place) -> list[str | Path]:
     (place.run / "controller.py").write_text(STILL)
     place.change(status="verified", max_tokens=12345)
     return ["synth", "--resume", place.run]
 
 
-@attack("claims to be verified: test it with tdac verify", works=False)
+@attack("claims to be (passed|verified): test it with tdac verify", works=False)
 def verdict_with_a_copied_mark(place: Place) -> list[str | Path]:
     (place.run / "controller.py").write_text(STILL)
     place.change(status="verified", id="0" * 16)
     return ["synth", "--resume", place.run]
 
 
-@attack("claims to be verified: test it with tdac verify", works=False)
+@attack("claims to be (passed|verified): test it with tdac verify", works=False)
 def controller_below_a_mark(place: Place) -> list[str | Path]:
     (place.run / "controller.py").write_text(STILL)
     return ["synth", "--resume", place.run]
 
 
-@attack("claims to be verified: test it with tdac verify", works=False)
+@attack("claims to be (passed|verified): test it with tdac verify", works=False)
 def cases_below_a_mark(place: Place) -> list[str | Path]:
     place.change(status="verified", attempts=[], cost=0.0)
     return ["synth", "--resume", place.run]
 
 
-@attack("claims to be verified: test it with tdac verify", works=False)
+@attack("claims to be (passed|verified): test it with tdac verify", works=False)
 def journal_below_a_mark(place: Place) -> list[str | Path]:
     with (place.run / "journal.jsonl").open("a") as file:
         file.write('{"event": "prove.end", "seconds": 1}\n')
