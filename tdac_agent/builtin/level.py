@@ -88,6 +88,7 @@ def level_of(tasks: TaskSet) -> str | None:
     return next((name for name in names if (LEVELS / f"{name}.py").is_file()), None)
 
 
-def _given(tasks: TaskSet) -> tuple[frozenset[str], str, bool, bool]:
+def _given(tasks: TaskSet) -> tuple[frozenset[str], str, bool, bool, str]:
     file = tasks.file
-    return frozenset(file.observed), file.frame, file.map, bool(file.movers)
+    seen = frozenset(file.observed)
+    return seen, file.frame, file.map, bool(file.movers), file.shown_unit

@@ -12,7 +12,6 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.robust_view import error_rates, rate_text
 from tdac_agent.cli.sentences import print_command, print_plain, print_sentences
-from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.decision import decision_text
 from tdac_agent.verification.diagnosis.report import OWN
 from tdac_agent.verification.episode_report import EpisodeReport, HiddenCount
@@ -44,7 +43,7 @@ def show_set_report(report: EpisodeReport, console: Console) -> None:
     if report.causes:
         causes = list(report.causes.items())[:MOST_CAUSES]
         say("failures: " + ", ".join(f"{count} {name}" for name, count in causes))
-    for line in report.gap_lines(UNITS[provenance.unit]):
+    for line in report.gap_lines(provenance.units):
         say(line)
     for text in report.told:
         print_sentences(console, text, indent=2)

@@ -27,6 +27,7 @@ from tdac_envs.ladder.picture import AHEAD, contact_sheet, draw_world
 from tdac_envs.ladder.plate_worlds import PlatesWorld
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import SetFile, shipped_names
+from tdac_envs.ladder.shown import in_shown_units
 from tdac_envs.ladder.task_sets import AnyTask, AnyWorld, TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
 from tdac_envs.mapping.ray_angles import fan
@@ -153,7 +154,7 @@ def _sensor(file: SetFile, pixel: float) -> RangeSensor:
 
 
 def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None:
-    file = tasks.file
+    file = in_shown_units(tasks.file)
     console.print(f"[bold]{escape(tasks.name)}[/]  {tasks.sha256[:12]}")
     if file.description:
         print_sentences(console, file.description)
@@ -170,10 +171,11 @@ def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None
         f"{100 * file.most_contacts:g} %",
     }
     if file.movers:
-        rows["movers"] = "; ".join(_group(group) for group in file.movers)
+        unit = file.shown_unit
+        rows["movers"] = "; ".join(_group(group, unit) for group in file.movers)
     world = record.get("world")
     if world is not None:
-        rows |= _world_rows(world, file.unit)
+        rows |= _world_rows(world, file.shown_unit, file.per_unit)
     table = Table.grid(padding=(0, 2))
     for label, text in rows.items():
         table.add_row(label, escape(text))
@@ -205,14 +207,14 @@ def _horizon(file: SetFile) -> str:
 
 
 def _robot(file: SetFile) -> str:
-    robot = file.robot
-    speed = f"{file.full_step / file.dt:g} {file.unit}/s"
+    robot, unit = file.robot, file.shown_unit
+    speed = f"{file.full_step / file.dt:g} {unit}/s"
     if isinstance(robot, EPuckRobotParams):
         return f"e-puck, radius {robot.radius:g} m, {speed}"
     return (
-        f"radius {robot.radius:g} px, axle {robot.axle_length:g} px, {speed}, "
+        f"radius {robot.radius:g} {unit}, axle {robot.axle_length:g} {unit}, {speed}, "
         f"{robot.n_rays} rays over "
-        f"{robot.field_of_view_deg:g}° up to {robot.range_max:g} px"
+        f"{robot.field_of_view_deg:g}° up to {robot.range_max:g} {unit}"
     )
 
 
@@ -224,31 +226,35 @@ def _disturbed(file: SetFile) -> str:
     return ", ".join(f"{name} {value:g}" for name, value in sizes.items())
 
 
-def _group(group: MoversOfSet) -> str:
+def _group(group: MoversOfSet, unit: str) -> str:
     """A group of movers: kind, number, radius and speed."""
     count, radius, speed = (
         f"{low:g}" if low == high else f"{low:g} to {high:g}"
         for low, high in (group.count, group.radius, group.speed)
     )
     kind = "people of a crowd" if group.kind == "crowd" else "bouncing discs"
-    rest = f"radius {radius} px, {speed} px/s; fewer where they block every way"
+    rest = f"radius {radius} {unit}, {speed} {unit}/s; fewer where they block every way"
     return f"{count} {kind}, {rest}"
 
 
-def _world_rows(world: dict[str, Any], unit: str) -> dict[str, str]:
-    """The figures of a world, by label."""
+def _world_rows(world: dict[str, Any], unit: str, size: float) -> dict[str, str]:
+    """The figures of a world, by label; `size` is that of its lengths in the unit.
+
+    Start and goal are where the world has them: for an e-puck in m, else in px.
+    """
     x, y, heading = world["start"]
     goal_x, goal_y = world["goal"]
-    sides = f"{world['width']:g} x {world['height']:g} {unit}"
+    sides = f"{size * world['width']:g} x {size * world['height']:g} {unit}"
+    place = "" if size == 1.0 else " px"
     among = {}
     if "movers" in world:
         speed = f"{world['mover_speed']:.2f} of the robot's speed on average"
         among["movers here"] = f"{world['movers']}, {speed}"
     return {
         f"{world['split']} {world['index']}": f"{world['generator']}, "
-        f"{sides}, start ({x:g}, {y:g}), heading {heading:.3f} rad, goal "
-        f"({goal_x:g}, {goal_y:g})",
-        "shortest": f"{world['length']:.4g} {unit}, {world['detour']:.2f} times the "
+        f"{sides}, start ({x:g}, {y:g}){place}, heading {heading:.3f} rad, goal "
+        f"({goal_x:g}, {goal_y:g}){place}",
+        "shortest": f"{size * world['length']:.4g} {unit}, {world['detour']:.2f} times the "
         f"straight distance; OT {world['steps']:.1f} steps, horizon "
         f"{world['horizon']}",
         "gap": f"{world['gap']:.2f} body diameters at the narrowest place",

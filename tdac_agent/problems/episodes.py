@@ -10,6 +10,7 @@ from tdac_agent.problems.part import Episodes, Part
 from tdac_agent.sandbox import Limits
 from tdac_agent.tasks.provenance import origin
 from tdac_agent.tasks.task import Task, lay_out
+from tdac_agent.tasks.units import frame_of
 from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.worlds import TaskWorld
 from tdac_envs.core.errors import TaskError
@@ -89,6 +90,7 @@ class OfTask:
     ) -> dict[str, Any]:
         """See `Episodes`."""
         facts = origin(self.task, b"", folder / "work", tier, limits)
+        facts["frame"] = frame_of(self.task.setting.shown)
         return {
             **facts,
             "controller_sha256": sha256,

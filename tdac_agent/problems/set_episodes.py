@@ -13,8 +13,10 @@ from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.first_run import compile_first
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.registry import environment
+from tdac_agent.tasks.units import frame_of
 from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.set_files import write_set
+from tdac_agent.verification.judge.set_worlds import printed_units
 from tdac_agent.verification.judge.worlds import SetWorlds
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.salt import read_salt
@@ -70,7 +72,7 @@ class OfSet:
         """See `Episodes`."""
         movers = bool(self.tasks.file.movers)
         parts = environment(Map2DTask.env_id).code_parts(movers=movers, worlds=True)
-        if self.tasks.file.unit == "m":  # its generated worlds are measured as maps
+        if self.tasks.file.is_epuck:  # its generated worlds are measured as maps
             parts += environment(EPuckTask.env_id).code_parts(movers=movers)
         compile_first(parts)
 
@@ -128,6 +130,7 @@ class OfSet:
             "salt_sha256": self.secret(part),
             "first": part.first,
             "unit": self.tasks.file.unit,
+            "frame": frame_of(printed_units(self.tasks.file)),
             "controller_sha256": sha256,
             "sandbox": tier,
             "limits": asdict(limits),

@@ -9,23 +9,26 @@ from tdac_envs.epuck.infrared import LARGEST, N_SENSORS, TABLE
 from tdac_envs.epuck.observed import ENCODER_STEP
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import SetFile
+from tdac_envs.ladder.shown import in_shown_units
 from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.mapping.params import RobotParams
 
 
 def observation_rows(tasks: TaskSet) -> Iterator[str]:
     """Yields the rows of the table of observations."""
-    file = tasks.file
-    rows = {**_places(file, tasks.largest_side), **_readings(file)}
+    file = in_shown_units(tasks.file)
+    side = tasks.largest_side * file.per_unit
+    rows = {**_places(file, side), **_readings(file)}
     for key in sorted(file.observed):
         yield f"| `{key}` | {' | '.join(rows[key])} |"
 
 
 def _places(file: SetFile, side: float) -> dict[str, tuple[str, str, str, str]]:
     """Rows of what all robots observe, in worlds with sides of at most `side`."""
-    unit = file.unit
+    unit = file.shown_unit
     decimals = 0 if unit == "px" else 2
     far = math.ceil(math.hypot(side, side) * 10**decimals) / 10**decimals
-    low = -0.5 if unit == "px" else -side / 2
+    low = -side / 2 if file.is_epuck else 0.0 if unit == "m" else -0.5
     if file.frame == "start":
         place, frame = f"-{far:g} to {far:g}", "start frame"
     else:
@@ -84,17 +87,61 @@ def _readings(file: SetFile) -> dict[str, tuple[str, str, str, str]]:
         "ranges": (
             f"({robot.n_rays},)",
             f"0 to {robot.range_max:g}",
-            "px",
-            "distance from the robot's centre to the first obstacle along each ray",
+            file.shown_unit,
+            f"distance from the {_origin(robot)} to the first obstacle along each ray",
         )
     }
 
 
+def _origin(robot: RobotParams) -> str:
+    return "robot's centre" if robot.scanner_offset is None else "scanner"
+
+
+def limit_lines(file: SetFile) -> Iterator[str]:
+    """Yields a line for each limit of a robot on maps beyond that of its wheels.
+
+    Args:
+        file: The set in the units that the robot observes.
+    """
+    robot, unit = file.robot, file.shown_unit
+    assert not isinstance(robot, EPuckRobotParams)
+    body = [
+        f"{text} {value:g} {of}"
+        for text, value, of in (
+            ("at most", robot.max_speed, f"{unit}/s"),
+            ("at most", robot.max_turn_rate, "rad/s"),
+        )
+        if value is not None
+    ]
+    if body:
+        yield (
+            f"The body drives {' and turns '.join(body)}: a command beyond that is "
+            "scaled down, both wheels alike."
+        )
+    slow = [
+        f"{text} {value:g} {of}"
+        for text, value, of in (
+            ("wheels by", robot.max_acceleration, f"{unit}/s²"),
+            ("the turn of the body by", robot.max_turn_acceleration, "rad/s²"),
+        )
+        if value is not None
+    ]
+    if slow:
+        yield (
+            f"Speeds change by a limited amount per second: {', '.join(slow)} at most. "
+            "A command acts as far as these allow."
+        )
+
+
 def disturbance_lines(file: SetFile) -> Iterator[str]:
-    """Yields a line for each disturbance of the set: its distribution and size."""
+    """Yields a line for each disturbance of the set: its distribution and size.
+
+    Args:
+        file: The set in the units that the robot observes.
+    """
     own = file.disturbances
     low, high = 1.0 - own.wheel_gains, 1.0 + own.wheel_gains
-    steps = "1 step" if own.delay == 1 else f"{own.delay} steps"
+    steps = _steps(own.delay)
     sizes_and_lines: list[tuple[float, str]] = [
         (
             own.wheel_gains,
@@ -152,9 +199,13 @@ def disturbance_lines(file: SetFile) -> Iterator[str]:
     return (line for size, line in sizes_and_lines if size)
 
 
+def _steps(count: int) -> str:
+    return "1 step" if count == 1 else f"{count} steps"
+
+
 def _map_errors(file: SetFile) -> list[tuple[float, str]]:
-    own, dt = file.disturbances, file.dt
-    pose = f"SD {own.pose_noise:g} px in x and in y"
+    own, dt, unit = file.disturbances, file.dt, file.shown_unit
+    pose = f"SD {own.pose_noise:g} {unit} in x and in y"
     if own.heading_noise:
         pose += f" and {own.heading_noise:g} rad of the heading"
     lasting = "new in each step"
@@ -170,12 +221,12 @@ def _map_errors(file: SetFile) -> list[tuple[float, str]]:
         (
             own.max_acceleration,
             "Acceleration: a wheel's speed changes by at most "
-            f"{own.max_acceleration:g} px/s², which is "
-            f"{own.max_acceleration * dt:g} px/s in a step.",
+            f"{own.max_acceleration:g} {unit}/s², which is "
+            f"{own.max_acceleration * dt:g} {unit}/s in a step.",
         ),
         (
             own.range_min,
-            f"Ranges below {own.range_min:g} px read range_max.",
+            f"Ranges below {own.range_min:g} {unit} read range_max.",
         ),
         (
             own.pose_noise or own.heading_noise,
@@ -186,8 +237,8 @@ def _map_errors(file: SetFile) -> list[tuple[float, str]]:
             f"Jumps of the pose: {own.pose_jumps:g} in a minute on average; its errors "
             "are drawn anew, three times as large, and decay.",
         ),
-        (own.pose_delay, f"The pose is {own.pose_delay} steps old."),
-        (own.scan_delay, f"The ranges are {own.scan_delay} steps old."),
+        (own.pose_delay, f"The pose is {_steps(own.pose_delay)} old."),
+        (own.scan_delay, f"The ranges are {_steps(own.scan_delay)} old."),
         (
             own.message_drop,
             "Lost messages: with probability "

@@ -11,6 +11,7 @@ from tdac_agent.prompting.prompt import PromptError, PromptTemplate, fill_in
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.prompting.set_observations import (
     disturbance_lines,
+    limit_lines,
     observation_rows,
 )
 from tdac_agent.sandbox import Limits
@@ -19,6 +20,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.infrared import PLACES, TABLE
 from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.robots import EPuckRobotParams
+from tdac_envs.ladder.shown import in_shown_units
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.mapping.params import RobotParams
 
@@ -65,17 +67,18 @@ def check_generated(tasks: TaskSet) -> None:
 
 def set_context(tasks: TaskSet) -> dict[str, Any]:
     """Returns the template variables of a task set."""
-    file, limits = tasks.file, Limits()
+    file, limits = in_shown_units(tasks.file), Limits()
     return {
         "name": tasks.name,
         "file": file,
+        "epuck": file.is_epuck,
         "found": tasks.files is not None,
         **_robot(tasks),
-        "unit": file.unit,
+        "unit": file.shown_unit,
         "full_step": file.full_step,
         "observation_rows": list(observation_rows(tasks)),
         "disturbances": list(disturbance_lines(file)),
-        "params_text": params_text(level_params(file)),
+        "params_text": params_text(level_params(tasks.file)),
         **allowed_code({"__future__", "sensors"}),
         "memory": f"{limits.memory_bytes >> 30}",
         "wall_seconds": f"{limits.call_seconds:g}",
@@ -85,14 +88,15 @@ def set_context(tasks: TaskSet) -> dict[str, Any]:
 
 def _robot(tasks: TaskSet) -> dict[str, Any]:
     """Variables of the robot and its worlds."""
-    file = tasks.file
+    file = in_shown_units(tasks.file)
     robot = file.robot
     if not isinstance(robot, EPuckRobotParams):
         return {
             "robot": robot,
             "turn": 2.0 * file.full_step / robot.axle_length,
             "rays": _rays(robot),
-            "side": tasks.largest_side,
+            "side": tasks.largest_side * file.per_unit,
+            "limits": list(limit_lines(file)),
         }
     floors = [each for each in file.worlds if isinstance(each, Plates)]
     table = TABLE.tolist()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from tdac_agent.tasks.units import Point, Units
+from tdac_agent.tasks.units import METRES, Point, Units
 from tdac_envs.drive.task import Pose
 
 
@@ -36,6 +36,13 @@ class StartFrame:
         screen = Pose(*units.on_screen([start])[0].tolist())
         size = 1.0 / units.scale
         return cls(screen, units.place, size, units.decimals, units.up)
+
+    def in_metres(self, resolution: float | None) -> StartFrame:
+        """The same frame in metres, if a map has these metres per px: y to the left."""
+        if resolution is None:
+            return self
+        digits = METRES.decimals
+        return replace(self, name="m", per_pixel=resolution, decimals=digits, up=True)
 
     def coordinates(self, x: float, y: float) -> Point:
         """The coordinates of a place on the screen."""

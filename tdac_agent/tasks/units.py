@@ -13,6 +13,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tdac_envs.grid.map_units import MapFrame, MapUnits
+
 Point = tuple[float, float]
 Points = NDArray[np.float64]
 Place = Literal["px", "m"]
@@ -188,3 +190,24 @@ PIXELS = Units("px", "px", 1.0, up=False, decimals=1, digits=2)
 METRES = Units("m", "mm", 1000.0, up=True, decimals=3, digits=4)
 UNITS: dict[str, Units] = {units.place: units for units in (PIXELS, METRES)}
 """Units by `place`, which reports state."""
+
+Frame = tuple[int, float, float, float, float]
+"""Height of a map, px; metres per px; origin (x, y, yaw) of its lower left pixel."""
+
+
+def frame_of(units: Units) -> Frame | None:
+    """The frame of a map in whose metres units are printed; None for other units."""
+    shown = units.shown
+    if not isinstance(shown, MapUnits) or shown.frame is None:
+        return None
+    return shown.frame.height, shown.frame.resolution, *shown.frame.origin
+
+
+def units_in(place: Place, frame: Frame | None) -> Units:
+    """The units of a report: those of an environment, printed in metres of a frame."""
+    if frame is None:
+        return UNITS[place]
+    height, resolution, *origin = frame
+    return UNITS[place].in_metres(
+        MapUnits(MapFrame(height, resolution, (origin[0], origin[1], origin[2])))
+    )

@@ -15,7 +15,7 @@ from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
 from tdac_agent.metrics.rates import rate_of_runs
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_agent.tasks.disturbance import Disturbance
-from tdac_agent.tasks.units import Place, Units
+from tdac_agent.tasks.units import Frame, Place, Units, units_in
 from tdac_agent.verification.decision import SequentialResult, result_of
 from tdac_agent.verification.diagnosis.gap import (
     TOO_CLOSE,
@@ -77,6 +77,9 @@ class EpisodeProvenance(StrictRecord):
     )
     variation: str | None = Field(None, description="Of start and goal of a task.")
     unit: Place = Field("px", description="Unit of positions and lengths.")
+    frame: Frame | None = Field(
+        None, description="Of a map, where lengths are printed in metres."
+    )
     left_out: tuple[str, ...] = Field(
         (), description="Nodes of the world that may be solid and were ignored."
     )
@@ -88,6 +91,11 @@ class EpisodeProvenance(StrictRecord):
     limits: dict[str, float] = Field(description="Limits of each episode.")
     warnings: tuple[str, ...] = ()
     versions: dict[str, str]
+
+    @property
+    def units(self) -> Units:
+        """Units in which figures are printed."""
+        return units_in(self.unit, self.frame)
 
 
 class Interval(StrictRecord):

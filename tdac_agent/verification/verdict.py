@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Literal
 
 from tdac_agent.runs.run_record import Run
-from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.gap import gap_figure, too_close_text
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.confirming import ConfirmingTest
@@ -49,7 +48,7 @@ def confirmed_text(report: EpisodeReport) -> str:
     test, failed = _test_of(report), report.count - report.successes
     if word_of(report) == "passed":
         assert report.smallest_gap is not None
-        near = too_close_text(report.smallest_gap, UNITS[report.provenance.unit])
+        near = too_close_text(report.smallest_gap, report.provenance.units)
         return f"{report.too_close} of {report.count} blind drives came {near}"
     if report.passed:
         return f"arrives ≥ {100 * test.least:g} % ({failed} of {report.count} failed)"
@@ -65,7 +64,7 @@ def verified_text(report: EpisodeReport) -> str:
     if not is_verified(report):
         return text
     if gap is not None:
-        text += f", smallest gap {gap_figure(gap.gap, UNITS[report.provenance.unit])}"
+        text += f", smallest gap {gap_figure(gap.gap, report.provenance.units)}"
     text += f", sandbox {report.provenance.sandbox}"
     return f"{text}; not covered: {not_covered(report)}"
 

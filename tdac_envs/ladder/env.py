@@ -247,8 +247,7 @@ def env_class(level: str | Path) -> type[LadderEnv | EPuckLadderEnv]:
     Raises:
         TaskError: There is no such set, or it is not valid.
     """
-    is_epuck = find_set_file(level).unit == "m"
-    return EPuckLadderEnv if is_epuck else LadderEnv
+    return EPuckLadderEnv if find_set_file(level).is_epuck else LadderEnv
 
 
 def _opened(

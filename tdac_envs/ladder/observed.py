@@ -24,6 +24,10 @@ ANCHOR = 7
 class SetView:
     """What is observed in a set, for one robot or for many.
 
+    Worlds are in px, with y down. In a set with a resolution, the robot observes
+    metres, y is up (in the start frame: to the left), and turns to the left are
+    positive, as in ROS.
+
     Args:
         file: The set.
         side: Largest width or height of its worlds, px or m.
@@ -34,8 +38,13 @@ class SetView:
         self._keys = tuple(sorted(file.observed))
         self._from_start = file.frame == "start"
         # Worlds of an e-puck have their origin in the middle.
-        self._low = -0.5 if file.unit == "px" else -side / 2
+        self._low = -side / 2 if file.is_epuck else -0.5
         self._side = side
+        self._is_metric = file.resolution is not None
+        self._scale = file.per_unit
+        turn = -1.0 if self._is_metric else 1.0
+        self._signs = np.array([self._scale, turn * self._scale])
+        self._turns = np.array([self._scale, turn])
         self.privileged = privileged
 
     def space(self, whole: spaces.Dict) -> spaces.Dict:
@@ -45,31 +54,49 @@ class SetView:
             whole: The space of the environment of one world.
         """
         if self._from_start:
-            far = math.hypot(self._side, self._side)
+            far = self._scale * math.hypot(self._side, self._side)
             low, high = np.full(2, -far, np.float32), np.full(2, far, np.float32)
         else:
-            low = np.full(2, self._low, np.float32)
-            high = np.full(2, self._low + self._side, np.float32)
+            least = 0.0 if self._is_metric else self._low
+            low = np.full(2, least, np.float32)
+            high = np.full(2, least + self._scale * self._side, np.float32)
         pi = np.float32(math.pi)
         own = {
             **whole.spaces,
             "pose": spaces.Box(np.append(low, -pi), np.append(high, pi)),
             "goal": spaces.Box(low, high),
         }
+        if self._is_metric:
+            own |= {
+                key: _scaled(own[key], factors)
+                for key, factors in (
+                    ("ranges", self._scale),
+                    ("odometry", np.abs(self._turns)),
+                )
+                if key in own
+            }
         return spaces.Dict({key: own[key] for key in self._keys})
 
     def anchor(self, task: Any) -> Array:
         """Where an episode's frame of reference is, and its goal, shape (7,).
 
         They are x, y, heading of the frame, cosine and sine of this heading, and the
-        goal in the frame.
+        goal as it is observed.
         """
-        x, y, heading = task.start if self._from_start else (0.0, 0.0, 0.0)
+        x, y, heading = task.start if self._from_start else self._corner(task)
         # From `math`: NumPy's may differ between a scalar and an array.
         cosine, sine = math.cos(heading), math.sin(heading)
         dx, dy = task.goal[0] - x, task.goal[1] - y
-        goal = cosine * dx + sine * dy, cosine * dy - sine * dx
+        goal = np.array([cosine * dx + sine * dy, cosine * dy - sine * dx])
+        if self._is_metric:
+            goal = goal * self._signs + 0.0  # not -0.0
         return np.array([x, y, heading, cosine, sine, *goal])
+
+    def _corner(self, task: Any) -> tuple[float, float, float]:
+        """Origin and heading of the map's frame: in metres its lower left corner."""
+        if not self._is_metric:
+            return 0.0, 0.0, 0.0
+        return -0.5, task.terrain.grid.cells.shape[0] - 0.5, 0.0
 
     def seen(self, whole: Seen, poses: Array, anchors: Array) -> Seen:
         """The observations of one robot, or of many with an additional first axis.
@@ -80,20 +107,34 @@ class SetView:
             anchors: See `anchor`, shape (..., 7).
         """
         own = {**whole, **self.placed(poses, anchors)}
-        return self.chosen(own)
+        return self.chosen(self.sensed(own))
 
     def chosen(self, whole: Seen) -> Seen:
         """The entries that are observed."""
         return {key: whole[key] for key in self._keys}
 
+    def sensed(self, whole: Seen) -> Seen:
+        """The same with ranges and odometry in the units of the set."""
+        if not self._is_metric:
+            return whole
+        own = {**whole, "ranges": _times(whole["ranges"], self._scale)}
+        if "odometry" in whole:
+            own["odometry"] = _times(whole["odometry"], self._turns)
+        return own
+
     def placed(self, poses: Array, anchors: Array) -> Seen:
         """The observed goal and pose; arguments as for `seen`."""
         own = {"goal": anchors[..., 5:].astype(np.float32)}
-        if self._from_start and "pose" in self._keys:
+        moves = self._from_start or self._is_metric
+        if moves and "pose" in self._keys:
             turned = poses[..., 2] - anchors[..., 2]
+            if self._is_metric:
+                turned = 0.0 - turned
             turned = np.where(turned > math.pi, turned - 2.0 * math.pi, turned)
             turned = np.where(turned <= -math.pi, turned + 2.0 * math.pi, turned)
             places = _moved(poses[..., :2], anchors)
+            if self._is_metric:
+                places = places * self._signs + 0.0  # not -0.0
             joined = np.concatenate([places, turned[..., None]], axis=-1)
             own["pose"] = joined.astype(np.float32)
         return own
@@ -154,6 +195,17 @@ def joined(each: Mapping[int, Mapping[str, Any]], count: int) -> dict[str, Any]:
             infos[key][list(values)] = list(values.values())
         infos[f"_{key}"] = mask.copy()
     return infos
+
+
+def _times(values: NDArray[np.float32], factors: Any) -> NDArray[np.float32]:
+    """The product in double precision, as float32."""
+    return np.asarray(values.astype(np.float64) * factors).astype(np.float32)
+
+
+def _scaled(box: spaces.Space[Any], factors: Any) -> spaces.Box:
+    """A box with its bounds multiplied."""
+    assert isinstance(box, spaces.Box)
+    return spaces.Box(_times(box.low, factors), _times(box.high, factors))
 
 
 def _moved(points: Array, anchors: Array) -> Array:

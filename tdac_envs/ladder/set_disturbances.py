@@ -19,6 +19,8 @@ RECEPTION = (
     *("pose_delay", "scan_delay", "message_drop"),
 )
 """Those that concern how pose and scan reach the robot."""
+LENGTHS = "pose_noise", "range_min", "max_acceleration"
+"""Those that are lengths, or lengths per second squared."""
 ONLY_ON_MAPS = (
     *("range_noise", "range_dropout", "range_min", "wheel_radius_error"),
     *("max_acceleration", *RECEPTION),

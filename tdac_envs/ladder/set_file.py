@@ -94,7 +94,7 @@ class SetFile(StrictModel):
         LEVEL_ROBOT
     )
     resolution: Length | None = Field(
-        None, description="Metres per px of the worlds, for a robot in metres."
+        None, description="Metres per px of the worlds: the robot observes metres."
     )
     dt: float = Field(0.1, ge=0.01, le=1, description="Duration of a step, s.")
     goal_tolerance: Length = Field(4.0, le=100, description="px or m")
@@ -173,8 +173,10 @@ class SetFile(StrictModel):
 
     def _check_robot(self) -> None:
         """Checks that worlds and observations are those of the robot."""
-        epuck = isinstance(self.robot, EPuckRobotParams)
+        epuck = self.is_epuck
         whose = "an e-puck" if epuck else "a robot on maps"
+        if epuck and self.resolution is not None:
+            raise ValueError("`resolution` is for robots on maps")
         if epuck and (self.files is not None or self.map):
             raise ValueError("an e-puck drives in generated worlds, without a map")
         if any(isinstance(each, Plates) != epuck for each in self.worlds):
@@ -193,9 +195,24 @@ class SetFile(StrictModel):
                 )
 
     @property
+    def is_epuck(self) -> bool:
+        """Whether the robot is an e-puck, which drives in Webots worlds."""
+        return isinstance(self.robot, EPuckRobotParams)
+
+    @property
     def unit(self) -> Literal["px", "m"]:
-        """Unit of lengths."""
-        return "m" if isinstance(self.robot, EPuckRobotParams) else "px"
+        """Unit of lengths here, of worlds and of reports."""
+        return "m" if self.is_epuck else "px"
+
+    @property
+    def shown_unit(self) -> Literal["px", "m"]:
+        """Unit of lengths that the robot observes, and that are printed."""
+        return self.unit if self.resolution is None else "m"
+
+    @property
+    def per_unit(self) -> float:
+        """Size of a unit of lengths here in the shown one."""
+        return 1.0 if self.resolution is None else self.resolution
 
     @property
     def full_step(self) -> float:
@@ -326,7 +343,7 @@ BUILT_IN = Path(__file__).parent / "sets"
 
 def set_names() -> tuple[str, ...]:
     """Names of the levels, the easiest first."""
-    return "known", "unknown", "lost", "moving", "crowd", "epuck"
+    return "known", "unknown", "lost", "moving", "crowd", "epuck", "floor"
 
 
 def shipped_names() -> tuple[str, ...]:

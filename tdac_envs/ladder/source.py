@@ -69,7 +69,7 @@ class SetSource:
             )
         size = whole_number("train_pool", train_pool, 0, MOST_WORLDS)
         kept = split == "train" and size > 0
-        pool = PlatePool if task_set.file.unit == "m" else TrainingPool
+        pool = PlatePool if task_set.file.is_epuck else TrainingPool
         self._pool = pool(task_set) if kept else None
         most, count = size if kept else MOST_WORLDS, task_set.count(split)
         self._count = most if count is None else min(count, most)

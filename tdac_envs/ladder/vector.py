@@ -57,7 +57,7 @@ class TaskSetVectorEnv(DrivenVectorEnv):
         placed = view.placed(self.last_observed_poses, before)
         for i in np.flatnonzero(ended).tolist():
             own = {key: values[i].copy() for key, values in placed.items()}
-            final[i] = view.chosen({**final[i], **own})
+            final[i] = view.chosen(view.sensed({**final[i], **own}))
         last = view.infos(infos.pop("final_info"), self.last_poses, ended)
         # The new episodes have not ended.
         infos = view.infos(infos, poses, np.zeros_like(ended))

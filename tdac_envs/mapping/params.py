@@ -294,7 +294,21 @@ def _converted(
     def place(point: Any) -> tuple[float, float]:
         return units.pixels(tuple(point)) if inwards else units.written_place(*point)
 
-    robot = dict(own["robot"])
+    places = {key: place(own[key]) for key in ("start", "goal") if own[key] is not None}
+    return {
+        **places,
+        "heading": units.heading_in_pixels(own["heading"]),
+        "inflation": length(own["inflation"]),
+        "robot": converted_robot(own["robot"], units, inwards=inwards),
+    }
+
+
+def converted_robot(
+    own: dict[str, Any], units: MapUnits, *, inwards: bool
+) -> dict[str, Any]:
+    """The values of a robot of a file, to pixels (inwards) or metres."""
+    length = units.length_in_pixels if inwards else units.written_length
+    robot = dict(own)
     robot.update({key: length(robot[key]) for key in _ROBOT_LENGTHS if key in robot})
     if "scanner_offset" in robot:
         ahead, aside = robot["scanner_offset"]
@@ -303,13 +317,7 @@ def _converted(
     if "ray_angles" in robot:
         # y points up in the frame of a map; 0.0 - 0.0 is not -0.0.
         robot["ray_angles"] = [0.0 - angle for angle in robot["ray_angles"]]
-    places = {key: place(own[key]) for key in ("start", "goal") if own[key] is not None}
-    return {
-        **places,
-        "heading": units.heading_in_pixels(own["heading"]),
-        "inflation": length(own["inflation"]),
-        "robot": robot,
-    }
+    return robot
 
 
 def _without_even_fan(robot: RobotParams) -> RobotParams:

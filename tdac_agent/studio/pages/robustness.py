@@ -11,7 +11,6 @@ from tdac_agent.studio.folder import STATE, as_word, made_within
 from tdac_agent.studio.jobs import job_of, start, stop_job
 from tdac_agent.studio.pages.films import show_film
 from tdac_agent.studio.run_status import readable_run
-from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
@@ -73,7 +72,7 @@ class Robustness:
                 low, high = report.interval.low, report.interval.high
                 text += f" (95 % interval {low:.3f} to {high:.3f})"
             ui.label(f"{text}.")
-            units, first = UNITS[report.provenance.unit], report.provenance.first
+            units, first = report.provenance.units, report.provenance.first
             name = f"episode {(report.closest or first) - first + 1}"
             for line in report.gap_lines(units, name):
                 ui.label(f"{line}.")

@@ -269,7 +269,7 @@ def look_at(name: str, split: str, index: int) -> tuple[TaskSet, Image, dict[str
     hard, file = world.difficulty, tasks.file
     facts = {
         "generator": tasks.kind(split, index),
-        "shortest path": f"{hard.length:.4g} {file.unit}",
+        "shortest path": f"{hard.length * file.per_unit:.4g} {file.shown_unit}",
         "at full speed": f"{hard.steps:.0f} steps",
         "narrowest passage": f"{hard.gap:.2f} body diameters",
         "detour": f"{hard.detour:.2f} times the straight line",

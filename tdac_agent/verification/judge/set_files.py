@@ -18,6 +18,7 @@ from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_disturbances import DisturbanceSpec
 from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.set_limits import CpuSpec
+from tdac_envs.ladder.shown import in_shown_units
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 
@@ -73,7 +74,11 @@ def write_as_level(folder: Path, task: Task) -> None:
 
 
 def level_params(file: SetFile) -> dict[str, Any]:
-    """What `params.json` tells a controller: the robot and its budget, no world."""
+    """What `params.json` tells a controller: the robot and its budget, no world.
+
+    Lengths are in the units that the robot observes.
+    """
+    file = in_shown_units(file)
     robot, disturbances = file.robot, file.disturbances.written()
     sizes: dict[str, Any]
     if isinstance(robot, EPuckRobotParams):
@@ -81,8 +86,10 @@ def level_params(file: SetFile) -> dict[str, Any]:
         disturbances |= robot.errors
     else:
         sizes = robot.written()
+    scale = {} if file.resolution is None else {"resolution": file.resolution}
     return {
         "schema_version": 1,
+        **scale,
         "robot": sizes,
         "dt": file.dt,
         "goal_tolerance": file.goal_tolerance,

@@ -15,7 +15,7 @@ from tdac_agent.episodes.episode import Driver, Record
 from tdac_agent.sandbox import Child
 from tdac_agent.tasks.setting import JudgedEnv, Nominal
 from tdac_agent.tasks.start_frame import StartFrame
-from tdac_agent.tasks.units import UNITS, Units
+from tdac_agent.tasks.units import UNITS, Units, units_in
 from tdac_agent.verification.judge.cpu_budget import Budgeted
 from tdac_agent.verification.judge.episode_row import EpisodeRow, plan_facts
 from tdac_agent.verification.judge.set_files import write_files
@@ -51,7 +51,7 @@ class SetEpisodes:
     @property
     def units(self) -> Units:
         """See `Worlds`."""
-        return UNITS[self.file.unit]
+        return printed_units(self.file)
 
     @cached_property
     def salt(self) -> bytes | None:
@@ -173,7 +173,16 @@ def shown_units(file: SetFile, task: AnyTask) -> Units:
         file: The task set.
         task: The task of a world.
     """
-    units = UNITS[file.unit]
     if file.frame == "map":
-        return units
-    return units.from_start(StartFrame.of(task.start, units))
+        return printed_units(file, task)
+    units = UNITS[file.unit]
+    frame = StartFrame.of(task.start, units)
+    return units.from_start(frame.in_metres(file.resolution))
+
+
+def printed_units(file: SetFile, task: AnyTask | None = None) -> Units:
+    """Units of the lengths of a set; with a task of a world, also of places there."""
+    if file.resolution is None:
+        return UNITS[file.unit]
+    height = task.terrain.grid.cells.shape[0] if isinstance(task, Map2DTask) else 1
+    return units_in(file.unit, (height, file.resolution, 0.0, 0.0, 0.0))

@@ -172,9 +172,9 @@ def damaged(folder, name, content=None):
         ("report.json", "report.json: damaged"),
         ("task.yaml", "Not readable"),
         ("rules.json", "is not a rules file"),
-        ("journal.jsonl", "verified in iteration 1"),
+        ("journal.jsonl", "passed in iteration 1"),
         ("iterations/k01/j1/trajectories/nominal.npz", "jitter 1: reached"),
-        ("iterations/k01/j1/controller.py", "verified in iteration 1"),
+        ("iterations/k01/j1/controller.py", "passed in iteration 1"),
     ],
 )
 def test_a_torn_file(copied, name, told):
