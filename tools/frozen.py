@@ -1,6 +1,6 @@
 """Prints the hashes of the bundled task sets, for `tdac_envs/ladder/frozen.py`.
 
-    python -m tools.frozen           # the table FROZEN
+    python -m tools.frozen           # the tables CODE and FROZEN
     python -m tools.frozen --drive   # a hash of some episodes of each set
 
 Run the second one before and after a change of code, on one machine: equal hashes show
@@ -16,13 +16,18 @@ import gymnasium as gym
 import numpy as np
 
 import tdac_envs
+from tdac_envs.core.dynamics import code_sha256
+from tdac_envs.ladder.frozen import ON_MAPS_OF_SETS, ON_PLATES
 from tdac_envs.ladder.set_file import shipped_names
 
 WORLDS, STEPS = 4, 400
 
 
 def main() -> None:
-    """Prints the table, or the hashes of episodes."""
+    """Prints the tables, or the hashes of episodes."""
+    if "--drive" not in sys.argv:
+        print(f'    ON_MAPS_OF_SETS: "{code_sha256(*ON_MAPS_OF_SETS)}",')
+        print(f'    ON_PLATES: "{code_sha256(*ON_PLATES)}",')
     for name in shipped_names():
         if "--drive" in sys.argv:
             print(f"{name}: {driven(name)}", flush=True)

@@ -26,6 +26,7 @@ from tdac_envs.ladder.set_file import set_names
 
 _COMPARED = {
     "sha256": "version",
+    "dynamics": "dynamics",
     "split": "split",
     "worlds": "number of worlds",
     "salt_sha256": "salt",

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tdac_envs.core.dynamics import ON_MAPS, STEP
+from tdac_envs.core.dynamics import IN_WORLDS, ON_MAPS
 
 LADDER = "Ladder 1.0"
 BEFORE = f"before {LADDER}"
 """What results without a hash of the dynamics are called."""
 ON_MAPS_OF_SETS = (*ON_MAPS, "ladder")
 ON_PLATES = (
-    *(*STEP, "epuck", "ladder"),
-    *("worlds/bodies.py", "worlds/footprint.py", "worlds/materials.py"),
-    *("worlds/world.py", "map2d/contact.py", "map2d/rays.py", "map2d/straight.py"),
-    "map2d/terrain.py",
+    *(*IN_WORLDS, "ladder", "map2d/contact.py", "map2d/rays.py"),
+    *("map2d/straight.py", "map2d/terrain.py"),
 )
 """Code of sets of an e-puck; their worlds are measured as maps."""
 
@@ -31,41 +29,46 @@ class Frozen(NamedTuple):
     dynamics: str
 
 
+CODE = {
+    ON_MAPS_OF_SETS: "4b0f032f9121c41410cd111be6664c2f345f2f53a85a019b96f0e08f4c542818",
+    ON_PLATES: "643703d9d8b7ce73050a08c827d40f0edde49d85c4f05098f30be6d7628d63da",
+}
+"""Hashes of the code of this ladder."""
 FROZEN: dict[str, Frozen] = {
     "known": Frozen(
         "7cd7606b6276646f57999a90d81eee4a83f7b195386c467dd69cb76388ac218f",
-        "fbc35b6278f2142d689bf7a00d0bc2b288539b03fad9d6da596cd9c6e743e9f4",
+        "27039d0862284a44c158211495f9e07e54c0076e47582bbf44c2a597ada72451",
     ),
     "unknown": Frozen(
         "a95bc6cc55cd46d86b71535da6009fd7a23510ec82cd2fd90f1c0484bce42cb4",
-        "bbbeee8ca6b5b9516f97e8195f5f94ac4ddb02105f15d9872cefc260a29b2b5d",
+        "ae15c7acfc3d8c6f28df23f76cb9f87391c30d6a3d8578d26736cd269dfa0a58",
     ),
     "lost": Frozen(
         "6ecbed8a359e0683cd64b6dbf341b629a93828854c724bc5e1ba6f60b95e29a4",
-        "9d2d49da15e0e4adfd7bec9d690b9c3bb156da7b46b09813edbd12b795359d62",
+        "611bb9a95ddc80c8934ee1f7925ceacfe4256ca73c45231aad55bd2e93923e56",
     ),
     "moving": Frozen(
         "fcabb48d5d2ee33aaeb9397e1028dfa123b43fea2e14abbf3468bc5c42e65835",
-        "b45867c58dcf3b969ad894b5f80d427643c5b600e7482a262c06ac40eb208101",
+        "a5409c184440c76cc81d39b937b81a77c3e66b8c5f3029043bdbeb0a6ff1ef77",
     ),
     "crowd": Frozen(
         "535b797efa54b4a55dc7986a4be163783927317b75ec2c1a4facf4b5f737974c",
-        "31bfca23fc54ad454130bae7bd4bbc49c22d45a5fcc454651bceec89c59da999",
+        "2e1664da3a0f4637c416b82a41fc4f74acb6a1d30b5bc61e8b84e2379f43204f",
     ),
     "epuck": Frozen(
         "f14e67b3a6302229283054585b4c435c02fca0fdc70ece5733dc87fcf89eeb52",
-        "7b79d36223e140ee1d3e44aeba5e4da18a08bd253691e60fc01a2f15a3451279",
+        "82759f4b7a52c6fd098f10795bef4746ac21b365e57d9775f01e59fc18ce525d",
     ),
     "barn": Frozen(
         "57468e2ffea454090dc0a56c2f71ff84396bf818ab061c281dcb0fe5d956700c",
-        "7fce53fa96d9efaf6cf3dce42d06480c46c9dcdafcc4c025d595fce1fe1293bc",
+        "47e0e596334814fb423264213a4094abd3d99889b8d65d042bc27910b3210a4a",
     ),
     "barn-slow": Frozen(
         "8595432ce3f749f02d9bfd9eceabd32eb4e5e7e40579e80110597e64b73e3894",
-        "f7785cb79696009ab074d42f84b804982e5bb9eac98893abc6ca524548a4e726",
+        "cbb5cde160dea8ad2dc2bdea79a08adb4c30629456c7684c3d48154ef0574ba5",
     ),
 }
-"""The sets of this ladder by name; `python -m tools.frozen` prints what they are now."""
+"""The sets of this ladder by name; `python -m tools.frozen` prints the present ones."""
 UNCHANGED = ("known", "unknown", "lost", "moving", "crowd", "barn", "barn-slow")
 """Sets with the same dynamics as before; the e-puck of `epuck` had another axle."""
 

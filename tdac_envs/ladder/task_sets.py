@@ -67,17 +67,17 @@ class TaskSet:
 
     @cached_property
     def dynamics(self) -> str:
-        """Hash of all that decides what happens in an episode.
+        """Hash of all that decides what happens in an episode, code included.
 
-        Beside the values of the set, these are its robot with all figures, and the
-        source of what makes worlds, drives and observes.
+        It covers the values of the set, the sizes of an e-puck, and the source of what
+        makes worlds, drives and observes.
         """
-        robot = self.file.robot
+        robot, facts = self.file.robot, {"set": self.sha256}
         if isinstance(robot, EPuckRobotParams):
-            sizes, code = robot.sizes, ON_PLATES
+            sizes = json.dumps(robot.sizes, sort_keys=True)
+            facts |= {"robot": sizes, "code": code_sha256(*ON_PLATES)}
         else:
-            sizes, code = robot.model_dump(mode="json"), ON_MAPS_OF_SETS
-        facts = {"set": self.sha256, "robot": sizes, "code": code_sha256(*code)}
+            facts |= {"code": code_sha256(*ON_MAPS_OF_SETS)}
         return sha256_of(json.dumps(facts, sort_keys=True))
 
     @property

@@ -115,7 +115,7 @@ def _without_texts(body):
             "epuck/contact.py epuck/pushing.py ladder/plate_worlds.py "
             "ladder/generators/plates.py ladder/robots.py drive/stepping.py",
         ),
-        (IN_WORLDS, "worlds/world.py worlds/wbt/geometry.py epuck/kernels.py"),
+        (IN_WORLDS, "worlds/world.py worlds/bodies.py epuck/kernels.py"),
     ],
 )
 def test_what_decides_an_episode_counts(parts, names):

@@ -6,23 +6,41 @@ import pytest
 import yaml
 
 from tdac_envs import load_set
-from tdac_envs.ladder.frozen import BEFORE, FROZEN, LADDER, UNCHANGED, ladder_of
+from tdac_envs.core.dynamics import code_sha256
+from tdac_envs.ladder.frozen import (
+    BEFORE,
+    CODE,
+    FROZEN,
+    LADDER,
+    ON_PLATES,
+    UNCHANGED,
+    ladder_of,
+)
 from tdac_envs.ladder.set_file import shipped_names
 
 CHANGED = f"""
-The dynamics of {{name}} are not those of {LADDER}. They are frozen: results are compared
-with each other, and the ledger of hidden worlds answers from them.
-- If the change moves no number of an episode (`python -m tools.frozen --drive` prints the
-  same before and after it), add the old and the new hash of the code to SAME in
-  tdac_envs/core/dynamics.py. Results stay valid.
-- Otherwise raise LADDER in tdac_envs/ladder/frozen.py, replace the table by what
-  `python -m tools.frozen` prints, and drive everything in results/ again.
+The dynamics of {{name}} are not those of {LADDER}. They are frozen: results are
+compared with each other, and the ledger of hidden worlds answers from them.
+- A change that moves no number of an episode: `python -m tools.frozen --drive` prints
+  the same before and after it. Add the old and the new hash of the code to SAME in
+  tdac_envs/core/dynamics.py; results stay valid.
+- Any other change: raise LADDER in tdac_envs/ladder/frozen.py, replace its table by
+  what `python -m tools.frozen` prints, and drive everything in results/ again.
 """
 
 
 def test_all_bundled_sets_are_frozen():
     """In the order in which they are listed."""
     assert tuple(FROZEN) == shipped_names()
+
+
+@pytest.mark.parametrize("parts", CODE, ids=("maps", "plates"))
+def test_the_code_is_frozen(parts):
+    """It decides together with the values of a set what happens in an episode."""
+    name = "sets of an e-puck" if parts is ON_PLATES else "sets on maps"
+    found, frozen = code_sha256(*parts), CODE[parts]
+    same = f'For SAME: "{found}": "{frozen}"'
+    assert found == frozen, CHANGED.format(name=name) + same
 
 
 @pytest.mark.parametrize("name", shipped_names())
