@@ -7,7 +7,7 @@ from typing import NamedTuple
 from tdac_envs.core.dynamics import IN_WORLDS, ON_MAPS
 
 LADDER = "Ladder 1.0"
-BEFORE = f"before {LADDER}"
+BEFORE = "before Ladder 1.0"
 """What results without a hash of the dynamics are called."""
 ON_MAPS_OF_SETS = (*ON_MAPS, "ladder")
 ON_PLATES = (
@@ -85,7 +85,7 @@ def ladder_of(name: str, sha256: str, dynamics: str) -> str:
     own = frozen is not None and frozen.sha256 == sha256
     if not dynamics:
         same = own and name in UNCHANGED
-        return f"{BEFORE}, whose dynamics are the same" if same else BEFORE
+        return f"{BEFORE}, with the same dynamics" if same else BEFORE
     if frozen is None or not own:
         return ""
     return LADDER if dynamics == frozen.dynamics else f"other dynamics than {LADDER}"
