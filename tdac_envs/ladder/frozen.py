@@ -73,19 +73,32 @@ UNCHANGED = ("known", "unknown", "lost", "moving", "crowd", "barn", "barn-slow")
 """Sets with the same dynamics as before; the e-puck of `epuck` had another axle."""
 
 
-def ladder_of(name: str, sha256: str, dynamics: str) -> str:
+def dynamics_of(name: str, sha256: str, recorded: str) -> str:
+    """The dynamics of results; empty if they are of before and not known.
+
+    Args:
+        name: Name of the set.
+        sha256: Hash of its values.
+        recorded: Hash of its dynamics in the results; empty in those of before.
+    """
+    frozen = FROZEN.get(name)
+    if recorded or frozen is None or frozen.sha256 != sha256 or name not in UNCHANGED:
+        return recorded
+    return frozen.dynamics
+
+
+def ladder_of(name: str, sha256: str, recorded: str) -> str:
     """To which ladder results belong, in words; empty for sets of one's own.
 
     Args:
         name: Name of the set.
         sha256: Hash of its values.
-        dynamics: Hash of its dynamics; empty in results of before.
+        recorded: Hash of its dynamics in the results; empty in those of before.
     """
-    frozen = FROZEN.get(name)
-    own = frozen is not None and frozen.sha256 == sha256
-    if not dynamics:
-        same = own and name in UNCHANGED
+    if not recorded:
+        same = dynamics_of(name, sha256, recorded)
         return f"{BEFORE}, with the same dynamics" if same else BEFORE
-    if frozen is None or not own:
+    frozen = FROZEN.get(name)
+    if frozen is None or frozen.sha256 != sha256:
         return ""
-    return LADDER if dynamics == frozen.dynamics else f"other dynamics than {LADDER}"
+    return LADDER if recorded == frozen.dynamics else f"other dynamics than {LADDER}"

@@ -521,3 +521,25 @@ def test_results_say_to_which_ladder_they_belong(done, tmp_path, name, dynamics,
     (tmp_path / RESULTS).write_text(json.dumps(record))
     lines = done("bench", "show", tmp_path).splitlines()
     assert what in [line.strip() for line in lines]
+
+
+@pytest.mark.parametrize("name", ["known", "epuck"])
+def test_results_on_equal_dynamics_are_put_together(tmp_path, name):
+    """Also those of before Ladder 1.0, if nothing has changed since."""
+    own = {"name": name, "sha256": FROZEN[name].sha256, "salt_sha256": None}
+    own |= {"split": "test", "worlds": 100}
+    for folder, dynamics in (("old", ""), ("new", FROZEN[name].dynamics)):
+        rows = [{"set": name, "entrant": folder, "problem": "it broke"}]
+        sets = [own | {"dynamics": dynamics}]
+        record = {"versions": {}, "sets": sets, "entrants": [folder], "rows": rows}
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / RESULTS).write_text(json.dumps(record))
+        columns = "set,entrant,file,index,success,time_score\n"
+        (tmp_path / folder / WORLD_TABLE).write_text(columns)
+    folders = [tmp_path / "new", tmp_path / "old"]
+    if name == "epuck":
+        with pytest.raises(RunError, match=r"in its dynamics \(unknown, not \w{8}\)"):
+            merged(folders)
+        return
+    (both,) = merged(folders).sets
+    assert both.ladder == "before Ladder 1.0, with the same dynamics"
