@@ -142,6 +142,7 @@ class Terms(NamedTuple):
         about = EpisodeProvenance(
             name=self.tasks.name,
             sha256=self.tasks.sha256,
+            dynamics=self.tasks.dynamics,
             split="dev",
             controller_sha256=sha256_of(source.encode()),
             sandbox="none",
@@ -194,6 +195,7 @@ def by_ours(terms: Terms) -> Found:
             folder=Path(name),
             task=terms.tasks.name,
             task_sha256=terms.tasks.sha256,
+            dynamics=terms.tasks.dynamics,
             learner="builtin",
             optimizer="builtin",
             iterations=1,

@@ -96,7 +96,7 @@ def best_of_n(
         assert source is not None
         raw = source.encode()
         kept = out / "dev" / tasks.name / sha256_of(raw)[:16]
-        about = {"controller_sha256": sha256_of(raw), "sha256": tasks.sha256}
+        about = {"controller_sha256": sha256_of(raw), "dynamics": tasks.dynamics}
         known = kept_report(kept, {**about, "split": "dev"}, range(share))
         report = known or verify_episodes(
             raw, tasks, share, split="dev", out=kept, judge=judge

@@ -149,7 +149,7 @@ def main() -> int:
 def measure(kind: str, options: argparse.Namespace, pool: ProcessPoolExecutor) -> int:
     """Examines a kind of task's mutants; returns how many harmful ones survive."""
     ground, task, began = GROUNDS[kind], _task(kind), time.monotonic()
-    journal = Journal(options.resume, task.sha256())
+    journal = Journal(options.resume, task.dynamics())
     candidates = ground.originals(task)
     faults = list(journal.answers(pool, fault_of, candidates))
     left_out = {c.name: f for c, f in zip(candidates, faults, strict=True) if f}

@@ -97,9 +97,9 @@ def driven_on(
     file = kept / REPORT_FILE
     if file.is_file():
         report = EpisodeReport.model_validate_json(file.read_bytes())
-        own = report.provenance.sha256, report.provenance.controller_sha256
-        same = own == (tasks.sha256, sha256_of(raw))
-        if same and report.count == worlds:
+        about = {"controller_sha256": sha256_of(raw), "dynamics": tasks.dynamics}
+        known = report.provenance.model_dump(include=set(about))
+        if known == about and report.count == worlds:
             return report
     return verify_episodes(
         raw, tasks, worlds, split="hidden", salt_file=salt, out=kept, judge=warm
@@ -131,6 +131,7 @@ def _row(
             row |= {"ahead": ahead.mean()}
             row |= dict(zip(("ahead_low", "ahead_high"), interval(ahead), strict=True))
     row |= {"set_sha256": about.sha256, "salt_sha256": about.salt_sha256}
+    row |= {"dynamics": about.dynamics}
     return row | {"controller_sha256": about.controller_sha256}
 
 

@@ -38,6 +38,7 @@ from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.set_files import write_files
 from tdac_envs.drive.scores import time_score
 from tdac_envs.ladder.env import make
+from tdac_envs.ladder.task_sets import load_set
 
 FIRST = 100
 """The first of the worlds."""
@@ -100,7 +101,8 @@ def drawn(
 
 def driven(source: str, level: str, worlds: int, out: Path) -> list[dict[str, Any]]:
     """The first episodes of a file; those that have been driven are in `OUT/driven`."""
-    file = out / "driven" / level / f"{sha256_of(source.encode())[:16]}.jsonl"
+    name = sha256_of(source, load_set(level).dynamics)[:16]
+    file = out / "driven" / level / f"{name}.jsonl"
     file.parent.mkdir(parents=True, exist_ok=True)
     text = file.read_text(encoding="utf-8") if file.exists() else ""
     rows = [json.loads(line) for line in text.splitlines()]

@@ -16,7 +16,7 @@ from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import part_of
 from tdac_agent.evaluation.policies import Entrant
 from tdac_agent.problems.episodes import episodes_of
-from tdac_agent.problems.part import Part
+from tdac_agent.problems.part import Part, identity_of
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.drive_episodes import drive
 from tdac_agent.verification.episode_report import EpisodeReport, named
@@ -100,7 +100,7 @@ class Arena:
         own, part = episodes_of(problem), self.part(problem)
         wanted = {
             "controller_sha256": member.sha256,
-            "sha256": own.sha256,
+            **identity_of(own),
             "split": part.split or None,
             "salt_sha256": own.secret(part),
         }

@@ -31,6 +31,7 @@ from tdac_agent.bench.record import Bench, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import Executor
 from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import identity_of
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.storage.csv_file import TABLE_BYTES, read_rows
 from tdac_agent.storage.files import write_atomic
@@ -185,6 +186,7 @@ def _record(out: Path, entries: Sequence[Entry], worlds: int) -> None:
         {
             "set": entry.problem.name,
             "set_sha256": episodes_of(entry.problem).sha256,
+            "dynamics": episodes_of(entry.problem).dynamics,
             "worlds": worlds,
             "entrant": entry.entrant.name,
             "files": [member.sha256 for member in entry.members],
@@ -217,7 +219,7 @@ def _set_of(arena: Arena, problem: Problem) -> BenchSet:
     own, part = episodes_of(problem), arena.part(problem)
     return BenchSet(
         name=problem.name,
-        sha256=own.sha256,
+        **identity_of(own),
         split=part.split or part.variation,
         worlds=arena.count,
         salt_sha256=own.secret(part),

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from tdac_agent.metrics.paired import Estimate
 from tdac_agent.storage.printable_record import StrictRecord
+from tdac_envs.ladder.frozen import dynamics_of, ladder_of
 
 Kind = Literal["builtin", "planner", "controller", "learned", "privileged"]
 """What an entrant is."""
@@ -31,9 +32,22 @@ class BenchSet(StrictRecord):
 
     name: str
     sha256: str
+    dynamics: str = Field(
+        "", description="Hash of the set with its code; empty before Ladder 1.0."
+    )
     split: str
     worlds: int
     salt_sha256: str | None = Field(description="Of hidden worlds.")
+
+    @property
+    def driven_on(self) -> str:
+        """Its dynamics, also of results of before; see `dynamics_of`."""
+        return dynamics_of(self.name, self.sha256, self.dynamics)
+
+    @property
+    def ladder(self) -> str:
+        """To which ladder the results belong, in words; see `ladder_of`."""
+        return ladder_of(self.name, self.sha256, self.dynamics)
 
     @property
     def which(self) -> str:

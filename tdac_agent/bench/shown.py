@@ -26,6 +26,7 @@ from tdac_envs.ladder.set_file import set_names
 
 _COMPARED = {
     "sha256": "version",
+    "driven_on": "dynamics",
     "split": "split",
     "worlds": "number of worlds",
     "salt_sha256": "salt",
@@ -134,12 +135,14 @@ def _same_sets(folders: Sequence[Path], found: Sequence[Bench]) -> dict[str, Ben
                     f"the earlier folders in its {what} ({_short(other)}, not "
                     f"{_short(one)}); show them one at a time"
                 )
+            if not own.dynamics:
+                sets[own.name] = own  # says that results of before are among them
     levels = [name for name in set_names() if name in sets]
     return {name: sets[name] for name in dict.fromkeys([*levels, *sets])}
 
 
 def _short(value: object) -> str:
-    return value[:8] if isinstance(value, str) else str(value)
+    return (value[:8] or "unknown") if isinstance(value, str) else str(value)
 
 
 def _table(folder: Path) -> pd.DataFrame:

@@ -300,8 +300,9 @@ def question_of(problem: Task | TaskSet, template: PromptTemplate) -> str:
 def _hashes(problem: Task | TaskSet) -> dict[str, str]:
     """Hashes of what a candidate is tested with."""
     if isinstance(problem, TaskSet):
-        return {"set": problem.sha256}
-    return {"task": problem.sha256(), "suite": suite_sha256(problem)}
+        return {"set": problem.sha256, "dynamics": problem.dynamics}
+    own = {"task": problem.sha256(), "dynamics": problem.dynamics()}
+    return {**own, "suite": suite_sha256(problem)}
 
 
 def loop_of(config: CampaignConfig, setting: LoopSetting) -> tuple[int, int, bool]:

@@ -36,6 +36,8 @@ def show(results: Bench, console: Console) -> None:
         knows_map = any(row.knows == "+ map" for row in rows)
         console.print(_table(own, rows, console.width))
         console.print()
+        if own.ladder:
+            print_sentences(console, f"{own.name}: {own.ladder}", indent=2)
         for row in rows:
             for note in _notes(row, knows_map):
                 print_sentences(console, note, indent=2)

@@ -21,6 +21,7 @@ from tdac_agent.evaluation.evaluation_report import (
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.gap import TOO_CLOSE
+from tdac_envs.ladder.frozen import ladder_of
 
 NONE = "–"
 # Least widths of long policy names, so that a table fits into 80 columns.
@@ -188,9 +189,12 @@ def _figure(value: float | None, decimals: int) -> str:
 def _show_set(results: Evaluation, task: EvaluatedProblem, console: Console) -> None:
     """Prints the scores, those by generator, and failures."""
     worlds = f"worlds 0 to {results.episodes - 1} of {task.split}"
+    ladder = ladder_of(task.name, task.sha256, task.dynamics)
     rows = results.of(task.name)
     console.print(_scores(f"{task.name} {task.sha256[:8]}: {worlds}", rows))
     console.print()
+    if ladder:
+        print_sentences(console, f"{task.name}: {ladder}", indent=2)
     for row in rows:
         _print_failures(row, console)
     kinds = list(dict.fromkeys(kind for row in rows for kind in row.by_generator))

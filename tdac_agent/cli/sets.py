@@ -21,6 +21,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drawing.canvas import Image
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.ladder.dead_ends import RangeSensor, dead_ends
+from tdac_envs.ladder.frozen import ladder_of
 from tdac_envs.ladder.generators.blocks import PIXEL
 from tdac_envs.ladder.moving import MoversOfSet
 from tdac_envs.ladder.picture import AHEAD, contact_sheet, draw_world
@@ -116,7 +117,7 @@ def _record(tasks: TaskSet) -> dict[str, Any]:
     else:
         own = {"counts": tasks.files.counts, "skipped": list(tasks.files.skipped)}
         values["files"] |= own
-    return {**values, "sha256": tasks.sha256}
+    return {**values, "sha256": tasks.sha256, "dynamics": tasks.dynamics}
 
 
 def _world_record(
@@ -155,7 +156,10 @@ def _sensor(file: SetFile, pixel: float) -> RangeSensor:
 
 def _print_set(console: Console, tasks: TaskSet, record: dict[str, Any]) -> None:
     file = in_shown_units(tasks.file)
-    console.print(f"[bold]{escape(tasks.name)}[/]  {tasks.sha256[:12]}")
+    ladder = ladder_of(tasks.name, tasks.sha256, tasks.dynamics)
+    hashes = f"{tasks.sha256[:12]}, dynamics {tasks.dynamics[:12]}"
+    known = f"; {ladder}" if ladder else ""
+    console.print(f"[bold]{escape(tasks.name)}[/]  {hashes}{known}")
     if file.description:
         print_sentences(console, file.description)
     frame = "the map's frame" if file.frame == "map" else "the start's frame"
@@ -254,8 +258,8 @@ def _world_rows(world: dict[str, Any], unit: str, size: float) -> dict[str, str]
         f"{world['split']} {world['index']}": f"{world['generator']}, "
         f"{sides}, start ({x:g}, {y:g}){place}, heading {heading:.3f} rad, goal "
         f"({goal_x:g}, {goal_y:g}){place}",
-        "shortest": f"{size * world['length']:.4g} {unit}, {world['detour']:.2f} times the "
-        f"straight distance; OT {world['steps']:.1f} steps, horizon "
+        "shortest": f"{size * world['length']:.4g} {unit}, "
+        f"{world['detour']:.2f} times the straight distance; OT {world['steps']:.1f} steps, horizon "
         f"{world['horizon']}",
         "gap": f"{world['gap']:.2f} body diameters at the narrowest place",
         "dead ends": _dead_ends(world["dead_ends"], world["excess"]),

@@ -32,7 +32,7 @@ from tdac_agent.evaluation.policies import (
     prepared,
 )
 from tdac_agent.problems.episodes import episodes_of
-from tdac_agent.problems.part import Part
+from tdac_agent.problems.part import Part, identity_of
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import write_atomic
@@ -275,7 +275,7 @@ def _compete(entrant: Entrant, problem: Problem, part: Part, terms: _Terms) -> D
         trajectories=True,
     )
     own = folder / _folder_name(entrant.name, entrant.sha256)
-    report = _kept(own, request.sha256, problem.name, part)
+    report = _kept(own, request.sha256, _about_problem(problem, part), part)
     if report is None:
         report = drive(request, own, terms.judge, watch)
     knows = knowledge(entrant.policy, problem)
@@ -286,8 +286,11 @@ def _folder_name(name: str, sha256: str | None) -> str:
     return f"{Path(name).stem}-{(sha256 or 'ours')[:8]}"
 
 
-def _kept(folder: Path, sha256: str, name: str, part: Part) -> EpisodeReport | None:
-    wanted: dict[str, Any] = {"controller_sha256": sha256, "name": name}
+def _kept(
+    folder: Path, sha256: str, about: EvaluatedProblem, part: Part
+) -> EpisodeReport | None:
+    same = about.model_dump(include={"name", "sha256", "dynamics"})
+    wanted: dict[str, Any] = {"controller_sha256": sha256, **same}
     wanted |= {"split": part.split} if part.split else {"variation": part.variation}
     return kept_report(folder, wanted, part.numbers)
 
@@ -308,14 +311,14 @@ def _about_problem(problem: Problem, part: Part) -> EvaluatedProblem:
     if isinstance(problem, TaskSet):
         return EvaluatedProblem(
             name=problem.name,
-            sha256=problem.sha256,
+            **identity_of(episodes_of(problem)),
             split=part.split,
             unit=problem.file.unit,
         )
     return EvaluatedProblem(
         name=problem.name,
         called=display_name(problem),
-        sha256=problem.sha256(),
+        **identity_of(episodes_of(problem)),
         map_sha256=problem.setting.world_sha256(),
         unit=problem.setting.units.place,
     )
@@ -357,12 +360,13 @@ def _finished(
         )
     if not all((out / name).is_file() for name in written):
         return None
+    about_of = {task.name: task for task in found.tasks}
     part_of = {task.name: part for task, part in zip(found.tasks, parts, strict=True)}
     driven: list[Driven] = []
     for row in found.rows:
         name = _folder_name(row.policy, row.controller_sha256)
         folder, sha256 = out / POLICIES / row.task / name, row.controller_sha256 or ""
-        report = _kept(folder, sha256, row.task, part_of[row.task])
+        report = _kept(folder, sha256, about_of[row.task], part_of[row.task])
         if report is None:
             return None
         result = Result(row.task, row.policy, row.knows, report, row.note)

@@ -34,6 +34,9 @@ class EvaluatedProblem(StrictRecord):
     name: str
     called: str = Field("", description="Display name; with details unless bundled.")
     sha256: str
+    dynamics: str = Field(
+        "", description="The same with the code; empty before Ladder 1.0."
+    )
     map_sha256: str | None = Field(None, description="Of the map or world of a task.")
     split: str | None = Field(None, description="Of a set.")
     unit: Place = Field(description="Unit of lengths.")

@@ -34,6 +34,7 @@ from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 from tdac_envs.core.intake import read_file
+from tdac_envs.ladder.frozen import BEFORE
 
 DIFF_LINES = (100, 600)
 ALL_DIFF_LINES = 20_000
@@ -169,6 +170,7 @@ def _origin(history: RunHistory) -> list[tuple[str, str]]:
     facts = [
         ("started", run.started),
         ("task", f"{run.task}, sha256 {run.task_sha256}"),
+        ("dynamics", f"sha256 {run.dynamics}" if run.dynamics else BEFORE),
         ("Learner", learner_named(run.learner)),
         ("Optimizer", learner_named(run.optimizer)),
         ("agent", run.agent),

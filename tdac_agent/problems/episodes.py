@@ -49,6 +49,11 @@ class OfTask:
         return self.task.sha256()
 
     @property
+    def dynamics(self) -> str:
+        """See `Episodes`."""
+        return self.task.dynamics()
+
+    @property
     def longest(self) -> float:
         """See `Episodes`."""
         return self.task.nominal.horizon * self.task.nominal.dt

@@ -45,6 +45,14 @@ class Part:
         return self.numbers[0]
 
 
+def identity_of(own: Episodes) -> dict[str, str]:
+    """Fields of provenance in which results on the same problem agree.
+
+    Results of before Ladder 1.0 have no hash of the dynamics, and so are no answer.
+    """
+    return {"sha256": own.sha256, "dynamics": own.dynamics}
+
+
 class Episodes(Protocol):
     """The episodes of a task or a task set."""
 
@@ -55,6 +63,10 @@ class Episodes(Protocol):
     @property
     def sha256(self) -> str:
         """Its hash."""
+
+    @property
+    def dynamics(self) -> str:
+        """Hash of all that decides what happens in an episode, code included."""
 
     @property
     def checks(self) -> bool:

@@ -62,7 +62,11 @@ class Problem(Protocol):
 
     @property
     def sha256(self) -> str:
-        """Hash of all that determines an episode."""
+        """Hash of all values that determine an episode."""
+
+    @property
+    def dynamics(self) -> str:
+        """The same with the code that drives."""
 
     @property
     def suite_sha256(self) -> str:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.problems.part import Part
+from tdac_agent.problems.part import Part, identity_of
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.first_run import compile_first
@@ -46,6 +46,11 @@ class OfSet:
     def sha256(self) -> str:
         """See `Episodes`."""
         return self.tasks.sha256
+
+    @property
+    def dynamics(self) -> str:
+        """See `Episodes`."""
+        return self.tasks.dynamics
 
     @property
     def cpu(self) -> CpuSpec:
@@ -125,7 +130,7 @@ class OfSet:
         del folder
         return {
             "name": self.name,
-            "sha256": self.sha256,
+            **identity_of(self),
             "split": part.split,
             "salt_sha256": self.secret(part),
             "first": part.first,

@@ -62,6 +62,11 @@ class TaskProblem:
         return self.task.sha256()
 
     @property
+    def dynamics(self) -> str:
+        """See `Problem`."""
+        return self.task.dynamics()
+
+    @property
     def suite_sha256(self) -> str:
         """See `Problem`."""
         return suite_sha256(self.task)

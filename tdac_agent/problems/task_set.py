@@ -55,6 +55,11 @@ class SetProblem:
         return self.tasks.sha256
 
     @property
+    def dynamics(self) -> str:
+        """See `Problem`."""
+        return self.tasks.dynamics
+
+    @property
     def suite_sha256(self) -> str:
         """See `Problem`: of the user's own tests alone.
 

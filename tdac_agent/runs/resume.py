@@ -39,6 +39,7 @@ CONFIGURATION = {
     "version": "version of tdac",
     "task": "task",
     "task_sha256": "map, start, goal or limits of the task",
+    "dynamics": "dynamics",
     "profile": "profile",
     "suite_sha256": "suite",
     "learner": "learner",
@@ -59,6 +60,9 @@ CONFIGURATION = {
     "feedback_episodes": "feedback episodes",
     "improve": "number of improving episodes",
 }
+
+NOT_TO_BE_RESUMED = {"version", "dynamics"}
+"""Fields that no option of a command restores."""
 
 
 def existing_run(folder: Path) -> Run | None:
@@ -90,20 +94,25 @@ def check_same(before: Run, now: Run, further: Mapping[str, Any] | None = None) 
     Raises:
         RunError: They differ; names all differences.
     """
+    others = [
+        name for name in CONFIGURATION if getattr(before, name) != getattr(now, name)
+    ]
     differences = [
-        _difference(words, getattr(before, name), getattr(now, name))
-        for name, words in CONFIGURATION.items()
-        if getattr(before, name) != getattr(now, name)
+        _difference(CONFIGURATION[name], getattr(before, name), getattr(now, name))
+        for name in others
     ]
     for name, default in (further or {}).items():
         values = [run.options.get(name, default) for run in (before, now)]
         if values[0] != values[1]:
             differences.append(f"{name} {values[0]} instead of {values[1]}")
     if differences:
-        command = resume_line(before, before.folder)
+        way_out = "give a new folder with --out"
+        if not NOT_TO_BE_RESUMED.intersection(others):
+            command = resume_line(before, before.folder)
+            way_out += f", or resume that run: {command}"
         raise RunError(
-            f"{before.folder} contains another run ({'; '.join(differences)}): give a "
-            f"new folder with --out, or resume that run: {command}"
+            f"{before.folder} contains another run ({'; '.join(differences)}): "
+            f"{way_out}"
         )
 
 

@@ -90,6 +90,9 @@ class Run(PrintableRecord):
     folder: Path = Field(exclude=True)
     task: str
     task_sha256: str
+    dynamics: str = Field(
+        "", description="Hash of the task with its code; empty before Ladder 1.0."
+    )
     learner: str
     optimizer: str
     iterations: int = Field(description="K")

@@ -62,6 +62,9 @@ class Selection(StrictRecord):
     schema_version: int = 1
     set: str
     set_sha256: str
+    dynamics: str = Field(
+        "", description="Hash of the set with its code; empty before Ladder 1.0."
+    )
     split: str = "dev"
     first_feedback: int = Field(description="Number of the first feedback world.")
     first_validation: int = Field(description="Number of the first validation world.")

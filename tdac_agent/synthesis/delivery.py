@@ -127,6 +127,7 @@ def selection_of(
     return Selection(
         set=tasks.name,
         set_sha256=tasks.sha256,
+        dynamics=tasks.dynamics,
         episodes=run.episodes,
         feedback_used=used["feedback"],
         validation_used=used["validation"],

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import identity_of
 from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.terms import Terms
 from tdac_agent.tasks.task import Task
@@ -41,7 +42,7 @@ def drive_candidate(
     if recorder.vouches(file):
         wanted = {
             "controller_sha256": candidate.sha256,
-            "sha256": episodes_of(problem).sha256,
+            **identity_of(episodes_of(problem)),
             **part,
         }
         kept = kept_report(out, wanted, numbers)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import identity_of
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.candidates import Candidate
@@ -31,7 +33,8 @@ def hidden_report(tasks: TaskSet, candidate: Candidate, terms: Terms) -> Episode
         terms: What the trials share.
     """
     recorder, folder = terms.recorder, terms.folder
-    about = {"controller_sha256": candidate.sha256, "sha256": tasks.sha256}
+    same = identity_of(episodes_of(tasks))
+    about = {"controller_sha256": candidate.sha256, **same}
     recorder.event("hidden.start", **about)
     known = recorder.vouches(folder / HIDDEN_FILE)
     report = _recorded(folder, about) if known else None

@@ -99,6 +99,7 @@ def new_run(
     return Run(
         task=problem.name,
         task_sha256=problem.sha256,
+        dynamics=problem.dynamics,
         profile=problem.profile,
         suite_sha256=problem.suite_sha256,
         learner=models[0].name,

@@ -45,6 +45,8 @@ class Environment(ABC):
             map or world.
         names: Names that controllers of the profile `paper` must define.
         kernels: Package with the compiled functions.
+        code: Folders and files of `tdac_envs` that decide what happens in an episode;
+            by default all.
     """
 
     id: ClassVar[str]
@@ -53,6 +55,7 @@ class Environment(ABC):
     keys: ClassVar[tuple[str, ...]]
     names: ClassVar[Names]
     kernels: ClassVar[str]
+    code: ClassVar[tuple[str, ...]] = (".",)
 
     @property
     def suite(self) -> Path:

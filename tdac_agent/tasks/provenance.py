@@ -32,6 +32,7 @@ def origin(
     return {
         "task": task.name,
         "task_sha256": task.sha256(),
+        "dynamics": task.dynamics(),
         "unit": task.setting.units.place,
         "left_out": task.setting.left_out,
         "map_sha256": task.setting.world_sha256(),

@@ -28,6 +28,7 @@ from tdac_agent.tasks.task_file import (
     read_task_file,
 )
 from tdac_agent.tasks.units import Units
+from tdac_envs.core.dynamics import code_sha256
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import printable
 from tdac_envs.drive.env import Observation
@@ -180,10 +181,15 @@ class Task:
         return usual.changed(self.spec.disturbances).changed(sizes)
 
     def sha256(self) -> str:
-        """Returns the hash of all that determines an episode and the progress test."""
+        """Hash of all values that determine an episode and the progress test."""
         facts = {**self.setting.facts(), "progress": self.spec.progress.model_dump()}
         if (own := self.own_disturbance()) != Disturbance():
             facts["disturbances"] = asdict(own)
+        return sha256_of_json(facts)
+
+    def dynamics(self) -> str:
+        """Hash of all that decides what happens in an episode, code included."""
+        facts = {"task": self.sha256(), "code": code_sha256(*self.environment.code)}
         return sha256_of_json(facts)
 
 

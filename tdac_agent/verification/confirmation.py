@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tdac_agent.problems.episodes import episodes_of
-from tdac_agent.problems.part import Part
+from tdac_agent.problems.part import Part, identity_of
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.hashes import sha256_of
@@ -104,7 +104,7 @@ def kept_confirmation(
         return None
     wanted = {
         "controller_sha256": sha256_of(source),
-        "sha256": task.sha256(),
+        **identity_of(episodes_of(task)),
         "first": confirming_seeds(source, task, number).start,
         "disturbance": disturbance_of(task),
     }

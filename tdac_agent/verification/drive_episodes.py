@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from tdac_agent.problems.part import Episodes, Part
+from tdac_agent.problems.part import Episodes, Part, identity_of
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
 from tdac_agent.storage.files import write_atomic
@@ -141,6 +141,7 @@ def _recorded(
         entrant=request.sha256,
         set=own.name,
         set_sha256=own.sha256,
+        dynamics=own.dynamics,
         worlds=SEQUENTIAL if request.test else len(request.part.numbers),
         salt_sha256=secret,
     )
@@ -197,7 +198,7 @@ def _driven(
     own.compile()
     about = {
         "policy": [policy.kind, policy.wrappers, request.sha256],
-        "problem": own.sha256,
+        "problem": identity_of(own),
         "part": [part.split, list(part.numbers), part.variation, str(part.disturbance)],
         "secret": own.secret(part),
         "sandbox": [request.tier, asdict(limits), request.patience],

@@ -61,6 +61,11 @@ class EpisodeProvenance(StrictRecord):
         validation_alias=AliasChoices("sha256", "set_sha256", "task_sha256"),
         description="Its hash.",
     )
+    dynamics: str = Field(
+        "",
+        description="Hash of all that decides what happens in an episode, code "
+        "included; empty before Ladder 1.0.",
+    )
     split: str | None = Field(None, description="Split of the worlds of a set.")
     salt_sha256: str | None = Field(
         None,

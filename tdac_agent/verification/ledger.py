@@ -35,6 +35,9 @@ class HiddenEvaluation(BaseModel):
     entrant: str = Field(description="SHA-256 of the controller file.")
     set: str = Field(description="Name of the set.")
     set_sha256: str
+    dynamics: str = Field(
+        "", description="Hash of the set with its code; empty before Ladder 1.0."
+    )
     worlds: int | Literal["sequential"]
     salt_sha256: str
 

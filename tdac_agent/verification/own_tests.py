@@ -142,6 +142,7 @@ def kept_tests(
     wanted = {
         "controller_sha256": sha256_of(source),
         "task_sha256": tasks.sha256,
+        "dynamics": tasks.dynamics,
         "suite_sha256": tests_sha256(suite),
         "seed": seed_from(source, tasks.sha256) if seed is None else seed,
         "versions": versions(),
@@ -171,6 +172,7 @@ def _provenance(
         task=tasks.name,
         called=f"set {tasks.name}",
         task_sha256=tasks.sha256,
+        dynamics=tasks.dynamics,
         unit=tasks.file.unit,
         map_sha256="",
         params_sha256=sha256_of(params),

@@ -158,14 +158,15 @@ def kept_report(
 ) -> Report | None:
     """Loads the report in a folder if it is about this controller, otherwise None.
 
-    Controller, task, suite, seed and package versions must be the same. A seed of None
-    is the one derived from the controller and this installation's secret, so that a
-    report from elsewhere never matches.
+    Controller, task, dynamics, suite, seed and package versions must be the same. A
+    seed of None is the one derived from the controller and this installation's secret,
+    so that a report from elsewhere never matches.
     """
     raw = source.encode("utf-8", "surrogatepass")
     wanted = {
         "controller_sha256": sha256_of(raw),
         "task_sha256": task.sha256(),
+        "dynamics": task.dynamics(),
         "suite_sha256": suite_sha256(task),
         "profile": task.spec.profile,
         "paper": False,

@@ -166,7 +166,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
       the axle is the effective one, 57 mm instead of 52 mm, so that the robot turns
       as in Webots; objects that are pushed have the ground friction of the world's
       `contactProperties`, 1 by default instead of 0.5, and the robot the mass of its
-      version, 0.16 or 0.14 kg.
+      version, 0.16 or 0.14 kg. Since then, dynamics are frozen as Ladder 1.0.
     """
 
     title = "TDAC-EPuck-v0"

@@ -164,7 +164,8 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
             from the world's own start. This makes learning easier.
 
     ## Version History
-    * v0: Initial version.
+    * v0: Initial version. Before the first release, the e-puck's axle became the
+      effective one, 57 mm; since then, dynamics are frozen as Ladder 1.0.
     """
 
     def __init__(

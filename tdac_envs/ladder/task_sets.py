@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -10,7 +11,9 @@ from typing import TypeVar, get_args
 import numpy as np
 
 from tdac_envs.core.arguments import whole_number
+from tdac_envs.core.dynamics import code_sha256
 from tdac_envs.core.errors import TaskError, hint
+from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.intake import printable
 from tdac_envs.core.salt import LEAST_SALT, MOST_SALT
 from tdac_envs.drive.task import AT_START
@@ -20,6 +23,7 @@ from tdac_envs.ladder.difficulty import Difficulty
 from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.ladder.files.opened import FileWorlds, opened
 from tdac_envs.ladder.files.placed import placed_world
+from tdac_envs.ladder.frozen import ON_MAPS_OF_SETS, ON_PLATES
 from tdac_envs.ladder.moving import draw_movers
 from tdac_envs.ladder.orca_driver import drive_by_orca
 from tdac_envs.ladder.plate_worlds import PlatesWorld, make_plates
@@ -58,8 +62,23 @@ class TaskSet:
 
     @cached_property
     def sha256(self) -> str:
-        """Hash of everything that defines the set; worlds follow from it."""
+        """Hash of all values that define the set; worlds follow from it."""
         return self.file.sha256(self.files.sha256 if self.files else None)
+
+    @cached_property
+    def dynamics(self) -> str:
+        """Hash of all that decides what happens in an episode, code included.
+
+        It covers the values of the set, the sizes of an e-puck, and the source of what
+        makes worlds, drives and observes.
+        """
+        robot, facts = self.file.robot, {"set": self.sha256}
+        if isinstance(robot, EPuckRobotParams):
+            sizes = json.dumps(robot.sizes, sort_keys=True)
+            facts |= {"robot": sizes, "code": code_sha256(*ON_PLATES)}
+        else:
+            facts |= {"code": code_sha256(*ON_MAPS_OF_SETS)}
+        return sha256_of(json.dumps(facts, sort_keys=True))
 
     @property
     def largest_side(self) -> float:

@@ -247,7 +247,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     ## Version History
     * v0: Initial version. Before the first release, `on_collision="block"` changed,
       rays of a full circle became 360°/n apart, and maps with a resolution got
-      defaults in metres.
+      defaults in metres. Since then, dynamics are frozen as Ladder 1.0.
     """
 
     title = "TDAC-Map2D-v0"

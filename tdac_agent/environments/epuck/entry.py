@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tdac_agent.tasks.environment import Environment, Names
 from tdac_agent.tasks.setting import Nominal, Setting
 from tdac_agent.tasks.units import METRES, Point
+from tdac_envs.core.dynamics import IN_WORLDS
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template
@@ -39,6 +40,7 @@ class EPuckEnvironment(Environment):
         ),
     )
     kernels = "tdac_envs.epuck"
+    code = IN_WORLDS
 
     def bundled(self) -> dict[str, str]:
         """Returns the bundled worlds: `epuck` is `arena`, `epuck-maze` is `maze`."""

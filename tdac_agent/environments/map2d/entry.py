@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tdac_agent.tasks.environment import Environment, Names
 from tdac_agent.tasks.setting import Nominal, Setting
 from tdac_agent.tasks.units import PIXELS, Point
+from tdac_envs.core.dynamics import ON_MAPS
 
 if TYPE_CHECKING:
     from tdac_agent.builtin.template import Template
@@ -41,6 +42,7 @@ class Map2DEnvironment(Environment):
         classes=("OccMap2D",),
     )
     kernels = "tdac_envs.map2d"
+    code = ON_MAPS
 
     def bundled(self) -> dict[str, str]:
         """Returns the bundled maps; a task has the name of its map."""

@@ -113,6 +113,11 @@ class Provenance(StrictRecord):
     task: str
     called: str = Field("", description="Description of the task, beyond its name.")
     task_sha256: str
+    dynamics: str = Field(
+        "",
+        description="Hash of all that decides what happens in an episode, code "
+        "included; empty before Ladder 1.0.",
+    )
     unit: Place = Field("px", description="Unit of positions and lengths.")
     left_out: tuple[str, ...] = Field(
         (), description="Nodes of the world that may be solid but were ignored."

@@ -27,6 +27,7 @@ from tdac_agent.verification.store import mark_rows
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
+from tdac_envs.ladder.frozen import FROZEN
 from tdac_envs.ladder.set_file import BUILT_IN
 from tdac_envs.ladder.space_time import earliest_arrival
 
@@ -498,3 +499,47 @@ def test_tasks_beside_sets(warm, tmp_path, files, level, small_task):
     assert (out / "bench.html").read_text().count("seed ") > 0
     with pytest.raises(TaskError, match="tasks have no hidden worlds"):
         bench(["dwa"], [level], "hidden", 2, **given)
+
+
+@pytest.mark.parametrize(
+    ("name", "dynamics", "what"),
+    [
+        ("known", "", "known: before Ladder 1.0, with the same dynamics"),
+        ("epuck", "", "epuck: before Ladder 1.0"),
+        ("epuck", FROZEN["epuck"].dynamics, "epuck: Ladder 1.0"),
+        ("known", "0" * 64, "known: other dynamics than Ladder 1.0"),
+    ],
+)
+def test_results_say_to_which_ladder_they_belong(done, tmp_path, name, dynamics, what):
+    """An e-puck of before had another axle; nothing has changed on maps."""
+    own = {"name": name, "sha256": FROZEN[name].sha256, "dynamics": dynamics}
+    own |= {"split": "test", "worlds": 100, "salt_sha256": None}
+    if not dynamics:
+        del own["dynamics"]
+    rows = [{"set": name, "entrant": "one", "problem": "it broke"}]
+    record = {"versions": {}, "sets": [own], "entrants": ["one"], "rows": rows}
+    (tmp_path / RESULTS).write_text(json.dumps(record))
+    lines = done("bench", "show", tmp_path).splitlines()
+    assert what in [line.strip() for line in lines]
+
+
+@pytest.mark.parametrize("name", ["known", "epuck"])
+def test_results_on_equal_dynamics_are_put_together(tmp_path, name):
+    """Also those of before Ladder 1.0, if nothing has changed since."""
+    own = {"name": name, "sha256": FROZEN[name].sha256, "salt_sha256": None}
+    own |= {"split": "test", "worlds": 100}
+    for folder, dynamics in (("old", ""), ("new", FROZEN[name].dynamics)):
+        rows = [{"set": name, "entrant": folder, "problem": "it broke"}]
+        sets = [own | {"dynamics": dynamics}]
+        record = {"versions": {}, "sets": sets, "entrants": [folder], "rows": rows}
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / RESULTS).write_text(json.dumps(record))
+        columns = "set,entrant,file,index,success,time_score\n"
+        (tmp_path / folder / WORLD_TABLE).write_text(columns)
+    folders = [tmp_path / "new", tmp_path / "old"]
+    if name == "epuck":
+        with pytest.raises(RunError, match=r"in its dynamics \(unknown, not \w{8}\)"):
+            merged(folders)
+        return
+    (both,) = merged(folders).sets
+    assert both.ladder == "before Ladder 1.0, with the same dynamics"

@@ -142,6 +142,18 @@ def test_another_run_is_refused(policy_task, small_task, halted, warm):
     assert after == before
 
 
+def test_a_run_on_other_dynamics_is_not_resumed(policy_task, halted, warm):
+    """As one of before Ladder 1.0; no option restores them."""
+    record = json.loads((halted / "run.json").read_text())
+    assert record["dynamics"] == policy_task.dynamics()
+    del record["dynamics"]
+    (halted / "run.json").write_text(json.dumps(record))
+    with pytest.raises(
+        RunError, match=r"\(different dynamics\): give a new f.* --out$"
+    ):
+        synthesize(policy_task, Script(), out=halted, judge=warm)
+
+
 def test_one_process_at_a_time(policy_task, halted, warm):
     """A run that is being written is left alone."""
     with hold(halted / LOCK_FILE) as mine:

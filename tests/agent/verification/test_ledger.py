@@ -58,15 +58,28 @@ def test_a_report_is_given_back(ledger):
         {"worlds": "sequential"},
         {"salt_sha256": "b" * 64},
         {"set_sha256": "6" * 64},
+        {"dynamics": "7" * 64},
     ],
 )
 def test_what_is_evaluated_again(ledger, other):
-    """Another number, salt or version of the set is another evaluation of the file."""
+    """Another number, salt, version or dynamics is another evaluation of the file."""
     driven(ledger, evaluation())
     assert ledger.recorded(evaluation(**other)) is None
     second = driven(ledger, evaluation(**other))
     assert (second.hidden.number, second.hidden.count) == (2, 2)
     assert ledger.recorded(evaluation()).hidden.number == 1
+    assert ledger.recorded(evaluation()).hidden.count == 2
+
+
+def test_lines_of_before_ladder_1_0_answer_nothing(ledger):
+    """They have no dynamics; they are read, and counted."""
+    driven(ledger, evaluation())
+    lines = [json.loads(line) for line in ledger.path.read_bytes().splitlines()]
+    del lines[0]["about"]["dynamics"]
+    ledger.path.write_text("".join(f"{json.dumps(line)}\n" for line in lines))
+    now = evaluation(dynamics="7" * 64)
+    assert ledger.recorded(now) is None
+    assert driven(ledger, now).hidden.count == 2
     assert ledger.recorded(evaluation()).hidden.count == 2
 
 

@@ -6,13 +6,19 @@ import shutil
 import pytest
 from script import STILL
 
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import identity_of
+from tdac_agent.tasks.provenance import versions
+from tdac_agent.verification.episode_report import EpisodeProvenance, summarise
 from tdac_agent.verification.store import (
     MARK,
     REPORT_FILE,
     ROWS_FILE,
     UNFINISHED,
     is_marked,
+    keep_report,
     kept_report,
+    read_report,
 )
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs import load_set
@@ -69,6 +75,23 @@ def test_rows_with_a_mark_are_used(problem, tmp_path, warm):
     kept, counts = len(rows.read_text().splitlines()), []
     drive(problem, tmp_path / "out", warm, lambda count, _: counts.append(count))
     assert counts[0] >= min(kept, 2)
+
+
+@pytest.mark.parametrize("dynamics", ["", "0" * 64])
+def test_results_on_other_dynamics_are_no_answer(tmp_path, dynamics):
+    """They are read, and driven again when they are asked for."""
+    own = episodes_of(load_set("known"))
+    facts = {"name": own.name, **identity_of(own), "split": "dev"}
+    facts |= {"controller_sha256": "", "sandbox": "none", "limits": {}}
+    about = EpisodeProvenance(**facts, versions=versions())
+    report = summarise(about, (), None, 0.0)
+    keep_report(report, tmp_path)
+    assert kept_report(tmp_path, identity_of(own), ()) == report
+    about = about.model_copy(update={"dynamics": dynamics})
+    report = report.model_copy(update={"provenance": about})
+    keep_report(report, tmp_path)
+    assert kept_report(tmp_path, identity_of(own), ()) is None
+    assert read_report(tmp_path) == report
 
 
 @pytest.mark.parametrize("problem", ["set"], indirect=True)
