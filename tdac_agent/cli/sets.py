@@ -259,8 +259,8 @@ def _world_rows(world: dict[str, Any], unit: str, size: float) -> dict[str, str]
         f"{sides}, start ({x:g}, {y:g}){place}, heading {heading:.3f} rad, goal "
         f"({goal_x:g}, {goal_y:g}){place}",
         "shortest": f"{size * world['length']:.4g} {unit}, "
-        f"{world['detour']:.2f} times the straight distance; OT {world['steps']:.1f} steps, horizon "
-        f"{world['horizon']}",
+        f"{world['detour']:.2f} times the straight distance; "
+        f"OT {world['steps']:.1f} steps, horizon {world['horizon']}",
         "gap": f"{world['gap']:.2f} body diameters at the narrowest place",
         "dead ends": _dead_ends(world["dead_ends"], world["excess"]),
         "in sight": f"the goal, from {world['in_sight']:.0%} of the path; "

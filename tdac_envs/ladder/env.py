@@ -191,6 +191,7 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
             range_min=file.disturbances.range_min,
             reception=file.disturbances.reception,
             max_acceleration=file.disturbances.max_acceleration,
+            resolution=file.resolution,
         )
         self._prepare(setup, render_mode)
         self._look(task_set, bool(privileged))

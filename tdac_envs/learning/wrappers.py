@@ -73,9 +73,9 @@ class Frame:
     def of_setup(cls, setup: Any) -> Frame:
         """The frame of what a robot observes."""
         frame, metric = cls.of_task(setup.nominal), getattr(setup, "metric", None)
-        if metric is None:
+        scale = getattr(setup, "resolution", None) or (metric and metric.resolution)
+        if scale is None:
             return frame
-        scale = metric.resolution
         return cls(frame.radius * scale, True, frame.readings, frame.largest * scale)
 
     @classmethod

@@ -47,6 +47,7 @@ class Map2DSetup(DriveSetup):
         range_dropout: Probability that a ray reads the largest range.
         movers: Movers of all episodes, if the source of the tasks has none.
         metric: Frame in whose metres the robot observes; None for pixels.
+        resolution: Metres per px where a task set converts what the robot observes.
         sensor: `"rays"` or `"sonar"`.
         range_min: Ranges below it are invalid, px; 0 for that of the robot.
         max_acceleration: Of a wheel, px/s²; 0 for that of the robot.
@@ -61,6 +62,7 @@ class Map2DSetup(DriveSetup):
     range_dropout: float
     movers: tuple[AnySpec, ...] = ()
     metric: MapFrame | None = None
+    resolution: float | None = None
     sensor: str = "rays"
     range_min: float = 0.0
     max_acceleration: float = 0.0

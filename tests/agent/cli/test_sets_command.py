@@ -31,7 +31,7 @@ def test_its_json_is_complete(tdac):
     assert [each["name"] for each in records] == list(shipped_names())
     for each in records[: len(set_names())]:
         assert each["sha256"] == load_set(each["name"]).sha256
-        assert each["horizon"] == {"factor": 16.0, "least": 400, "most": 2000}
+        assert each["horizon"] == load_set(each["name"]).file.horizon.model_dump()
 
 
 def test_it_shows_a_set(tdac):

@@ -16,6 +16,7 @@ from tdac_agent.prompting.set_prompt import set_prompt
 from tdac_agent.verification.judge.set_files import level_params
 from tdac_envs import load_set
 from tdac_envs.ladder.set_file import set_names
+from tdac_envs.ladder.shown import in_shown_units
 
 
 @pytest.mark.parametrize("name", [*set_names(), "barn", "barn-slow"])
@@ -27,12 +28,13 @@ def test_a_prompt_has_all_of_its_level(name):
     rows = dict(re.findall(r"^\| `(\w+)` \| (\([\d, ]*\)) \|", text, re.MULTILINE))
     spaces = env.observation_space.spaces
     assert rows == {key: str(box.shape) for key, box in spaces.items()}
-    ceil = 1.0 if file.unit == "px" else 100.0
+    ceil = 1.0 if file.shown_unit == "px" else 100.0
     limit = math.ceil(ceil * float(spaces["goal"].high[0]) - 1e-3) / ceil
     assert f"to {limit:g} |" in text or f"to {spaces['goal'].high[0]:g} |" in text
     params = text.partition("```json\n")[2].partition("\n```")[0]
     assert params == params_text(level_params(file))
     assert json.loads(params).keys() == level_params(file).keys()
+    file = in_shown_units(file)
     for value in (file.bar, file.goal_tolerance, file.horizon.most, file.full_step):
         assert f"{value:g}" in text
     assert ("occupancy.npy" in text) == file.map

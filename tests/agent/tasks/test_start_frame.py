@@ -15,8 +15,10 @@ from tdac_envs.ladder.observed import SetView
 
 
 @pytest.mark.parametrize("index", range(3))
-def test_places_and_headings_are_as_observed(index):
-    tasks = load_set("unknown")
+@pytest.mark.parametrize("level", ["unknown", "floor"])
+def test_places_and_headings_are_as_observed(level, index):
+    """In px, and in metres with y to the left."""
+    tasks = load_set(level)
     task, view = (
         tasks.task("dev", index),
         SetView(tasks.file, tasks.largest_side, False),
@@ -25,7 +27,7 @@ def test_places_and_headings_are_as_observed(index):
     anchors = np.array([view.anchor(task)] * len(poses))
     none = {key: np.zeros((2, 1), np.float32) for key in tasks.file.observed}
     seen = view.seen(none, poses, anchors)
-    frame = StartFrame(task.start)
+    frame = StartFrame(task.start).in_metres(tasks.file.resolution)
     for (x, y, heading), own in zip(poses.tolist(), seen["pose"], strict=True):
         assert frame.coordinates(x, y) == pytest.approx(own[:2].tolist(), abs=1e-4)
         turned = math.remainder(frame.heading(heading) - float(own[2]), math.tau)

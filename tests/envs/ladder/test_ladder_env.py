@@ -25,6 +25,7 @@ KEYS = {
     "moving": {"pose", "goal", "wheel_speeds", "ranges"},
     "crowd": {"pose", "goal", "wheel_speeds", "ranges"},
     "epuck": {"goal", "wheel_speeds", "ps", "encoders"},
+    "floor": {"pose", "goal", "wheel_speeds", "ranges"},
 }
 LEVELS = sorted(KEYS)
 

@@ -70,9 +70,17 @@ def test_the_pose_has_errors_and_the_goal_has_none(set_yaml):
 def test_a_named_robot_is_in_the_units_of_the_worlds(set_yaml):
     """With its rate and errors as defaults, which the set may override."""
     path = set_yaml(
-        robot=BURGER, resolution=0.02, goal_tolerance=5, disturbances={"pose_delay": 0}
+        robot=BURGER,
+        resolution=0.02,
+        worlds=[{"name": "aisles", "width": 5, "height": 4}],
+        movers=[{"kind": "bounce", "count": 2, "speed": [0.1, 0.2], "radius": 0.1}],
+        disturbances={"pose_delay": 0, "range_min": 0.2},
     )
     file, robot = find_set_file(path), load_robot(BURGER)
+    assert file.goal_tolerance == file.robot.radius
+    assert (file.worlds[0].width, file.worlds[0].height) == (250, 200)
+    assert file.movers[0].speed == pytest.approx((5.0, 10.0))
+    assert file.disturbances.range_min == pytest.approx(10.0)
     assert file.robot.radius == pytest.approx(robot.radius / 0.02)
     assert file.robot.n_rays == 360
     assert file.dt == 0.1
@@ -81,9 +89,70 @@ def test_a_named_robot_is_in_the_units_of_the_worlds(set_yaml):
     assert (own.pose_delay, own.scan_delay) == (0, 1)
 
 
-def test_a_robot_in_metres_needs_a_resolution(set_yaml):
-    with pytest.raises(TaskError, match=r"robot: .*give `resolution`"):
-        find_set_file(set_yaml(robot=BURGER))
+@pytest.mark.parametrize(
+    ("keys", "told"),
+    [
+        ({"robot": BURGER}, r"robot: .*give `resolution`"),
+        ({"robot": BURGER, "resolution": -1}, r"robot: expected resolution"),
+        ({"robot": "paper-disc", "resolution": 0.1}, "is in pixels: leave out"),
+        ({"robot": BURGER, "resolution": 0.1, "goal_tolerance": "a"}, "goal_tol"),
+        ({"robot": BURGER, "resolution": 0.1, "worlds": 3}, "worlds"),
+        ({"robot": BURGER, "resolution": 0.1, "movers": [7]}, "movers"),
+    ],
+)
+def test_a_set_in_metres_that_is_not_valid(set_yaml, keys, told):
+    with pytest.raises(TaskError, match=told):
+        find_set_file(set_yaml(**keys))
+
+
+SMALL = {
+    "robot": BURGER,
+    "resolution": 0.025,
+    "worlds": [{"name": "clutter", "width": 4, "height": 4, "gaps": [1.5, 2.2]}],
+    "horizon": {"factor": 1, "least": 25, "most": 25},
+}
+
+
+@pytest.mark.slow_after(2)
+@pytest.mark.parametrize("frame", ["start", "map"])
+def test_a_batch_in_metres_does_what_single_environments_do(set_yaml, frame):
+    path = set_yaml(
+        **SMALL, frame=frame, observed=["pose", "goal", "ranges", "odometry"]
+    )
+    own, kwargs = {"level": str(path), "train_pool": 3}, {"autoreset_mode": "SameStep"}
+    name = "TDAC-Ladder-v0"
+    many = gym.make_vec(name, 2, "sync", vector_kwargs=kwargs, **own)
+    batch = gym.make_vec(name, 2, "vector_entry_point", **kwargs, **own)
+    list(assert_alike(many, batch, 1, 0.5 * actions(2, 60)))
+
+
+@pytest.mark.parametrize("frame", ["start", "map"])
+def test_a_set_with_a_resolution_is_observed_in_metres(set_yaml, frame):
+    """As in ROS: y to the left or up, turns to the left are positive."""
+    keys = {**SMALL, "disturbances": dict.fromkeys(LOCALISER, 0), "frame": frame}
+    keys["disturbances"] |= {"range_noise": 0, "wheel_slip": 0}
+    env = gym.make("TDAC-Ladder-v0", level=str(set_yaml(**keys)), split="dev").unwrapped
+    size, driven = 0.025, []
+    seen, _ = env.reset(options={"index": 0})
+    start, height = env.task.start, env.task.terrain.grid.cells.shape[0]
+    for action in [(0.1, 0.4)] * 12:
+        seen, *_ = env.step(np.array(action, np.float32))
+        assert seen in env.observation_space
+        x, y, heading = env.pose().tolist()
+        if frame == "map":
+            place = (x + 0.5) * size, (height - 0.5 - y) * size
+            turned = -heading
+        else:
+            away = size * complex(x - start.x, y - start.y)
+            away *= np.exp(-1j * start.heading)
+            place, turned = (away.real, -away.imag), start.heading - heading
+        assert seen["pose"][:2] == pytest.approx(place, abs=1e-5)
+        apart = np.exp(1j * (float(seen["pose"][2]) - turned))
+        assert apart == pytest.approx(1.0, abs=1e-5)
+        assert seen["ranges"] == pytest.approx(size * env.robot.ranges, abs=1e-5)
+        driven.append(float(seen["pose"][2]))
+    if frame == "start":
+        assert driven[-1] > 0.2  # the right wheel was faster: a turn to the left
 
 
 def test_errors_of_a_pose_need_the_pose(set_yaml):

@@ -26,7 +26,9 @@ def set_yaml(tmp_path):
 
 
 def test_the_easiest_is_first():
-    assert set_names() == ("known", "unknown", "lost", "moving", "crowd", "epuck")
+    """Those in pixels, then those in metres."""
+    names = "known", "unknown", "lost", "moving", "crowd", "epuck", "floor"
+    assert set_names() == names
 
 
 @pytest.mark.slow_after(2)

@@ -11,6 +11,7 @@ from gymnasium.vector import SyncVectorEnv
 from tdac_envs import wrap_for_rl
 from tdac_envs.core.errors import TaskError
 from tdac_envs.learning.dead_reckoning import DeadReckoning, WheelReckoning
+from tdac_envs.learning.wrappers import Frame
 
 LADDER = "TDAC-Ladder-v0"
 LEVELS = ["unknown", "lost"]
@@ -113,6 +114,20 @@ def test_exact_odometry_adds_up_to_the_true_pose(few):
             assert np.allclose(seen[:2], [ahead / distance, left / distance], atol=1e-4)
             if ended:
                 break
+
+
+def test_a_set_in_metres_is_seen_without_its_unit(few):
+    """Bearing and distance of the goal in radii, as from the true pose in px."""
+    path = few(resolution=0.05)
+    env = wrap_for_rl(gym.make(LADDER, level=path, split="dev"))
+    own = Frame.of_task(env.unwrapped.nominal)
+    env.reset(options={"index": 2})
+    for action in ([0.05, 0.15],) * 6:
+        seen, *_ = env.step(np.array(action, np.float32))
+        plain = env.unwrapped
+        here = {"pose": plain.pose(), "goal": np.array(plain.task.goal)}
+        assert np.allclose(seen[:3], own.goal_relative(here)["goal"], atol=1e-5)
+        assert np.all((seen >= -1.0) & (seen <= 1.0))
 
 
 def test_poses_do_not_move_twice_in_a_step():
