@@ -107,7 +107,9 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
     - `crowd`: the map and the exact pose on it, among people who walk about; wheels
       that are not equally fast, rays that drop out,
     - `epuck`: infra-red sensors and wheel encoders of an e-puck whose wheels slip;
-      neither a pose nor a map.
+      neither a pose nor a map,
+    - `floor`: a TurtleBot3 in metres, with the pose of a localiser and the scan of a
+      laser, both with errors and late; no map.
 
     ## Action Space
     `Box(-1, 1, (2,), float32)`: speed of the left and of the right wheel as a fraction
@@ -115,7 +117,8 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
 
     ## Observation Space
     `Dict` of float32 arrays, the same for all worlds of a level. Without a map, the
-    frame of reference has its origin and its x axis at the start pose.
+    frame of reference has its origin and its x axis at the start pose. On `floor`,
+    and on other sets with a `resolution`, px below are m, and y is to the left.
 
     | key | levels | content |
     |---|---|---|
@@ -138,7 +141,7 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
     ## Info
     `collisions` and `clipped`; at the end of an episode also `is_success` and
     `collision`. With `privileged=True`, all entries of TDAC-Map2D-v0 and `pose`, the
-    true pose on the map.
+    true pose on the map; their lengths are px on maps, also where m are observed.
 
     In the splits `train` and `dev`, `reset` also returns `world_index`, the number of
     the world; `generator`, its generator or kind of map; and `difficulty`, a dict of
