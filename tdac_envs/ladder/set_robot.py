@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tdac_envs.core.arguments import positive
 from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.ladder.set_disturbances import DisturbanceSpec
@@ -22,12 +23,14 @@ def with_named_robot(values: dict[str, Any]) -> dict[str, Any]:
     override them. A robot in metres needs the set's `resolution`.
 
     Raises:
-        TaskError: There is no such robot, or its units are not those of the set.
+        TaskError: There is no such robot, its units are not those of the set, or the
+            resolution is not a number above 0.
     """
     file, resolution = load_robot(values["robot"]), values.get("resolution")
     metric = None
     if resolution is not None:
-        metric = MapUnits(MapFrame(1, float(resolution), (0.0, 0.0, 0.0)))
+        size = positive("resolution", resolution)
+        metric = MapUnits(MapFrame(1, size, (0.0, 0.0, 0.0)))
     elif file.units == "metres":
         raise TaskError(
             f"{file.name} is in metres: give `resolution`, the metres per px of the "

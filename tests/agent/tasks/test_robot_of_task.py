@@ -130,6 +130,16 @@ def test_units_must_be_those_of_the_map(floor):
         task_of(floor, robot="turtelbot")
 
 
+@pytest.mark.parametrize(
+    "own", [{"range_max": 1e9}, {"axle": 1e9}, {"scanner_offset": [0.0, -1e9]}]
+)
+@pytest.mark.parametrize("named", [{"file": BURGER}, {"radius": 0.2}])
+def test_a_length_may_be_too_large_in_pixels(floor, named, own):
+    """It is in range in metres; one line names it."""
+    with pytest.raises(TaskError, match=rf"lengths in px\): {next(iter(own))}"):
+        task_of(floor, robot={**named, **own})
+
+
 def test_a_model_is_told_of_limits_scanner_and_noise(floor):
     """In units of the task; an exact robot is called exact, as before."""
     told = " ".join(facts_of(task_of(floor))["robot_lines"])
