@@ -68,7 +68,7 @@ class Watch:
         """Called with each record of the run."""
         if record["event"] == "drive.start":
             self._counts = True
-            self._total = record["worlds"]
+            self._total = record.get("worlds", record.get("episodes"))
         elif record["event"] == "hidden.start":
             self._counts, self._total = True, None
         elif record["event"] == "drive.step":
