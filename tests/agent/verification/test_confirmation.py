@@ -94,6 +94,9 @@ def test_a_good_controller_is_confirmed(small_task, good_source, warm, tmp_path)
     assert confirmed_text(report).startswith("arrives ≥ 95 % (")
     assert "not covered: other worlds, delays" in verified_text(report)
     assert seen[-1] == (93, report.successes)
+    calm = report.provenance.model_copy(update={"disturbance": Disturbance.none()})
+    quiet = verified_text(report.model_copy(update={"provenance": calm}))
+    assert "other worlds, noise of ranges, slip, delays" in quiet
     kept = EpisodeReport.model_validate_json((tmp_path / "episodes.json").read_text())
     assert kept == report
 
