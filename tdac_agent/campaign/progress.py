@@ -178,7 +178,8 @@ def _activity(record: dict[str, Any]) -> str:
         case "verify.start":
             return f"{at} testing"
         case "drive.start":
-            return f"{at} {record.get('what')}: {record.get('worlds')} worlds"
+            what = "worlds" if "worlds" in record else "episodes"
+            return f"{at} {record.get('what')}: {record.get(what)} {what}"
         case "hidden.start":
             return "hidden worlds"
     return at

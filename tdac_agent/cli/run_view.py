@@ -49,7 +49,7 @@ def show_run(run: Run, console: Console) -> None:
             ending += f"improved in iteration {search.k}, "
         ending += f"{run.seconds:.1f} s: {escape(str(run.controller))}"
         console.print(ending, soft_wrap=True)
-        confirmation = read_confirmation(folder) if run.confirmations else None
+        confirmation = read_confirmation(run) if run.confirmations else None
         if confirmation is not None:
             _print_indented(console, verified_text(confirmation))
         if search is not None:

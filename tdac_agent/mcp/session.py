@@ -25,6 +25,7 @@ from tdac_agent.mcp.watch import Watch
 from tdac_agent.problems.problem import Problem
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import JOURNAL, Run, candidate_at
+from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.plain import one_line
 from tdac_agent.synthesis.candidates import Candidate
@@ -214,11 +215,18 @@ class Session:
         elif self.chosen is None:
             raise Refused(self._ending())
         if self.problem.has_hidden:
+            self._check_written(HIDDEN_FILE)
             return hidden_verdict(number, read_hidden_report(self.run.folder))
-        found = read_confirmation(self.run.folder)
+        found = read_confirmation(self.run)
         if found is None:
-            raise Refused(f"{self._ending()}; there is no {CONFIRMATION_FILE}")
+            self._check_written(CONFIRMATION_FILE)
+            raise Refused(f"{self._ending()}; {CONFIRMATION_FILE} is about another one")
         return blind_verdict(number, found)
+
+    def _check_written(self, name: str) -> None:
+        """Refuses a verdict in a file that this run did not write as it is now."""
+        if not self.recorder.vouches(self.run.folder / name):
+            raise Refused(f"{self._ending()}; {name} is missing or was changed")
 
     def close(self) -> None:
         """Records that the run was interrupted, unless it has ended."""

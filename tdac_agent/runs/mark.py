@@ -132,6 +132,15 @@ class MarkedJournal:
         self.size += len(content)
 
 
+def wrote(run: Run, content: bytes) -> bool:
+    """Whether a run has written a file with this content, by the marks in its folder.
+
+    Nothing of a run of another installation is; and nothing if no secret can be kept,
+    except what this process has written.
+    """
+    return _knows(run.folder, run.id, "file", sha256_of(content))
+
+
 def lines_of(folder: Path) -> bytes:
     """The whole lines of the journal of a run; nothing for a missing file.
 

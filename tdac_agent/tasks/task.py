@@ -167,6 +167,11 @@ class Task:
                 options[name] = self.setting.length_of(options[name])
         return options | self.setting.noise(options.pop("range_noise"))
 
+    @property
+    def says_disturbances(self) -> bool:
+        """Whether the robot's file or the task file says what disturbs the robot."""
+        return bool(self.setting.disturbances or self.spec.disturbances)
+
     def own_disturbance(self, **sizes: Any) -> Disturbance:
         """Returns what disturbs this task's robot when it is confirmed.
 
@@ -183,8 +188,8 @@ class Task:
     def sha256(self) -> str:
         """Hash of all values that determine an episode and the progress test."""
         facts = {**self.setting.facts(), "progress": self.spec.progress.model_dump()}
-        if (own := self.own_disturbance()) != Disturbance():
-            facts["disturbances"] = asdict(own)
+        if self.says_disturbances:
+            facts["disturbances"] = asdict(self.own_disturbance())
         return sha256_of_json(facts)
 
     def dynamics(self) -> str:
@@ -295,8 +300,8 @@ def portable_task_file(task: Task, own_suite: str | None = None) -> str:
         mode="json", exclude_none=True, exclude=excluded, by_alias=True
     )
     spec.pop("disturbances", None)
-    if (own := task.own_disturbance()) != Disturbance():
-        spec["disturbances"] = asdict(own)
+    if task.says_disturbances:
+        spec["disturbances"] = asdict(task.own_disturbance())
     spec["name"] = task.name
     spec.update(task.setting.portable())
     if task.suite is not None and own_suite is not None:

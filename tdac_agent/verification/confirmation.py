@@ -6,9 +6,11 @@ from pathlib import Path
 
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.problems.part import Part, identity_of
+from tdac_agent.runs.mark import wrote
+from tdac_agent.runs.run_record import Run
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.files import read_inside
-from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import SEED_BITS, seed_from
 from tdac_agent.tasks.task import Task
@@ -82,17 +84,22 @@ def confirm(
 
 def disturbance_of(task: Task) -> Disturbance:
     """What disturbs blind drives: what robot and task say, or else noise and slip."""
-    own = task.own_disturbance()
-    return DISTURBANCE if own == Disturbance() else own
+    return task.own_disturbance() if task.says_disturbances else DISTURBANCE
 
 
-def read_confirmation(folder: Path) -> EpisodeReport | None:
-    """The confirmation of the controller of a run; None if there is none."""
+def read_confirmation(run: Run) -> EpisodeReport | None:
+    """The confirmation of the controller of a run; None if there is none.
+
+    A file that the run did not write, or that is about another controller, is none.
+    """
     try:
-        content = read_inside(folder, CONFIRMATION_FILE, RECORD_BYTES)
-        return EpisodeReport.model_validate_json(content)
+        content = read_inside(run.folder, CONFIRMATION_FILE, RECORD_BYTES)
+        report = EpisodeReport.model_validate_json(content)
+        controller = sha256_of_file(run.controller)
     except (OSError, ValueError):
         return None
+    same = report.provenance.controller_sha256 == controller
+    return report if same and wrote(run, content) else None
 
 
 def kept_confirmation(

@@ -75,7 +75,10 @@ def not_covered(report: EpisodeReport) -> str:
     if drove_with is not None:
         wheels = drove_with.wheel_gains or drove_with.wheel_radius_error
         delay = drove_with.delay or drove_with.pose_delay or drove_with.scan_delay
+        ranges = drove_with.range_noise or drove_with.range_dropout
         parts = {
+            "noise of ranges": ranges,
+            "slip": drove_with.wheel_slip,
             "delays": delay,
             "unequal wheels": wheels,
             "a wrong pose": drove_with.pose_noise,

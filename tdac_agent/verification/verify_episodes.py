@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -188,11 +187,29 @@ def part_of_set(
     tasks.key(split, 0, "world", salt)  # checks that salt and split belong together
     count = most_worlds(tasks, split) if worlds is None else worlds
     bar = tasks.file.bar if accept_at is None and worlds is None else accept_at
-    test = None if bar is None else SequentialTest(bar, count, margin)
-    if test is not None and accept_at is None:
-        clean = CLEAN - (1.0 - tasks.file.most_contacts)
-        test = replace(test, contact=SequentialTest(CLEAN, count, clean))
+    test = None
+    if bar is not None and accept_at is not None:
+        test = SequentialTest(bar, count, margin)
+    elif bar is not None:
+        test = _verdict_of(tasks, count, margin)
     return Part(range(begin, begin + count), split, salt_file), test
+
+
+def _verdict_of(tasks: TaskSet, count: int, margin: float) -> SequentialTest:
+    """The tests of arrivals and contacts on so many worlds of a set.
+
+    Raises:
+        TaskError: They are too few to show that either is good enough.
+    """
+    clean = CLEAN - (1.0 - tasks.file.most_contacts)
+    try:
+        contact = SequentialTest(CLEAN, count, clean)
+        return SequentialTest(tasks.file.bar, count, margin, contact=contact)
+    except TaskError as error:
+        raise TaskError(
+            f"{tasks.name} has too few worlds for a verdict: {error} (arrivals, or "
+            f"drives without a contact); -n {count} asks for scores"
+        ) from None
 
 
 def written_by(controller: str | bytes | Path) -> str | None:

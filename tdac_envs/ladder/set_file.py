@@ -32,6 +32,7 @@ from tdac_envs.ladder.set_limits import AdmissionSpec, CpuSpec, HorizonSpec
 from tdac_envs.ladder.set_robot import with_named_robot
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
+from tdac_envs.robots.bundled import placed_robot
 
 Observed = Literal[
     "pose", "goal", "wheel_speeds", "ranges", "odometry", "ps", "encoders"
@@ -323,11 +324,13 @@ def read_set_file(path: Path) -> SetFile:
 
 def _placed(values: dict[Any, Any], path: Path) -> dict[Any, Any]:
     """The values of a set, with the places of its files relative to its own."""
+    own = path.absolute().parent
+    if isinstance(robot := values.get("robot"), str):
+        values = {**values, "robot": str(placed_robot(robot, own))}
     key = "worlds" if isinstance(values.get("worlds"), dict) else "files"
     files = values.get(key)
     if not isinstance(files, dict):
         return values
-    own = path.absolute().parent
     placed = {
         name: str(own / value)
         if name in ("folder", "barn") and isinstance(value, str)

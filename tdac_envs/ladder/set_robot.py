@@ -26,7 +26,8 @@ def with_named_robot(values: dict[str, Any]) -> dict[str, Any]:
     `resolution`; the lengths of the set are then in metres.
 
     Raises:
-        TaskError: There is no such robot, or its units are not those of the set.
+        TaskError: There is no such robot, its units are not those of the set, or the
+            resolution is not a number above 0.
     """
     file, resolution = load_robot(values["robot"]), values.get("resolution")
     metric = None

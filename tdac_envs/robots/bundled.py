@@ -41,6 +41,16 @@ def load_robot(name: str | Path) -> RobotFile:
     )
 
 
+def placed_robot(name: str, base: Path) -> str | Path:
+    """A robot that a file names: the path of a robot file is relative to its folder.
+
+    Args:
+        name: Bundled name or path of a robot file.
+        base: Folder of the file that names it.
+    """
+    return base / name if name.lower().endswith(_YAML) else name
+
+
 @lru_cache(maxsize=16)
 def _bundled(name: str) -> RobotFile:
     return read_robot_file(_FILES / f"{name}.yaml")

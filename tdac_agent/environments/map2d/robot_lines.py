@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from tdac_agent.environments.map2d.setting import Map2DSetting
-from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
 
 _BELOW = {
@@ -48,7 +47,7 @@ def robot_lines(task: Task, setting: Map2DSetting) -> list[str]:
             f"{'ahead of' if ahead >= 0 else 'behind'} the centre"
             + (f" and {length(abs(aside), 3)} to its {side}." if aside else ".")
         )
-    own = task.own_disturbance()
-    if own != Disturbance():
+    if task.says_disturbances:
+        own = task.own_disturbance()
         lines.append(f"When the controller is confirmed, there are also: {own}.")
     return lines

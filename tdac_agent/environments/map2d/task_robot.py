@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import cv2
+from pydantic import ValidationError
 
 from tdac_agent.tasks.task_file import RobotSpec, TaskFile
-from tdac_envs.core.errors import MapError, TaskError
+from tdac_envs.core.errors import MapError, TaskError, first_problem
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.robot_options import RAYS, options_of
 from tdac_envs.map2d.source import metric_units
 from tdac_envs.mapping.image import picture_size, read_bytes
 from tdac_envs.mapping.params import MapParams, RobotParams
-from tdac_envs.robots.bundled import load_robot
+from tdac_envs.robots.bundled import load_robot, placed_robot
 
 ROBOT_IMAGE_BYTES = 16_000_000
 ROBOT_IMAGE_PIXELS = 4_000_000
@@ -80,11 +83,15 @@ def with_robot_file(
     """The task file, in px, with the robot of its robot file; its disturbances.
 
     What the task file says of the robot overrides its robot file.
+
+    Raises:
+        TaskError: There is no such robot, its units are not those of the map, or a
+            length of it is too large in px.
     """
     name = spec.robot.file
     if name is None:
         return spec, {}
-    file = load_robot(base / name if name.lower().endswith((".yaml", ".yml")) else name)
+    file = load_robot(placed_robot(name, base))
     metric = metric_units(source, spec.resolution)
     # The task is in px by now; a robot in px is refused for one in metres.
     in_metres = units.frame is not None and file.units == "pixels"
@@ -94,7 +101,8 @@ def with_robot_file(
     typed = spec.robot.model_dump(exclude_none=True)
     if typed.keys() & set(RAYS):
         own = {key: value for key, value in own.items() if key not in RAYS}
-    robot = RobotSpec.model_validate({**own, **typed})
+    with _in_range():
+        robot = RobotSpec.model_validate({**own, **typed})
     errors = file.disturbances()
     if file.units == "metres" and units.frame is None and "pose_noise" in errors:
         assert metric is not None
@@ -123,10 +131,24 @@ def check_robot_image(file: Path) -> None:
 
 
 def with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
-    """The contents of `params.json` with a robot."""
+    """The contents of `params.json` with a robot.
+
+    Raises:
+        TaskError: A length of it is too large in px.
+    """
     values = spec.model_dump(exclude={"radius", "image", "file"}, exclude_none=True)
     fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
     changes = {fields.get(key, key): value for key, value in values.items()}
     if "ray_angles" in changes:
         changes["n_rays"] = len(changes["ray_angles"])
-    return params.model_copy(update={"robot": params.robot.changed(**changes)})
+    with _in_range():
+        return params.model_copy(update={"robot": params.robot.changed(**changes)})
+
+
+@contextmanager
+def _in_range() -> Generator[None]:
+    """Reports a length that is in range in metres, but not in px."""
+    try:
+        yield
+    except ValidationError as error:
+        raise TaskError(f"robot (lengths in px): {first_problem(error)}") from None

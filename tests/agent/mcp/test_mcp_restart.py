@@ -168,6 +168,13 @@ def test_a_finished_run_answers_from_its_record(serve, small_task, good_source, 
     assert [each["verified"] for each in listed["submissions"]] == [False, True]
     assert listed["ended"].endswith("submission 2 was chosen and is verified")
     assert (out / "run.json").read_bytes() == before
+    file = out / "confirmation.json"
+    file.write_text(file.read_text().replace("0.95", "0.9999"))
+
+    async def changed(agent):
+        assert "missing or was changed" in await agent.error("choose", submission=2)
+
+    serve(small_task, changed)
 
 
 def test_another_run_is_refused(serve, small_task, few, out, refused):

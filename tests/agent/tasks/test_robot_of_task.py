@@ -130,6 +130,47 @@ def test_units_must_be_those_of_the_map(floor):
         task_of(floor, robot="turtelbot")
 
 
+FIGURES = {
+    "radius": 0.11,
+    "axle_length": 0.17,
+    "limits.max_turn_rate": 2.0,
+    "limits.max_acceleration": 1.0,
+    "scanner.first_angle": 1,
+    "scanner.range_min": 0.1,
+    "scanner.below_min": "range_max",
+    "scanner.noise": 0.1,
+    "scanner.rate": 1,
+    "pose.noise": 0.1,
+    "pose.latency": 0.5,
+    "wheels.slip": 0.1,
+    "control_rate": 20,
+}
+
+
+def test_the_hash_covers_the_robot_file(floor):
+    """A changed figure makes another task, so that no verdict is about it."""
+    name = floor / "mine.yaml"
+    file = load_robot(BURGER).model_dump(mode="json", exclude_unset=True, by_alias=True)
+    name.write_text(yaml.safe_dump(file))
+    hashes = {task_of(floor, robot="mine.yaml").sha256()}
+    for key, value in FIGURES.items():
+        part, _, last = key.rpartition(".")
+        own = {**file[part], last: value} if part else value
+        name.write_text(yaml.safe_dump({**file, part or last: own}))
+        hashes.add(task_of(floor, robot="mine.yaml").sha256())
+    assert len(hashes) == 1 + len(FIGURES)
+
+
+@pytest.mark.parametrize(
+    "own", [{"range_max": 1e9}, {"axle": 1e9}, {"scanner_offset": [0.0, -1e9]}]
+)
+@pytest.mark.parametrize("named", [{"file": BURGER}, {"radius": 0.2}])
+def test_a_length_may_be_too_large_in_pixels(floor, named, own):
+    """It is in range in metres; one line names it."""
+    with pytest.raises(TaskError, match=rf"lengths in px\): {next(iter(own))}"):
+        task_of(floor, robot={**named, **own})
+
+
 def test_a_model_is_told_of_limits_scanner_and_noise(floor):
     """In units of the task; an exact robot is called exact, as before."""
     told = " ".join(facts_of(task_of(floor))["robot_lines"])

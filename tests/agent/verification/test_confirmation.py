@@ -1,16 +1,22 @@
 """Blind confirmations: what they accept, and that nobody can know their starts."""
 
+import json
 import xml.etree.ElementTree as ET
 
 import pytest
+import yaml
 from script import Script, code
 
 import tdac_agent
+from tdac_agent import load_task
 from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.task import lay_out
 from tdac_agent.verification.confirmation import (
     DISTURBANCE,
     confirm,
     confirming_seeds,
+    disturbance_of,
     kept_confirmation,
     read_confirmation,
 )
@@ -88,6 +94,9 @@ def test_a_good_controller_is_confirmed(small_task, good_source, warm, tmp_path)
     assert confirmed_text(report).startswith("arrives ≥ 95 % (")
     assert "not covered: other worlds, delays" in verified_text(report)
     assert seen[-1] == (93, report.successes)
+    calm = report.provenance.model_copy(update={"disturbance": Disturbance.none()})
+    quiet = verified_text(report.model_copy(update={"provenance": calm}))
+    assert "other worlds, noise of ranges, slip, delays" in quiet
     kept = EpisodeReport.model_validate_json((tmp_path / "episodes.json").read_text())
     assert kept == report
 
@@ -100,6 +109,22 @@ def test_it_ends_with_the_second_failure(small_task, good_source, warm):
     assert report.count < 40
     assert "2 of " in confirmed_text(report)
     assert "on purpose" in report.failures[0].error
+
+
+def test_a_task_that_states_the_usual_disturbance_gets_it(tmp_path, small_task):
+    """What a task says of its disturbances holds, whatever else is the default."""
+    folder = lay_out(small_task, tmp_path / "task")
+    file = folder / "task.yaml"
+    plain, keys = load_task(file), yaml.safe_load(file.read_text())
+    assert disturbance_of(plain) == DISTURBANCE
+    usual = Disturbance()
+    file.write_text(yaml.safe_dump({**keys, "disturbances": {"delay": usual.delay}}))
+    stated = load_task(file)
+    assert disturbance_of(stated) == usual
+    assert stated.sha256() != plain.sha256()
+    again = load_task(lay_out(stated, tmp_path / "again") / "task.yaml")
+    assert disturbance_of(again) == usual
+    assert again.sha256() == stated.sha256()
 
 
 def test_starts_follow_from_the_controller_and_a_secret(small_task, monkeypatch):
@@ -160,7 +185,7 @@ def test_a_run_goes_on_after_a_failed_confirmation(small_task, good_source, warm
     told = model.requests[1]
     assert "All tests passed. Then it drove blind" in told.prompt
     assert "it slipped" in told.prompt
-    assert read_confirmation(out).passed
+    assert read_confirmation(run).passed
     assert delivered_text(run) == "in iteration 1 (2 candidates, 2 confirmations)"
 
 
@@ -183,6 +208,29 @@ def test_what_passed_is_confirmed_later(small_task, good_source, warm, out):
     run = tdac_agent.synthesize(small_task, model, **given)
     assert (run.status, len(run.confirmations)) == ("verified", 1)
     assert len(model.requests) == 1
+
+
+@pytest.mark.parametrize("change", ["bound", "words", "other"])
+def test_a_changed_confirmation_is_not_shown(
+    small_task, good_source, warm, out, change
+):
+    """Not with another bound, nor what is none, nor that of another controller."""
+    once = {"iterations": 1, "patience": 0, "refine": False}
+    model = Script(code(good_source + UNLESS_IT_SLIPS))
+    run = tdac_agent.synthesize(small_task, model, out=out, judge=warm, **once)
+    found = read_confirmation(run)
+    assert found is not None
+    assert not found.passed
+    file, record = out / "confirmation.json", json.loads(found.model_dump_json())
+    if change == "bound":
+        record["sequential"]["test"]["least"] = 0.9999
+    elif change == "words":
+        record["sequential"] = None
+    else:
+        run.controller.write_text(good_source)
+    if change != "other":
+        file.write_text(json.dumps(record))
+    assert read_confirmation(run) is None
 
 
 def test_a_forged_confirmation_is_not_believed(small_task, good_source, warm, out):

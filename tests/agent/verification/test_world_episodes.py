@@ -22,7 +22,7 @@ from tdac_agent.verification.episode_report import EpisodeReport, clock_dependen
 from tdac_agent.verification.judge.set_checks import static_checks
 from tdac_agent.verification.judge.set_files import level_params, write_files
 from tdac_agent.verification.ledger import user_ledger
-from tdac_agent.verification.verify_episodes import verify_episodes
+from tdac_agent.verification.verify_episodes import part_of_set, verify_episodes
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.env import LadderEnv
@@ -42,6 +42,22 @@ def set_yaml(tmp_path):
         return load_set(write_short_set(tmp_path / "few.yaml", **values))
 
     return load
+
+
+@pytest.mark.parametrize("name", set_names())
+def test_neither_bound_is_crossed_by_more_than_one_in_twenty(name):
+    """Arrivals and contacts, each at the rate that must not be accepted."""
+    _, test = part_of_set(load_set(name), "test", None)
+    for one in (test, test.contact):
+        assert one.characteristics(one.refuse_at).accepted <= 0.05
+    assert test.contact.refuse_at == pytest.approx(0.95)
+
+
+def test_too_few_worlds_for_a_verdict():
+    """One line says so, and what can be asked instead."""
+    with pytest.raises(TaskError, match=r"barn has too few worlds .* -n 50 asks"):
+        part_of_set(load_set("barn"), "test", None)
+    assert part_of_set(load_set("barn"), "test", 50)[1] is None
 
 
 def test_a_good_controller(warm, tmp_path):

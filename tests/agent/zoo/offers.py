@@ -140,6 +140,7 @@ def all_offers() -> list[Offer]:
     import offered_maps
     import offered_policies
     import offered_records
+    import offered_robots
     import offered_tasks
     import offered_weights
     import offered_worlds
@@ -149,6 +150,7 @@ def all_offers() -> list[Offer]:
         offered_worlds,
         offered_tasks,
         offered_records,
+        offered_robots,
         offered_policies,
         offered_weights,
     )

@@ -86,7 +86,7 @@ def test_the_zoo(case, tier, check):
 
 OFFERS = offers.all_offers()
 SURFACES = {"maps": 30, "worlds": 11, "projects": 17, "tasks": 30, "records": 10}
-SURFACES |= {"policies": 40}
+SURFACES |= {"policies": 40, "robots": 35}
 AT_ONCE = [offer for offer in OFFERS if not offer.endless]
 FEW = {"maps/pipe", "worlds/endless", "tasks/endless", "records/pipe", "policies/bomb"}
 SECONDS = 60

@@ -155,6 +155,22 @@ def test_a_set_with_a_resolution_is_observed_in_metres(set_yaml, frame):
         assert driven[-1] > 0.2  # the right wheel was faster: a turn to the left
 
 
+def test_a_robot_file_is_beside_the_set(set_yaml, tmp_path, monkeypatch):
+    """Its path is relative to the file that names it, wherever a command runs."""
+    keys = load_robot(BURGER).model_dump(mode="json", exclude_unset=True, by_alias=True)
+    (tmp_path / "wide.yaml").write_text(yaml.safe_dump({**keys, "radius": 0.2}))
+    path = set_yaml(robot="wide.yaml", resolution=0.02)
+    monkeypatch.chdir("/")
+    assert find_set_file(path).robot.radius == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("resolution", [0, -1, True, "x", [1]])
+def test_a_wrong_resolution_is_named(set_yaml, resolution):
+    """In one line, also where a robot in metres needs it."""
+    with pytest.raises(TaskError, match=r"resolution|radius"):
+        find_set_file(set_yaml(robot=BURGER, resolution=resolution))
+
+
 def test_errors_of_a_pose_need_the_pose(set_yaml):
     keys = {"observed": ["goal", "ranges"], "disturbances": {"pose_noise": 1.0}}
     with pytest.raises(TaskError, match="errors of the pose need `pose`"):
