@@ -1,6 +1,7 @@
 """The smallest gap between body and obstacles in an episode, and the required one.
 
-The gap is measured along the exact arcs of all steps; see `gap_search`.
+The gap is measured along the exact arcs of all steps; see `gap_search`, which also
+says when a gap is too close.
 """
 
 from __future__ import annotations
