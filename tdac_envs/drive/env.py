@@ -156,7 +156,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     @property
     def required_gap(self) -> float:
         """The gap to obstacles that the robot should keep, px or m."""
-        required: float = self.setup.required_gap
+        required: float = self.setup.gap_in_episode(self.task)
         return required
 
     def _draw(self, options: dict[str, Any]) -> Any:

@@ -274,7 +274,8 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
 
     def watch_gap(self, robot: int) -> GapWatch:
         """A watch of a robot's smallest gap in the episode that has just begun."""
-        words, kept = self._addresses.words[robot], self.setups[robot].required_gap
+        kept = self.setups[robot].gap_in_episode(self.tasks[robot])
+        words = self._addresses.words[robot]
         watch: GapWatch = self._first.watch_gap(words, kept)
         return watch
 

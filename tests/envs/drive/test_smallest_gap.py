@@ -1,6 +1,7 @@
 """Promises of the smallest gap of an episode; dense samples are the oracle."""
 
 import math
+from importlib.resources import files
 
 import brute_force
 import gymnasium as gym
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 import tdac_envs
-from tdac_envs.drive.gap_search import SLACK, GapWatch
+from tdac_envs.drive.gap_search import SLACK
 from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.drive.stepping import FORWARD, TURN
 from tdac_envs.epuck.env import EPuckEnv
@@ -353,10 +354,34 @@ def test_a_batch_among_movers_has_no_watch():
         batch.watch_gap(0)
 
 
-def test_the_required_gap_covers_pose_error_and_stopping_distance():
-    """Three standard deviations and the way to stop, at least 5 % of the radius."""
+def test_the_required_gap_is_the_way_to_stop():
+    """At least 5 % of the radius, at most half of what the widest path leaves."""
     assert required_gap(20.0) == 1.0
-    assert required_gap(20.0, 0.1) == 1.0
-    assert required_gap(20.0, 1.0, 0.5) == 3.5
-    assert isinstance(Map2DEnv().required_gap, float)
-    assert Map2DEnv().watch_gap().__class__ is GapWatch
+    assert required_gap(20.0, 0.5) == 1.0
+    assert required_gap(20.0, 3.5) == 3.5
+    assert required_gap(20.0, 3.5, lambda: 40.0) == 3.5
+    assert required_gap(20.0, 3.5, lambda: 24.0) == 2.0
+    assert required_gap(20.0, 3.5, lambda: 20.5) == 1.0
+
+
+def test_a_robot_file_gives_its_stopping_distance(tmp_path):
+    """In its units, with or without errors of the pose; a narrow map allows less."""
+    (tmp_path / "disc.yaml").write_text(
+        load_text("paper-disc").replace("stopping_distance: 0", "stopping_distance: 2")
+    )
+    wide = np.zeros((41, 81), np.bool_)
+    own = {"start": (20, 20), "goal": (60, 20), "robot_radius": 4}
+    named = {**own, "robot": tmp_path / "disc.yaml"}
+    assert Map2DEnv(wide, **named).required_gap == 2.0
+    assert Map2DEnv(wide, **named, pose_noise=1.0).required_gap == 2.0
+    assert Map2DEnv(wide, **own).required_gap == pytest.approx(0.2)
+    assert Map2DEnv(wide, **own, stopping_distance=3).required_gap == 3.0
+    narrow = wide.copy()
+    narrow[:15, 40] = narrow[26:, 40] = True  # 11 px remain free
+    env = Map2DEnv(narrow, **named)
+    assert env.required_gap == pytest.approx(0.5 * (5.45 - 4.0), abs=0.03)
+
+
+def load_text(name):
+    """The text of a bundled robot file."""
+    return (files("tdac_envs.robots") / "files" / f"{name}.yaml").read_text()

