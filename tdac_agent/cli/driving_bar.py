@@ -16,6 +16,7 @@ from rich.progress import (
 )
 
 from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import print_plain
 
 SECONDS = 30.0
 """Time between two lines. Work that takes less prints none."""
@@ -29,6 +30,8 @@ class DrivingBar:
         most: Number of episodes.
         doing: What is driven.
         is_long: Whether to show the time left, and elsewhere a line now and then.
+        cut: What follows if it is interrupted, such as `not verified`. It is printed
+            with what was driven.
     """
 
     def __init__(
@@ -38,7 +41,9 @@ class DrivingBar:
         doing: str = "preparing",
         *,
         is_long: bool = False,
+        cut: str | None = None,
     ) -> None:
+        self._console, self._most, self._cut = console, most, cut
         columns = (
             TextColumn("{task.fields[doing]}"),
             BarColumn(),
@@ -64,8 +69,14 @@ class DrivingBar:
         self._bar.start()
         return self
 
-    def __exit__(self, *error: object) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *error: object) -> None:
         self._bar.stop()
+        if kind is KeyboardInterrupt and self._cut is not None:
+            driven, successes = self.counts
+            reached = f"{driven} of {self._most} {self._doing}"
+            failed = f"{driven - successes} failed"
+            text = f"interrupted after {reached}, {failed}; {self._cut}"
+            print_plain(self._console, text)
 
     def show(self, episodes: int, successes: int, doing: str | None = None) -> None:
         """Shows the episodes that were driven, and what is driven now."""

@@ -182,7 +182,8 @@ def _measure(
 
     assert options.episodes is not None
     console = Console(stderr=options.as_json)
-    bar = DrivingBar(console, options.episodes, "disturbed episodes", is_long=True)
+    doing, cut = "disturbed episodes", "no success rate computed"
+    bar = DrivingBar(console, options.episodes, doing, is_long=True, cut=cut)
     try:
         with bar:
             return _driven(
@@ -196,9 +197,6 @@ def _measure(
                 margin=options.margin,
             )
     except KeyboardInterrupt:
-        episodes, successes = bar.counts
-        reached = f"{successes} of {episodes} episodes reached the goal"
-        print_plain(console, f"{reached}; no success rate computed")
         if options.out is not None:
             rest = "contains the report of the suite, but no episodes.json"
             print_plain(console, f"{options.out} {rest}")
@@ -215,7 +213,8 @@ def _confirm(
     from tdac_agent.verification.judge.confirming import confirming_test
 
     console, most = Console(stderr=options.as_json), confirming_test().limit
-    with DrivingBar(console, most, "blind drives", is_long=True) as bar:
+    cut = "not verified"
+    with DrivingBar(console, most, "blind drives", is_long=True, cut=cut) as bar:
         out = None if options.out is None else options.out / CONFIRMATION
         return confirm(
             file, task, tier=options.tier, out=out, judge=judge, watch=bar.show
@@ -285,7 +284,8 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
     _freeze()
     most = options.episodes or most_worlds(tasks, options.split)
     console = Console(stderr=options.as_json)
-    bar = DrivingBar(console, most, f"worlds of {tasks.name}", is_long=True)
+    doing, cut = f"worlds of {tasks.name}", "no success rate computed"
+    bar = DrivingBar(console, most, doing, is_long=True, cut=cut)
     with WarmJudge(child_pool) as judge, bar:
         report = _driven(
             file,

@@ -154,6 +154,10 @@ class Record:
             return None
         return self._watch.smallest()
 
+    def close_gap(self) -> SmallestGap | None:
+        """Returns the smallest gap so far that was too close; None without any."""
+        return None if self._watch is None else self._watch.too_close()
+
     def _shown(self, observation: Observation) -> Observation:
         return observation if self.seen is None else self.seen(observation)
 
@@ -335,6 +339,7 @@ def _rollout(
         calls=np.array(calls, np.float64),
         contact=record.contact,
         smallest_gap=record.smallest_gap(),
+        close_gap=record.close_gap(),
         required_gap=record.env.required_gap,
         timed_out=isinstance(error, ControllerTimeout) or slow,
         is_retryable=slow

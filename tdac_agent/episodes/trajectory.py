@@ -186,6 +186,7 @@ class Rollout:
             environment does not say.
         smallest_gap: Smallest gap between body and obstacles, along the exact arcs;
             None if no step was taken.
+        close_gap: Smallest gap that was too close, likewise; None without any.
         required_gap: Gap that the robot should keep, px or m.
     """
 
@@ -206,6 +207,7 @@ class Rollout:
     printed: str = ""
     contact: Contact | None = None
     smallest_gap: SmallestGap | None = None
+    close_gap: SmallestGap | None = None
     required_gap: float = 0.0
 
     @property

@@ -25,7 +25,7 @@ from tdac_agent.html_report.section import (
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.history import RunHistory, gather_run, learner_named, run_folders
 from tdac_agent.storage.hashes import sha256_of
-from tdac_agent.verification.diagnosis.gap import gap_figure, gap_text
+from tdac_agent.verification.diagnosis.gap import gap_figure, gap_text, too_close_text
 
 MOST_BYTES = 24 << 20
 """Limit for the details of all runs; further runs are only listed."""
@@ -165,6 +165,7 @@ def _environment() -> jinja2.Environment:
         "duration": format_seconds,
         "gap_figure": gap_figure,
         "gap_text": gap_text,
+        "too_close_text": too_close_text,
         "learner": learner_named,
         "picture": question_picture,
         "python": highlighted,

@@ -14,7 +14,9 @@ from tdac_agent.storage.hashes import number_of
 from tdac_agent.synthesis.candidates import Figures
 from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.units import UNITS, Units
 from tdac_agent.verification.confirmation import CONFIRMATION
+from tdac_agent.verification.diagnosis.gap import too_close_text
 from tdac_agent.verification.diagnosis.measures import least_steps
 from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.diagnosis.report import Diagnosis, Failure, Report
@@ -87,8 +89,8 @@ def confirmation_feedback(report: Report, driven: EpisodeReport) -> Feedback:
     """
     line = f"all tests passed, but {confirmed_text(driven)}"
     bad = [each for each in driven.episodes if each.too_close or not each.success]
-    failures = tuple(_as_failure(each) for each in bad)
-    text = "All tests passed. Then it drove blind, from other starts and with {}. {}"
+    units = UNITS[driven.provenance.unit]
+    failures = tuple(_as_failure(each, units) for each in bad)
     found = disturbed_feedback(driven) or f"{confirmed_text(driven)}."
     text = (
         "All tests passed. Then it drove blind, from other starts, with "
@@ -98,10 +100,16 @@ def confirmation_feedback(report: Report, driven: EpisodeReport) -> Feedback:
     return Feedback(text, line, (CONFIRMATION,), as_failed)
 
 
-def _as_failure(episode: EpisodeRow) -> Failure:
-    """A failed drive, as a failed test of the suite."""
+def _as_failure(episode: EpisodeRow, units: Units) -> Failure:
+    """A drive that failed or came too close, as a failed test of the suite."""
     text = episode.text or episode.error or episode.outcome
-    cause = episode.cause or ("collision" if episode.too_close else "error")
+    cause = episode.cause or "error"
+    if episode.too_close:
+        assert episode.smallest_gap is not None
+        text, cause = (
+            f"it came {too_close_text(episode.smallest_gap, units)}",
+            "collision",
+        )
     diagnosis = Diagnosis(cause=cause, text=text)
     return Failure(
         test=f"{CONFIRMATION}::drive",

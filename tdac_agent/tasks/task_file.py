@@ -94,6 +94,9 @@ class RobotSpec(StrictModel):
     max_turn_rate: Length | None = Field(None, description="Of the body, rad/s.")
     max_acceleration: Length | None = Field(None, description="Of a wheel, px/s².")
     max_turn_acceleration: Length | None = Field(None, description="rad/s²")
+    stopping_distance: Length | None = Field(
+        None, description="From full speed to standstill, px."
+    )
     image: Path | None = Field(None, description="Picture of the robot, facing +x.")
 
 

@@ -18,11 +18,10 @@ from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.units import Frame, Place, Units, units_in
 from tdac_agent.verification.decision import SequentialResult, result_of
 from tdac_agent.verification.diagnosis.gap import (
-    TOO_CLOSE,
     Gap,
     closest,
-    gap_figure,
     gap_text,
+    too_close_text,
 )
 from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.episode_row import EpisodeRow, Scores, scores_of
@@ -170,7 +169,10 @@ class EpisodeReport(StrictRecord):
         None, description="Number of the episode with it; None for hidden worlds."
     )
     too_close: int = Field(
-        0, description="Episodes that reached the goal with less than the required gap."
+        0, description="Episodes that reached the goal but came too close."
+    )
+    close_gap: Gap | None = Field(
+        None, description="Smallest gap that was too close in one of these."
     )
     sequential: SequentialResult | None = None
     child_cpu_seconds: float
@@ -242,10 +244,10 @@ class EpisodeReport(StrictRecord):
         if self.closest is not None:
             number = f"{'world' if on_set else 'seed'} {self.closest}"
             text += f", {closest or number}"
-        if not self.too_close:
+        if self.close_gap is None:
             return [text]
-        what = f"{self.too_close} of the successes came {TOO_CLOSE} to obstacles"
-        return [text, f"{what}: less than {gap_figure(gap.required, units)}"]
+        near = too_close_text(self.close_gap, units, placed=not on_set)
+        return [text, f"{self.too_close} of the successes came {near}"]
 
     @property
     def worst(self) -> tuple[EpisodeRow, ...]:
@@ -289,6 +291,8 @@ def summarise(
         groups = {name: own for name, own in groups.items() if len(own) >= LEAST_GROUP}
     scored = test is None and bool(episodes)
     near = closest((each.number, each.smallest_gap) for each in episodes)
+    close = [each for each in episodes if each.too_close]
+    tightest = closest((each.number, each.close_gap) for each in close)
     texts = [each.text or f"{named(each)}: {each.error}" for each in failed]
     return EpisodeReport(
         provenance=provenance,
@@ -305,7 +309,8 @@ def summarise(
         episodes=tuple(episodes) if told else (),
         smallest_gap=None if near is None else near[1],
         closest=near[0] if near is not None and told else None,
-        too_close=sum(each.too_close for each in episodes),
+        too_close=len(close),
+        close_gap=None if tightest is None else tightest[1],
         sequential=None if test is None else result_of(test, episodes),
         child_cpu_seconds=round(sum(e.cpu_seconds for e in episodes), 3),
         seconds=round(seconds, 3),

@@ -47,8 +47,8 @@ def confirmed_text(report: EpisodeReport) -> str:
     """What a confirmation showed, such as `arrives ≥ 95 % (0 of 93 failed)`."""
     test, failed = _test_of(report), report.count - report.successes
     if word_of(report) == "passed":
-        assert report.smallest_gap is not None
-        near = too_close_text(report.smallest_gap, report.provenance.units)
+        assert report.close_gap is not None
+        near = too_close_text(report.close_gap, report.provenance.units)
         return f"{report.too_close} of {report.count} blind drives came {near}"
     if report.passed:
         return f"arrives ≥ {100 * test.least:g} % ({failed} of {report.count} failed)"

@@ -140,19 +140,23 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         """Moving obstacles as they are now, shape (n, 3): x, y, radius (px or m)."""
         return np.zeros((0, 3))
 
-    def watch_gap(self, words: Words | None = None) -> GapWatch:
+    def watch_gap(
+        self, words: Words | None = None, required: float | None = None
+    ) -> GapWatch:
         """A watch of the smallest gap in the episode that has just begun.
 
         Args:
             words: Addresses of the arrays of another robot; by default the own ones.
+            required: The gap that this robot should keep; by default `required_gap`.
         """
         own = self.addresses.words[0] if words is None else words
-        return GapWatch(self._note_gap, own)
+        kept = self.required_gap if required is None else required
+        return GapWatch(self._note_gap, own, kept, self.nominal.body_radius)
 
     @property
     def required_gap(self) -> float:
         """The gap to obstacles that the robot should keep, px or m."""
-        required: float = self.setup.required_gap
+        required: float = self.setup.gap_in_episode(self.task)
         return required
 
     def _draw(self, options: dict[str, Any]) -> Any:

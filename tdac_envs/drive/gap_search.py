@@ -2,6 +2,12 @@
 
 A watch follows the gap next to an environment, after each step: the step itself does
 not change. `found` is the watch's array.
+
+Two gaps are kept: the smallest one, and the smallest one that is too close. A start
+may be nearer to an obstacle than required, and its controller cannot help that. So a
+gap is too close if it is smaller than required, and also smaller than the robot had at
+the end of an earlier step, or at the start. `SLACK` is for the wheels' slip: a robot
+that turns on the spot keeps the gap of its start only approximately.
 """
 
 from __future__ import annotations
@@ -28,9 +34,15 @@ from tdac_envs.drive.stepping import (
 )
 
 # Entries of the array that a watch's kernel updates: the smallest gap, its step, pose
-# and mover; the pose after the last step.
-GAP, STEP, AT_X, AT_Y, AT_HEADING, WHO, FROM_X, FROM_Y, FROM_HEADING = range(9)
-N_FOUND = 9
+# and mover; from `CLOSE` on, the same of the smallest gap that is too close; the pose
+# after the last step; the largest gap at the end of a step so far, up to `ENOUGH`: the
+# required gap and the slack.
+GAP, STEP, AT_X, AT_Y, AT_HEADING, WHO = range(6)
+CLOSE = 6
+FROM_X, FROM_Y, FROM_HEADING, MOST, ENOUGH, LOOSE = range(12, 18)
+N_FOUND = 18
+SLACK = 0.01
+"""A gap must be smaller than an earlier one by this part of the body radius."""
 WALL = -1.0
 """`found[WHO]` of obstacles that do not move; otherwise the index of a mover."""
 NOWHERE = -1.0
@@ -46,17 +58,31 @@ class GapWatch:
     Args:
         note: Kernel `(words, found)` that updates `found`.
         words: Addresses of the arrays of the robot, which must stay alive.
+        required: The gap that the robot should keep.
+        radius: Radius of its body.
     """
 
-    def __init__(self, note: Callable[..., None], words: Any) -> None:
-        self._found = np.zeros(N_FOUND)
-        self._found[GAP], self._found[WHO] = math.inf, WALL
-        self.note: Callable[[], None] = partial(note, words, self._found)
+    def __init__(
+        self, note: Callable[..., None], words: Any, required: float, radius: float
+    ) -> None:
+        found = self._found = np.zeros(N_FOUND)
+        found[[GAP, CLOSE + GAP]], found[[WHO, CLOSE + WHO]] = math.inf, WALL
+        found[LOOSE] = SLACK * radius
+        found[MOST], found[ENOUGH] = -math.inf, required + found[LOOSE]
+        self.note: Callable[[], None] = partial(note, words, found)
         """Must be called after the reset and after each step."""
 
     def smallest(self) -> SmallestGap:
         """The smallest gap so far."""
-        gap, step, x, y, heading, who = self._found[: WHO + 1].tolist()
+        return self._kept(0)
+
+    def too_close(self) -> SmallestGap | None:
+        """The smallest gap so far that is too close; None without any."""
+        found = self._kept(CLOSE)
+        return None if found.gap == math.inf else found
+
+    def _kept(self, at: int) -> SmallestGap:
+        gap, step, x, y, heading, who = self._found[at : at + WHO + 1].tolist()
         mover = None if who == WALL else int(who)
         return SmallestGap(gap, int(step), x, y, heading, mover)
 
@@ -138,8 +164,15 @@ def begin_note(state: Array, found: Array) -> None:
 
 
 @subkernel
-def end_note(state: Array, found: Array) -> None:
-    """Ends the note of a step: the next arc begins here."""
+def end_note(state: Array, found: Array, gap: float) -> None:
+    """Ends the note of a step: the next arc begins here.
+
+    Args:
+        state: State of the robot after the step.
+        found: Overwritten.
+        gap: The gap at the end of the step, up to `found[ENOUGH]`.
+    """
+    found[MOST] = max(found[MOST], gap)
     _leave(state, found)
 
 
@@ -150,8 +183,19 @@ def _leave(state: Array, found: Array) -> None:
 
 
 @subkernel
+def sought(found: Array) -> float:
+    """A gap is kept if it is below this."""
+    return max(float(found[GAP]), _close_below(found))
+
+
+@subkernel
+def _close_below(found: Array) -> float:
+    return float(min(found[CLOSE + GAP], found[MOST] - found[LOOSE]))
+
+
+@subkernel
 def keep(state: Array, found: Array, gap: float, part: float, who: float) -> None:
-    """Keeps a gap that is smaller than all before.
+    """Keeps a gap if it is smaller than those before.
 
     Args:
         state: State of the robot after the step.
@@ -164,13 +208,28 @@ def keep(state: Array, found: Array, gap: float, part: float, who: float) -> Non
         found[FROM_X], found[FROM_Y], found[FROM_HEADING],
         part * state[FORWARD], part * state[TURN],
     )  # fmt: skip
-    found[GAP], found[STEP], found[WHO] = max(gap, 0.0), state[STEPS], who
-    found[AT_X], found[AT_Y], found[AT_HEADING] = x, y, wrap_angle(heading)
+    _write(state, found, max(gap, 0.0), x, y, wrap_angle(heading), who)
 
 
 @subkernel
 def keep_contact(state: Array, found: Array, who: float) -> None:
     """Keeps a gap of 0 where the robot is now."""
-    found[GAP], found[STEP], found[WHO] = 0.0, state[STEPS], who
-    found[AT_X], found[AT_Y] = state[X], state[Y]
-    found[AT_HEADING] = state[HEADING]
+    _write(state, found, 0.0, state[X], state[Y], state[HEADING], who)
+
+
+@subkernel
+def _write(
+    state: Array,
+    found: Array,
+    gap: float,
+    x: float,
+    y: float,
+    heading: float,
+    who: float,
+) -> None:
+    is_close = gap < _close_below(found)
+    for at, smaller in ((0, gap < found[GAP]), (CLOSE, is_close)):
+        if smaller:
+            found[at + GAP], found[at + STEP], found[at + WHO] = gap, state[STEPS], who
+            found[at + AT_X], found[at + AT_Y] = x, y
+            found[at + AT_HEADING] = heading

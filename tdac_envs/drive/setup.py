@@ -84,10 +84,17 @@ class DriveSetup:
         """Whether the task may differ from episode to episode."""
         return self.variation != "nominal" or self.source is not None
 
-    @property
-    def required_gap(self) -> float:
-        """The gap to obstacles that the robot should keep, px or m."""
-        return required_gap(self.nominal.body_radius)
+    def required_gap(self, task: Any) -> float:
+        """The gap to obstacles that the robot should keep in a task, px or m."""
+        return required_gap(task.body_radius)
+
+    def gap_in_episode(self, task: Any) -> float:
+        """`required_gap` of an episode: other starts on one map have the same one.
+
+        Args:
+            task: The task of the episode.
+        """
+        return self.required_gap(self.nominal if self.source is None else task)
 
     def constants(self) -> NDArray[np.float64]:
         """The constants of a robot on the nominal task, as in `stepping`."""

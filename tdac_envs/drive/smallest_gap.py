@@ -1,16 +1,19 @@
 """The smallest gap between body and obstacles in an episode, and the required one.
 
-The gap is measured along the exact arcs of all steps; see `gap_search`.
+The gap is measured along the exact arcs of all steps; see `gap_search`, which also
+says when a gap is too close.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 LEAST_SHARE = 0.05
 """Least required gap, as a share of the body radius."""
-DEVIATIONS = 3.0
-"""Standard deviations of the pose that the required gap covers."""
+MOST_SHARE = 0.5
+"""Largest required gap, as a share of the gap of the widest path to the goal."""
 
 
 class SmallestGap(NamedTuple):
@@ -34,14 +37,23 @@ class SmallestGap(NamedTuple):
 
 
 def required_gap(
-    radius: float, pose_deviation: float = 0.0, stopping_distance: float = 0.0
+    radius: float,
+    stopping_distance: float = 0.0,
+    widest: Callable[[], float] = lambda: math.inf,
 ) -> float:
     """The gap that a robot should keep, in the unit of its arguments.
 
+    It is the stopping distance, but no more than `MOST_SHARE` of what the world leaves,
+    and at least `LEAST_SHARE` of the radius. The error of the observed pose is not
+    added: where a drive has one, the true gap already includes it.
+
     Args:
         radius: Radius of the body.
-        pose_deviation: Standard deviation of the observed position.
         stopping_distance: Distance in which the robot stops from full speed.
+        widest: Returns the radius of the largest disc that gets from start to goal;
+            called only if it matters.
     """
-    needed = DEVIATIONS * pose_deviation + stopping_distance
-    return max(needed, LEAST_SHARE * radius)
+    least = LEAST_SHARE * radius
+    if stopping_distance <= least:
+        return least
+    return max(min(stopping_distance, MOST_SHARE * (widest() - radius)), least)

@@ -274,7 +274,9 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
 
     def watch_gap(self, robot: int) -> GapWatch:
         """A watch of a robot's smallest gap in the episode that has just begun."""
-        watch: GapWatch = self._first.watch_gap(self._addresses.words[robot])
+        kept = self.setups[robot].gap_in_episode(self.tasks[robot])
+        words = self._addresses.words[robot]
+        watch: GapWatch = self._first.watch_gap(words, kept)
         return watch
 
     def _bind(self) -> None:

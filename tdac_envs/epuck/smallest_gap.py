@@ -10,11 +10,11 @@ import math
 from tdac_envs.core.addresses import Words
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.gap_search import (
+    ENOUGH,
     EXACT,
     FROM_HEADING,
     FROM_X,
     FROM_Y,
-    GAP,
     NOWHERE,
     WALL,
     begin_note,
@@ -22,6 +22,7 @@ from tdac_envs.drive.gap_search import (
     keep,
     keep_contact,
     searching,
+    sought,
 )
 from tdac_envs.drive.stepping import (
     CLEARANCE,
@@ -69,11 +70,11 @@ def _note_parts(
     for k in range(extent.shape[0]):
         off_x, off_y = extent[k, MID_X] - state[X], extent[k, MID_Y] - state[Y]
         far = math.sqrt(off_x * off_x + off_y * off_y) - extent[k, REACH]
-        if far - radius - abs(forward) < found[GAP]:
+        if far - radius - abs(forward) < sought(found):
             gap, part = _search(
                 (points, first, extent, k, radius),
                 found[FROM_X], found[FROM_Y], found[FROM_HEADING], forward, turn,
-                0.0, 1.0, found[GAP], EXACT * radius,
+                0.0, 1.0, sought(found), EXACT * radius,
             )  # fmt: skip
             if part != NOWHERE:
                 keep(state, found, gap, part, WALL)
@@ -92,8 +93,8 @@ def note_gap(words: Words, found: Array) -> None:
     begin_note(state, found)
     room = outcome[CLEARANCE] - radius
     if outcome[TOUCHED] == 1.0:
-        if found[GAP] > 0.0:
+        if sought(found) > 0.0:
             keep_contact(state, found, WALL)
-    elif room - abs(state[FORWARD]) < found[GAP]:
+    elif room - abs(state[FORWARD]) < sought(found):
         _note_parts(own[0], own[1], own[2], state, radius, found)
-    end_note(state, found)
+    end_note(state, found, min(room, found[ENOUGH]))

@@ -39,6 +39,7 @@ def with_named_robot(values: dict[str, Any]) -> dict[str, Any]:
     own = options_of(file, metric, False, disturbed=True)
     dt = own.pop("dt")
     errors = {name: own.pop(name) for name in list(own) if name in _ERRORS}
+    own.pop("stopping_distance", None)  # it has no part in a set's hash
     robot = {_KEYS.get(name, name): value for name, value in own.items()}
     if "ray_angles" in robot:
         assert file.scanner is not None

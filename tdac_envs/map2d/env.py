@@ -208,6 +208,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             both wheels by the same factor, so that the robot drives the same curve.
         max_turn_rate: Largest turn of the body, rad/s; commands are scaled likewise.
         max_turn_acceleration: Largest acceleration of its turn, rad/s².
+        stopping_distance: From full speed to standstill, px. It changes no motion, but
+            the gap to obstacles that the robot should keep (`required_gap`).
         pose_noise: Standard deviation of the error of the observed x and y, px.
             `info`, reward and the end of an episode always use the true pose.
         heading_noise: Standard deviation of the error of the observed heading, rad.
@@ -290,6 +292,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         delay: int = 0,
         max_acceleration: float | None = None,
         max_turn_acceleration: float | None = None,
+        stopping_distance: float | None = None,
         max_speed: float | None = None,
         max_turn_rate: float | None = None,
         pose_noise: float | None = None,
@@ -331,6 +334,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             "scanner_offset": scanner_offset,
             "max_acceleration": max_acceleration,
             "max_turn_acceleration": max_turn_acceleration,
+            "stopping_distance": stopping_distance,
             "max_speed": max_speed,
             "max_turn_rate": max_turn_rate,
             "dt": dt,

@@ -23,7 +23,10 @@ LENGTHS = (
     "goal_tolerance",
 )
 """Arguments of `Map2DEnv` that are lengths, or lengths per second."""
-LENGTHS_OR_ZERO = "max_speed", "pose_noise", "range_min", "max_acceleration"
+LENGTHS_OR_ZERO = (
+    *("max_speed", "pose_noise", "range_min", "max_acceleration"),
+    "stopping_distance",
+)
 """Those that may be 0, lengths per second squared among them."""
 
 

@@ -14,7 +14,7 @@ from tdac_envs.robots.robot_file import RobotFile
 RobotSource = str | Path | None
 LENGTHS = (
     *("robot_radius", "axle_length", "max_wheel_speed", "range_max", "range_min"),
-    *("max_speed", "max_acceleration", "pose_noise"),
+    *("max_speed", "max_acceleration", "stopping_distance", "pose_noise"),
 )
 """Arguments that a robot file gives as lengths, per second or per second squared."""
 RAYS = "ray_angles", "n_rays", "field_of_view"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from tdac_envs.map2d.reception import EXACT, Receiver, Reception
 from tdac_envs.map2d.robot import FRICTION
 from tdac_envs.map2d.sonar import Sonar
 from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.map2d.terrain import widest_connected_radius
 from tdac_envs.mapping.params import RobotParams
 from tdac_envs.movers.spec import AnySpec
 
@@ -99,11 +101,11 @@ class Map2DSetup(DriveSetup):
             # A fault is found here, and not at the first reset.
             self.movers_setup.start(self.nominal, np.random.default_rng(0))
 
-    @property
-    def required_gap(self) -> float:
-        """The gap to obstacles that the robot should keep, px."""
-        radius, stated = self.nominal.body_radius, self.reception.pose_noise
-        return required_gap(radius, stated)
+    def required_gap(self, task: Map2DTask) -> float:
+        """See `DriveSetup.required_gap`."""
+        own, clear = task.robot, task.terrain.clear
+        widest = partial(widest_connected_radius, clear, task.start[:2], task.goal)
+        return required_gap(own.radius, own.stopping_distance or 0.0, widest)
 
     @property
     def has_inexact_ranges(self) -> bool:
@@ -182,9 +184,10 @@ OVERRIDDEN = (
     *("axle_length", "max_wheel_speed", "n_rays", "field_of_view", "range_max"),
     *("ray_angles", "range_min", "below_min", "scanner_offset"),
     *("max_speed", "max_turn_rate", "max_acceleration", "max_turn_acceleration"),
+    "stopping_distance",
 )
 """Arguments of `override`."""
-_MAY_BE_ZERO = "range_min", "max_acceleration"
+_MAY_BE_ZERO = "range_min", "max_acceleration", "stopping_distance"
 
 
 def override(

@@ -10,11 +10,12 @@ import math
 from tdac_envs.core.addresses import Words
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.drive.gap_search import (
+    ENOUGH,
     EXACT,
     FROM_HEADING,
     FROM_X,
     FROM_Y,
-    GAP,
+    MOST,
     NOWHERE,
     WALL,
     begin_note,
@@ -22,11 +23,13 @@ from tdac_envs.drive.gap_search import (
     keep,
     keep_contact,
     searching,
+    sought,
 )
 from tdac_envs.drive.stepping import (
     CONTACT,
     DT,
     FORWARD,
+    HEADING,
     RADIUS,
     STEPS,
     TOUCHED,
@@ -146,7 +149,7 @@ def _note_walls(
         return
     gap, part = _gap_to_walls(
         clear, found[FROM_X], found[FROM_Y], found[FROM_HEADING],
-        state[FORWARD], state[TURN], constants[RADIUS], found[GAP],
+        state[FORWARD], state[TURN], constants[RADIUS], sought(found),
     )  # fmt: skip
     if part != NOWHERE:
         keep(state, found, gap, part, WALL)
@@ -166,7 +169,7 @@ def _note_mover(
         )  # fmt: skip
         gap, part = _search_disc(
             disc, found[FROM_X], found[FROM_Y], found[FROM_HEADING],
-            state[FORWARD], state[TURN], time, end, found[GAP], exact,
+            state[FORWARD], state[TURN], time, end, sought(found), exact,
         )  # fmt: skip
         if part != NOWHERE:
             keep(state, found, gap, part, float(m))
@@ -188,25 +191,38 @@ def _note_movers(
         off_x, off_y = now[m, at.X] - state[X], now[m, at.Y] - state[Y]
         reach = radius + traits[m, at.RADIUS]
         gap = math.sqrt(off_x * off_x + off_y * off_y) - reach
-        if gap - length - traits[m, at.SPEED] * constants[DT] >= found[GAP]:
+        if gap - length - traits[m, at.SPEED] * constants[DT] >= sought(found):
             continue
         if state[STEPS] == 0.0:
             # Their motion has not been planned yet.
-            if gap < found[GAP]:
+            if gap < sought(found):
                 keep(state, found, gap, 1.0, float(m))
         else:
             _note_mover(state, found, pieces, m, reach, EXACT * radius)
 
 
 @subkernel
-def _nearest_mover(state: Array, traits: Array, now: Array) -> float:
+def _nearest_mover(state: Array, traits: Array, now: Array) -> tuple[float, float]:
+    """Distance to the nearest mover, and its index."""
     best, nearest = math.inf, WALL
     for m in range(traits.shape[0]):
         off_x, off_y = now[m, at.X] - state[X], now[m, at.Y] - state[Y]
         gap = math.sqrt(off_x * off_x + off_y * off_y) - traits[m, at.RADIUS]
         if gap < best:
             best, nearest = gap, float(m)
-    return nearest
+    return best, nearest
+
+
+@subkernel
+def _gap_now(clear: FloatGrid, constants: Array, state: Array, found: Array) -> float:
+    """The gap to walls where the robot is, up to `found[ENOUGH]`."""
+    if found[MOST] >= found[ENOUGH]:
+        return float(found[ENOUGH])
+    gap, _ = _gap_to_walls(
+        clear, state[X], state[Y], state[HEADING], 0.0, 0.0, constants[RADIUS],
+        found[ENOUGH],
+    )  # fmt: skip
+    return gap
 
 
 @kernel
@@ -220,9 +236,9 @@ def note_gap(words: Words, found: Array) -> None:
     own = arrays_at(words)
     clear, constants, state, outcome = own[1], own[4], own[5], own[10]
     begin_note(state, found)
-    if found[GAP] > 0.0:
+    if sought(found) > 0.0:
         _note_walls(clear, constants, state, outcome, found)
-    end_note(state, found)
+    end_note(state, found, _gap_now(clear, constants, state, found))
 
 
 @kernel
@@ -232,11 +248,12 @@ def note_gap_among(words: Words, found: Array) -> None:
     clear, constants, state, outcome = own[1], own[4], own[5], own[10]
     traits, now, pieces = movers[0], movers[1], movers[3]
     begin_note(state, found)
-    if found[GAP] > 0.0:
-        if outcome[CONTACT] >= MOVER:
-            keep_contact(state, found, _nearest_mover(state, traits, now))
-        else:
-            _note_walls(clear, constants, state, outcome, found)
-        if found[GAP] > 0.0:
-            _note_movers(constants, state, traits, now, pieces, found)
-    end_note(state, found)
+    if outcome[CONTACT] >= MOVER:
+        keep_contact(state, found, _nearest_mover(state, traits, now)[1])
+    elif sought(found) > 0.0:
+        _note_walls(clear, constants, state, outcome, found)
+        _note_movers(constants, state, traits, now, pieces, found)
+    gap = _gap_now(clear, constants, state, found)
+    if found[MOST] < found[ENOUGH]:
+        gap = min(gap, _nearest_mover(state, traits, now)[0] - constants[RADIUS])
+    end_note(state, found, gap)

@@ -112,6 +112,9 @@ class RobotParams(StrictModel):
     max_turn_rate: Length | None = Field(None, description="Its turn, rad/s.")
     max_acceleration: Length | None = Field(None, description="Of a wheel, px/s².")
     max_turn_acceleration: Length | None = Field(None, description="rad/s²")
+    stopping_distance: Length | None = Field(
+        None, description="From full speed to standstill, px."
+    )
 
     @model_validator(mode="after")
     def _has_an_angle_for_each_ray(self) -> Self:
@@ -281,7 +284,7 @@ class MapParams(StrictModel):
 
 _ROBOT_LENGTHS = (
     *("radius", "axle_length", "max_wheel_speed", "range_max"),
-    *("range_min", "max_speed", "max_acceleration"),
+    *("range_min", "max_speed", "max_acceleration", "stopping_distance"),
 )
 
 

@@ -172,6 +172,7 @@ class RobotFile(StrictModel):
             "range_min": scanner.range_min or None,
             "below_min": scanner.below_min if scanner.range_min else None,
             "scanner_offset": scanner.offset if any(scanner.offset) else None,
+            "stopping_distance": self.stopping_distance or None,
             "dt": 1.0 / self.control_rate,
         }
 

@@ -67,6 +67,7 @@ def drive(env, act, start=None, steps=None, name="nominal", held_out=False) -> R
         tolerance=task.goal_tolerance,
         contact=record.contact,
         smallest_gap=record.smallest_gap(),
+        close_gap=record.close_gap(),
         required_gap=env.required_gap,
     )
 

@@ -13,6 +13,8 @@ from tdac_agent.verification.diagnosis.report import Cause
 from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.mapping.params import RobotParams
 
+DEVIATIONS = 3.0
+"""Standard deviations of its observed position that it keeps in addition."""
 RESERVE = 0.02
 """Margin beyond the kept gap, as a share of the radius: it does not drive exactly."""
 

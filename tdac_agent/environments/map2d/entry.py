@@ -122,13 +122,14 @@ class Map2DEnvironment(Environment):
 
     def template(self, setting: Setting) -> Template[Any]:
         """See `template_for`."""
-        from tdac_agent.environments.map2d.builtin import template_for
+        from tdac_agent.environments.map2d.builtin import DEVIATIONS, template_for
         from tdac_agent.environments.map2d.setting import map_setting
 
         own = map_setting(setting)
         params = own.params
         resolution = params.resolution if params.frame == "metres" else None
-        kept = setting.make_env().required_gap
+        noise = own.length_of(own.disturbances.get("pose_noise", 0.0))
+        kept = own.make_env().required_gap + DEVIATIONS * noise
         return template_for(params.robot, own.nominal.dt, resolution, kept)
 
 

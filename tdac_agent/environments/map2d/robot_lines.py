@@ -34,6 +34,11 @@ def robot_lines(task: Task, setting: Map2DSetting) -> list[str]:
         lines.append(
             f"The turn accelerates by at most {robot.max_turn_acceleration:g} rad/s²."
         )
+    if robot.stopping_distance:
+        lines.append(
+            f"It needs {length(robot.stopping_distance, 3)} to stop from full speed, "
+            "and should keep this gap to obstacles where the map allows it."
+        )
     if robot.range_min:
         lines.append(
             f"A ray that meets a surface nearer than {length(robot.range_min, 3)} "

@@ -24,9 +24,10 @@ ROBOT_IMAGE_PIXELS = 4_000_000
 FURTHER = (
     *("ray_angles", "range_min", "below_min", "scanner_offset", "max_speed"),
     *("max_turn_rate", "max_acceleration", "max_turn_acceleration"),
+    "stopping_distance",
 )
 """Properties of a robot that not every robot has."""
-_FURTHER_LENGTHS = "range_min", "max_speed", "max_acceleration"
+_FURTHER_LENGTHS = "range_min", "max_speed", "max_acceleration", "stopping_distance"
 _NAMES = {"robot_radius": "radius", "axle_length": "axle"}
 
 

@@ -30,11 +30,16 @@ class Gap(StrictRecord):
     y: float | None = None
     heading: float | None = Field(None, description="Heading there, rad.")
     thing: str | None = Field(None, description="What was nearest.")
+    close: Gap | None = Field(
+        None,
+        description="The smallest gap that was too close: smaller than required, and "
+        "than one that the robot had before. None without any.",
+    )
 
     @property
     def too_close(self) -> bool:
-        """Whether it is smaller than the required one, and not that of the start."""
-        return self.gap < self.required and self.step != 0
+        """Whether the robot came too close, on the way from where it started."""
+        return self.close is not None
 
 
 def gap_figure(length: float, units: Units) -> str:
@@ -67,10 +72,17 @@ def gap_text(gap: Gap, units: Units, *, placed: bool = True) -> str:
     return f"{text} in step {gap.step}" if gap.step else f"{text} at the start"
 
 
-def too_close_text(gap: Gap, units: Units) -> str:
-    """Says that a gap is smaller than the required one."""
-    required = gap_figure(gap.required, units)
-    return f"{TOO_CLOSE}: {gap_text(gap, units)}; required {required}"
+def too_close_text(gap: Gap, units: Units, *, placed: bool = True) -> str:
+    """Says where the robot came too close.
+
+    Args:
+        gap: The smallest gap of an episode, or the smallest one that was too close.
+        units: Units of the text.
+        placed: Whether to tell the place.
+    """
+    near, required = gap.close or gap, gap_figure(gap.required, units)
+    text = gap_text(near, units, placed=placed)
+    return f"{TOO_CLOSE}: {text}; required {required}"
 
 
 G = TypeVar("G")

@@ -6,6 +6,7 @@ from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.verification.diagnosis.gap import Gap
 from tdac_agent.verification.diagnosis.surroundings import surroundings_of
+from tdac_envs.drive.smallest_gap import SmallestGap
 from tdac_envs.drive.task import Pose
 
 _DIGITS = 9
@@ -22,9 +23,17 @@ def gap_of(rollout: Rollout, task: Nominal, *, told: bool = True) -> Gap | None:
         task: Its task.
         told: Whether the place may be told.
     """
-    found = rollout.smallest_gap
+    found, close = rollout.smallest_gap, rollout.close_gap
     if found is None:
         return None
+    gap = _recorded(found, rollout, task, told)
+    if close is None:
+        return gap
+    near = gap if close == found else _recorded(close, rollout, task, told)
+    return gap.model_copy(update={"close": near})
+
+
+def _recorded(found: SmallestGap, rollout: Rollout, task: Nominal, told: bool) -> Gap:
     gap = Gap(
         gap=round(found.gap, _DIGITS),
         radii=round(found.gap / rollout.radius, _ANGLE_DIGITS),
@@ -37,15 +46,13 @@ def gap_of(rollout: Rollout, task: Nominal, *, told: bool = True) -> Gap | None:
         "x": round(found.x, _DIGITS),
         "y": round(found.y, _DIGITS),
         "heading": round(found.heading, _ANGLE_DIGITS),
-        "thing": _nearest(rollout, task),
+        "thing": _nearest(found, rollout, task),
     }
     return gap.model_copy(update=place)
 
 
-def _nearest(rollout: Rollout, task: Nominal) -> str | None:
-    """Name of what was nearest at the smallest gap."""
-    found = rollout.smallest_gap
-    assert found is not None
+def _nearest(found: SmallestGap, rollout: Rollout, task: Nominal) -> str | None:
+    """Name of what was nearest at a gap."""
     if found.mover is not None:
         return f"mover {found.mover}"
     around = surroundings_of(task)

@@ -102,7 +102,7 @@ class Episode(StrictRecord):
 
     @property
     def too_close(self) -> bool:
-        """Whether it reached the goal with a smaller gap than the required one."""
+        """Whether it reached the goal, but came too close to an obstacle."""
         found, reached = self.smallest_gap, self.outcome == "reached"
         return reached and found is not None and found.too_close
 
@@ -195,7 +195,7 @@ class Report(StrictRecord):
 
     @property
     def too_close(self) -> tuple[Episode, ...]:
-        """The episodes that reached the goal with less than the required gap."""
+        """The episodes that reached the goal, but came too close to an obstacle."""
         return tuple(each for each in self.episodes if each.too_close)
 
 

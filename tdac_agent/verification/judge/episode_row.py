@@ -121,10 +121,14 @@ class EpisodeRow(StrictRecord):
         return self.least_gap or 0.0 if self.success else 0.0
 
     @property
+    def close_gap(self) -> Gap | None:
+        """The smallest gap that was too close; None without any."""
+        return None if self.smallest_gap is None else self.smallest_gap.close
+
+    @property
     def too_close(self) -> bool:
-        """Whether it reached the goal with a smaller gap than the required one."""
-        found = self.smallest_gap
-        return self.success and found is not None and found.too_close
+        """Whether it reached the goal, but came too close to an obstacle."""
+        return self.success and self.close_gap is not None
 
 
 class Scores(StrictRecord):

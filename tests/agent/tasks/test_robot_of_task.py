@@ -8,6 +8,7 @@ import pytest
 import yaml
 
 from tdac_agent import load_task
+from tdac_agent.builtin.provider import template_of
 from tdac_agent.environments.map2d.prompt import facts_of
 from tdac_agent.tasks.disturbance import PARTS, Disturbance
 from tdac_agent.tasks.task import lay_out
@@ -67,6 +68,22 @@ def test_pixels_and_metres_are_the_same_robot(floor):
     metric = task_of(floor)
     same = metric.disturbed_options(metric.own_disturbance())
     assert options == pytest.approx(same)
+
+
+def test_it_should_keep_its_stopping_distance(floor):
+    """With and without the errors of its pose; `builtin` plans with these in addition.
+
+    Plain tasks keep 5 % of the radius.
+    """
+    task = task_of(floor)
+    for errors in ({}, task.disturbed_options(task.own_disturbance())):
+        required = task.setting.make_env(**errors).required_gap * 0.05
+        assert required == pytest.approx(0.032)
+    planned = template_of(task.setting).facts["kept_gap"] * 0.05
+    assert planned == pytest.approx(0.032 + 3 * 0.03)
+    plain = task_of(floor, robot={"radius": 0.2})
+    assert plain.setting.make_env().required_gap * 0.05 == pytest.approx(0.01)
+    assert template_of(plain.setting).facts["kept_gap"] * 0.05 == pytest.approx(0.01)
 
 
 def test_a_laid_out_task_is_the_same(floor, tmp_path):

@@ -1,6 +1,7 @@
 """Promises of the smallest gap of an episode; dense samples are the oracle."""
 
 import math
+from importlib.resources import files
 
 import brute_force
 import gymnasium as gym
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 import tdac_envs
-from tdac_envs.drive.gap_search import GapWatch
+from tdac_envs.drive.gap_search import SLACK
 from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.drive.stepping import FORWARD, TURN
 from tdac_envs.epuck.env import EPuckEnv
@@ -108,7 +109,8 @@ def map_oracle(env, before, best):
     return least(gap_at, abs(forward) + speed, best)
 
 
-def start_oracle(env):
+def end_oracle(env):
+    """Gap on a map where the robot is now."""
     x, y, _ = env.pose()
     gap = float(brute_force.distance(env.nominal.terrain.grid.cells, x, y))
     discs = env.discs()
@@ -145,25 +147,35 @@ def prism_distance(solid, x, y):
     return best
 
 
-def check_episode(env, seed, at_start, in_step):
-    """The watch agrees with the oracle after each step; returns the last gap."""
-    watch, expected = None, math.inf
+def check_episode(env, seed, at_end, in_step):
+    """The watch agrees with the oracle after each step, also with what is too close.
+
+    The required gap is a radius, so that many gaps are smaller.
+    """
+    radius = env.nominal.body_radius
+    watch, expected, close, most = None, math.inf, math.inf, -math.inf
     for before, info in steps_of(env, seed):
         if info is None:
-            watch = env.watch_gap()
-            expected = at_start(env)
+            watch = env.watch_gap(required=radius)
+            expected = at_end(env)
         else:
-            gap = 0.0 if info["collision"] else in_step(env, before, expected)
+            limit = min(radius, most - SLACK * radius)
+            best = max(expected, min(close, limit))
+            gap = 0.0 if info["collision"] else in_step(env, before, best)
             expected = min(expected, gap)
+            close = min(close, gap) if gap < limit else close
+        most = max(most, at_end(env))
         watch.note()
         assert watch.smallest().gap == pytest.approx(expected, abs=EXACT)
-    return watch.smallest()
+        found = watch.too_close()
+        assert (found is None) == (close == math.inf)
+        assert found is None or found.gap == pytest.approx(close, abs=EXACT)
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_the_gap_to_walls_is_that_of_dense_samples(seed):
     """On random maps, along the arcs, to 1e-6 px; 0 with a contact."""
-    check_episode(map_env(seed), seed, start_oracle, map_oracle)
+    check_episode(map_env(seed), seed, end_oracle, map_oracle)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -171,7 +183,7 @@ def test_the_gap_to_movers_is_that_of_dense_samples(seed):
     """The movers' motion within a step counts, with all their turns."""
     movers = [{"kind": "bounce", "count": 3, "speed": 60.0, "radius": 1.5}]
     env = map_env(100 + seed, movers=movers)
-    check_episode(env, seed, start_oracle, map_oracle)
+    check_episode(env, seed, end_oracle, map_oracle)
 
 
 @pytest.mark.parametrize("world", ["maze", "crates"])
@@ -180,12 +192,12 @@ def test_the_gap_in_worlds_is_that_of_dense_samples(world, seed):
     """To all solid parts of an e-puck's world, to 1e-6 m."""
     env = EPuckEnv(world, variation="random", max_wheel_speed=40.0)
 
-    def at_start(env):
+    def at_end(env):
         x, y, _ = env.pose()
         solid = env.nominal.ground.solid
         return float(prism_distance(solid, x, y)) - env.nominal.body_radius
 
-    check_episode(env, seed, at_start, world_oracle)
+    check_episode(env, seed, at_end, world_oracle)
 
 
 def test_the_place_of_the_gap_is_where_the_body_was_nearest():
@@ -207,6 +219,82 @@ def test_the_place_of_the_gap_is_where_the_body_was_nearest():
             x, y, _ = poses[found.step - 1]
             reach = abs(env.nominal.full_step) + 1e-9
             assert math.hypot(found.x - x, found.y - y) <= reach
+
+
+AWAY, BACK, SPIN = (0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)
+"""Steps of 1 px, and a turn on the spot."""
+
+
+def between_walls(room, moves):
+    """A robot of 10 px radius starts near the left wall, and faces the right one.
+
+    The walls are 30 px and the radii apart; the required gap is 0.5 px.
+    """
+    cells = np.zeros((60, 80), np.bool_)
+    cells[:, :11] = cells[:, 61:] = True
+    env = Map2DEnv(
+        cells, (20.5 + room, 30.0, 0.0), (40.0, 30.0), robot_radius=10.0,
+        max_wheel_speed=100.0, goal_tolerance=0.1,
+    )  # fmt: skip
+    env.reset(seed=0)
+    watch = env.watch_gap()
+    watch.note()
+    for count, wheels in moves:
+        for _ in range(count):
+            env.step(np.array(wheels, np.float32))
+            watch.note()
+    return watch
+
+
+@pytest.mark.parametrize(
+    ("room", "moves", "gap", "side"),
+    [
+        (0.2, [], None, None),
+        (0.2, [(20, AWAY)], None, None),
+        (0.2, [(9, SPIN), (4, (0.201, -0.199)), (9, AWAY)], None, None),
+        # It came as near to the other wall as it was at the start, and nearer.
+        (0.2, [(29, AWAY), (1, (0.1, 0.1))], 0.3, "right"),
+        (0.2, [(29, AWAY), (1, (0.13, 0.13))], 0.15, "right"),
+        # It went back to its start.
+        (0.2, [(20, AWAY), (20, BACK)], 0.2, "left"),
+        (0.2, [(1, (-0.03, -0.03))], 0.05, "left"),
+        (0.2, [(1, (-0.01, -0.01))], None, None),
+        (1.6, [(1, BACK), (9, AWAY)], None, None),
+        (1.5, [(1, BACK), (1, (-0.02, -0.02))], 0.4, "left"),
+    ],
+)
+def test_a_start_is_not_too_close_and_what_follows_may_be(room, moves, gap, side):
+    """A gap is too close if it is smaller than required and than an earlier one."""
+    watch = between_walls(room, moves)
+    found = watch.too_close()
+    if gap is None:
+        assert found is None
+        return
+    assert found.gap == pytest.approx(gap, abs=EXACT)
+    assert found.step > 0
+    assert ("left" if found.x < 30 else "right") == side
+    assert watch.smallest().gap == pytest.approx(min(gap, room), abs=EXACT)
+
+
+def test_a_start_next_to_a_mover_is_not_too_close():
+    """If the gap only grows from then on."""
+    route = {"kind": "route", "points": [[30, 20], [30, 10]], "speed": 4, "phase": 0}
+    env = Map2DEnv(
+        map=np.zeros((60, 60), np.bool_),
+        start=(30, 24.55, math.pi / 2),
+        goal=(30, 50),
+        robot_radius=2.0,
+        movers=[{**route, "radius": 2.5}],
+    )
+    env.reset(seed=0)
+    watch = env.watch_gap()
+    watch.note()
+    for _ in range(10):
+        env.step(np.full(2, 0.2, np.float32))
+        watch.note()
+    assert watch.smallest().gap == pytest.approx(0.05)
+    assert watch.smallest().gap < env.required_gap
+    assert watch.too_close() is None
 
 
 def test_a_mover_that_comes_nearest_is_named():
@@ -253,6 +341,7 @@ def test_a_batch_gives_the_same_gaps(env_id):
         for each in (*ours, *theirs):
             each.note()
     assert [each.smallest() for each in ours] == [each.smallest() for each in theirs]
+    assert [each.too_close() for each in ours] == [each.too_close() for each in theirs]
 
 
 def test_a_batch_among_movers_has_no_watch():
@@ -265,10 +354,34 @@ def test_a_batch_among_movers_has_no_watch():
         batch.watch_gap(0)
 
 
-def test_the_required_gap_covers_pose_error_and_stopping_distance():
-    """Three standard deviations and the way to stop, at least 5 % of the radius."""
+def test_the_required_gap_is_the_way_to_stop():
+    """At least 5 % of the radius, at most half of what the widest path leaves."""
     assert required_gap(20.0) == 1.0
-    assert required_gap(20.0, 0.1) == 1.0
-    assert required_gap(20.0, 1.0, 0.5) == 3.5
-    assert isinstance(Map2DEnv().required_gap, float)
-    assert Map2DEnv().watch_gap().__class__ is GapWatch
+    assert required_gap(20.0, 0.5) == 1.0
+    assert required_gap(20.0, 3.5) == 3.5
+    assert required_gap(20.0, 3.5, lambda: 40.0) == 3.5
+    assert required_gap(20.0, 3.5, lambda: 24.0) == 2.0
+    assert required_gap(20.0, 3.5, lambda: 20.5) == 1.0
+
+
+def test_a_robot_file_gives_its_stopping_distance(tmp_path):
+    """In its units, with or without errors of the pose; a narrow map allows less."""
+    (tmp_path / "disc.yaml").write_text(
+        load_text("paper-disc").replace("stopping_distance: 0", "stopping_distance: 2")
+    )
+    wide = np.zeros((41, 81), np.bool_)
+    own = {"start": (20, 20), "goal": (60, 20), "robot_radius": 4}
+    named = {**own, "robot": tmp_path / "disc.yaml"}
+    assert Map2DEnv(wide, **named).required_gap == 2.0
+    assert Map2DEnv(wide, **named, pose_noise=1.0).required_gap == 2.0
+    assert Map2DEnv(wide, **own).required_gap == pytest.approx(0.2)
+    assert Map2DEnv(wide, **own, stopping_distance=3).required_gap == 3.0
+    narrow = wide.copy()
+    narrow[:15, 40] = narrow[26:, 40] = True  # 11 px remain free
+    env = Map2DEnv(narrow, **named)
+    assert env.required_gap == pytest.approx(0.5 * (5.45 - 4.0), abs=0.03)
+
+
+def load_text(name):
+    """The text of a bundled robot file."""
+    return (files("tdac_envs.robots") / "files" / f"{name}.yaml").read_text()

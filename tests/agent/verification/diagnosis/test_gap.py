@@ -22,7 +22,9 @@ from tdac_agent.verification.diagnosis.gap import (
 from tdac_agent.verification.diagnosis.nearest import gap_of
 from tdac_agent.verification.diagnosis.report import Episode, Report
 from tdac_agent.verification.episode_report import EpisodeProvenance, summarise
+from tdac_agent.verification.judge.confirming import ConfirmingTest
 from tdac_agent.verification.judge.episode_row import EpisodeRow, driven_row
+from tdac_agent.verification.verdict import confirmed_text, word_of
 from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.env import Map2DEnv
 
@@ -92,6 +94,32 @@ def test_an_episode_without_a_step_has_no_gap():
     assert gap_of(rollout, env.nominal) is None
 
 
+def test_a_tight_start_is_not_too_close_and_what_follows_is_named():
+    """It starts nearer to a wall than required, then passes another one too close."""
+    env = corridor_env(0.2)
+    cells = env.nominal.terrain.grid.cells.copy()
+    cells[:, :15] = True  # its right edge is at 14.5
+    env = Map2DEnv(cells, (19.6, *env.nominal.start[1:]), (70.0, 29.0), robot_radius=5)
+    for told in (True, False):
+        row = row_of(env, drive(env, always(1.0, 1.0)), told=told)
+        assert row.smallest_gap.gap == pytest.approx(0.1, abs=1e-6)
+        assert row.close_gap.gap == pytest.approx(0.2, abs=1e-6)
+        assert row.too_close
+        rows = [row.model_copy(update={"seed": 1}), tight_start()]
+        report = summarise(provenance(), rows, None, 1.0)
+        assert (report.closest, report.too_close) == (2, 1)
+        assert report.close_gap == row.close_gap
+    leaves = row_of(env, drive(env, always(1.0, 1.0), steps=3), told=False)
+    assert leaves.smallest_gap.gap == pytest.approx(0.1, abs=1e-6)
+    assert not leaves.smallest_gap.too_close
+
+
+def tight_start():
+    """A success that was nowhere nearer to an obstacle than at its start."""
+    gap = Gap(gap=0.05, radii=0.01, required=0.25, step=0)
+    return EpisodeRow(seed=2, outcome="reached", steps=9, smallest_gap=gap)
+
+
 def test_a_diagnosis_says_where_it_came_too_close():
     """Of an episode that failed for another reason."""
     env = corridor_env(0.125)
@@ -100,7 +128,7 @@ def test_a_diagnosis_says_where_it_came_too_close():
     said = "It came too close: 0.125 px (2.5 % of the radius) to the wall at ("
     assert said in found.text
     assert "; required 0.25 px." in found.text
-    far = replace(rollout, required_gap=0.1)
+    far = replace(rollout, close_gap=None)
     assert "too close" not in diagnose(far, env.nominal).text
 
 
@@ -160,7 +188,8 @@ def provenance(**changes):
 
 
 def gap_in(gap, **place):
-    return Gap(gap=gap, radii=gap / 5.0, required=0.25, **place)
+    found = Gap(gap=gap, radii=gap / 5.0, required=0.25, **place)
+    return found.model_copy(update={"close": found if gap < 0.25 else None})
 
 
 def two_rows():
@@ -184,7 +213,10 @@ def test_a_report_has_the_smallest_gap_of_its_episodes():
         "smallest gap: 0.125 px (2.5 % of the radius) to the wall at (41.0, 20.0) in "
         "step 4, seed 8"
     )
-    assert second == "1 of the successes came too close to obstacles: less than 0.25 px"
+    assert second == (
+        "1 of the successes came too close: 0.125 px (2.5 % of the radius) to the wall "
+        "at (41.0, 20.0) in step 4; required 0.25 px"
+    )
     hidden = summarise(provenance(split="hidden"), two_rows(), None, 1.0, told=False)
     assert hidden.closest is None
     assert hidden.episodes == ()
@@ -215,3 +247,19 @@ def test_gaps_read_in_the_units_of_the_user():
         "0.125 px (2.5 % of the radius) to mover 2 at (41.0, 20.0) in step 4"
     )
     assert too_close_text(gap, PIXELS).endswith("; required 0.25 px")
+
+
+def test_the_verdict_names_the_smallest_gap_that_is_too_close():
+    """Not that of a start, although it is smaller."""
+    near = gap_in(0.125, step=4, x=41.0, y=20.0, heading=0.0, thing="wall")
+    row = EpisodeRow(seed=0, outcome="reached", steps=9, smallest_gap=near)
+    test = ConfirmingTest(0.95, 0.05, 1, 4)
+    rows = [tight_start(), row, row, tight_start()]
+    report = summarise(provenance(), rows, test, 1.0)
+    assert word_of(report) == "passed"
+    assert confirmed_text(report) == (
+        "2 of 4 blind drives came too close: 0.125 px (2.5 % of the radius) to the "
+        "wall at (41.0, 20.0) in step 4; required 0.25 px"
+    )
+    starts = summarise(provenance(), [tight_start()] * 4, test, 1.0)
+    assert word_of(starts) == "verified"
