@@ -13,3 +13,10 @@ def test_noisy_ranges():
     controller = LEVELS / "unknown.py"
     report = verify_episodes(controller, load_set("barn-slow"), 8, split="dev")
     assert report.successes >= 5
+
+
+@pytest.mark.slow
+def test_a_robot_whose_pose_scan_and_wheels_err():
+    """On a floor in metres, within its CPU budget."""
+    report = verify_episodes(LEVELS / "floor.py", load_set("floor"), 8, split="dev")
+    assert report.successes >= 7
