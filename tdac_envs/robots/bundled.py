@@ -41,6 +41,11 @@ def load_robot(name: str | Path) -> RobotFile:
     )
 
 
+def beside(name: str, folder: Path) -> str | Path:
+    """A name, or the path of a robot file relative to a folder."""
+    return folder / name if name.lower().endswith(_YAML) else name
+
+
 @lru_cache(maxsize=16)
 def _bundled(name: str) -> RobotFile:
     return read_robot_file(_FILES / f"{name}.yaml")

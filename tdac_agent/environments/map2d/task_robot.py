@@ -14,7 +14,7 @@ from tdac_envs.map2d.robot_options import RAYS, options_of
 from tdac_envs.map2d.source import metric_units
 from tdac_envs.mapping.image import picture_size, read_bytes
 from tdac_envs.mapping.params import MapParams, RobotParams
-from tdac_envs.robots.bundled import load_robot
+from tdac_envs.robots.bundled import beside, load_robot
 
 ROBOT_IMAGE_BYTES = 16_000_000
 ROBOT_IMAGE_PIXELS = 4_000_000
@@ -85,7 +85,7 @@ def with_robot_file(
     name = spec.robot.file
     if name is None:
         return spec, {}
-    file = load_robot(base / name if name.lower().endswith((".yaml", ".yml")) else name)
+    file = load_robot(beside(name, base))
     metric = metric_units(source, spec.resolution)
     # The task is in px by now; a robot in px is refused for one in metres.
     in_metres = units.frame is not None and file.units == "pixels"
