@@ -70,9 +70,9 @@ def refuse_foreign(flags: TaskFlags, own: Environment) -> None:
         TaskError: There is such a flag.
     """
     for field in typed_fields(flags.changes):
-        key = KEYS.get(field.name, field.name).partition(".")[0]
+        key = KEYS.get(field.name, field.name)
         for other in own_environments():
-            if key in other.keys and key not in own.keys:
+            if other.has_key(key) and not own.has_key(key):
                 why = f"this task is of {own.id}, not of {other.id}"
                 raise TaskError(f"{why}: leave out {flag_name(field)}")
 

@@ -43,6 +43,7 @@ class Environment(ABC):
         units: Units of places and lengths.
         keys: Task file keys that only this environment has; the first one names the
             map or world.
+        robot_keys: Those below the key `robot` that it has; None for all.
         names: Names that controllers of the profile `paper` must define.
         kernels: Package with the compiled functions.
         code: Folders and files of `tdac_envs` that decide what happens in an episode;
@@ -53,6 +54,7 @@ class Environment(ABC):
     folder: ClassVar[Path]
     units: ClassVar[Units]
     keys: ClassVar[tuple[str, ...]]
+    robot_keys: ClassVar[frozenset[str] | None] = None
     names: ClassVar[Names]
     kernels: ClassVar[str]
     code: ClassVar[tuple[str, ...]] = (".",)
@@ -61,6 +63,13 @@ class Environment(ABC):
     def suite(self) -> Path:
         """Folder of the verification tests."""
         return self.folder / "suite"
+
+    def has_key(self, key: str) -> bool:
+        """Returns whether it has a key of task files, such as `robot.radius`."""
+        part, _, inner = key.partition(".")
+        if part not in self.keys:
+            return False
+        return not inner or self.robot_keys is None or inner in self.robot_keys
 
     @abstractmethod
     def bundled(self) -> dict[str, str]:

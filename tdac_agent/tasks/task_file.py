@@ -252,12 +252,14 @@ def checked(data: dict[str, Any], source: str) -> TaskFile:
     except ValidationError as error:
         raise TaskError(f"{source}: {first_problem(error, TaskFile)}") from error
     try:
-        own = environment(spec.env).keys
+        own = environment(spec.env)
     except TaskError as error:
         raise TaskError(f"{source}: env: {error}") from error
+    typed = spec.model_fields_set | {f"robot.{k}" for k in spec.robot.model_fields_set}
     for other in own_environments():
-        for key in spec.model_fields_set.intersection(other.keys).difference(own):
-            raise TaskError(f"{source}: {key}: only valid with env: {other.id}")
+        for key in sorted(typed):
+            if other.has_key(key) and not own.has_key(key):
+                raise TaskError(f"{source}: {key}: only valid with env: {other.id}")
     return spec
 
 

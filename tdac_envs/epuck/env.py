@@ -23,6 +23,12 @@ from tdac_envs.epuck import kernels, observed
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.movables import Movables
 from tdac_envs.epuck.robot import EPuckArrays
+from tdac_envs.epuck.robot_options import (
+    RobotSource,
+    e_puck_of,
+    with_robot,
+    with_version,
+)
 from tdac_envs.epuck.setup import EPuckSetup
 from tdac_envs.epuck.smallest_gap import note_gap
 from tdac_envs.epuck.source import WorldSource, open_world
@@ -159,6 +165,13 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         ignore: Names or types of unmodelled nodes to leave out. Any other unmodelled
             node that may be solid raises an error.
         ground_sensors, gps, compass, encoders: Whether to observe what the table says.
+        robot: `"e-puck"`, `"e-puck2"` or the path of a robot file of an e-puck: its
+            version, with the mass and the full speed, and its stopping distance. The
+            time step stays that of the world.
+        disturbed: Whether the errors of this robot are on, too, where no other argument
+            says otherwise.
+        stopping_distance: From full speed to standstill, m. It changes no motion, but
+            the gap to obstacles that the robot should keep (`required_gap`).
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -191,10 +204,10 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         sensor_noise: float = 0.0,
         reflectance: str = "ideal",
         goal_visible: bool = False,
-        wheel_slip: float = 0.0,
+        wheel_slip: float | None = None,
         wheel_gains: float = 0.0,
         axle_error: float = 0.0,
-        wheel_radius_error: float = 0.0,
+        wheel_radius_error: float | None = None,
         odometry: bool = False,
         odometry_scale: float = 0.0,
         odometry_noise: float = 0.0,
@@ -206,16 +219,28 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         gps: bool = False,
         compass: bool = False,
         encoders: bool = False,
+        robot: RobotSource = None,
+        disturbed: bool = False,
+        stopping_distance: float | None = None,
         render_mode: str | None = None,
     ) -> None:
         one_of("reflectance", reflectance, ("ideal", "webots"))
-        opened = open_world(world, start, goal, ignore)
+        opened, own = open_world(world, start, goal, ignore), None
+        if robot is not None:
+            own = e_puck_of(robot)
+            opened = with_version(opened, own)
+        given = {
+            "wheel_slip": wheel_slip,
+            "wheel_radius_error": wheel_radius_error,
+            "stopping_distance": stopping_distance,
+        }
+        sizes = with_robot(own, given, disturbed=disturbed)
         assert opened.goal is not None
-        robot, ground = opened.robot, Ground.of(opened)
-        speed = robot.max_wheel_speed if max_wheel_speed is None else max_wheel_speed
+        body, ground = opened.robot, Ground.of(opened)
+        speed = body.max_wheel_speed if max_wheel_speed is None else max_wheel_speed
         nominal = make_task(
             ground,
-            robot.pose,
+            body.pose,
             opened.goal,
             max_wheel_speed=speed,
             dt=opened.time_step / 1e3 if dt is None else dt,
@@ -230,18 +255,19 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             motor_lag=motor_lag,
             delay=delay,
             disturbances=Disturbances(
-                wheel_slip,
+                sizes["wheel_slip"],
                 wheel_gains,
                 axle_error,
                 odometry,
                 odometry_scale,
                 odometry_noise,
-                wheel_radius_error,
+                sizes["wheel_radius_error"],
             ),
             weights=weights_of(reward_weights),
             source=None,
             webots=reflectance == "webots",
             goal_visible=bool(goal_visible),
+            stopping_distance=sizes["stopping_distance"],
         )
         asked = (ground_sensors, gps, compass, encoders)
         further = tuple(itertools.compress(observed.INSTRUMENTS, asked))

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.core.arguments import non_negative
 from tdac_envs.drive.setup import DriveSetup
+from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.drive.stepping import AXLE, FRICTION
 from tdac_envs.epuck.infrared import RANGE
 from tdac_envs.epuck.kernels import FLOOR, N_CONSTANTS
 from tdac_envs.epuck.nearby import NearbyParts, surroundings
+from tdac_envs.epuck.paths import widest_body
 from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.worlds.bodies import BODY_RADIUS
@@ -25,11 +29,23 @@ class EPuckSetup(DriveSetup):
     Attributes:
         webots: Whether the sensors see Webots' reflectances; see `Ground.visible`.
         goal_visible: Whether the sensors see the file's goal marker.
+        stopping_distance: Of the robot, from full speed, m.
     """
 
     nominal: EPuckTask
     webots: bool
     goal_visible: bool
+    stopping_distance: float = 0.0
+
+    def __post_init__(self) -> None:
+        DriveSetup.__post_init__(self)
+        least = non_negative("stopping_distance", self.stopping_distance)
+        object.__setattr__(self, "stopping_distance", least)
+
+    def required_gap(self, task: EPuckTask) -> float:
+        """See `DriveSetup.required_gap`."""
+        widest = partial(widest_body, task.ground, task.start[:2], task.goal)
+        return required_gap(BODY_RADIUS, self.stopping_distance, widest)
 
     @property
     def pushes(self) -> bool:

@@ -98,6 +98,9 @@ class RobotFile(StrictModel):
     drives: Literal["disc", "e-puck"] = Field(
         "disc", description="`disc` on maps, `e-puck` in Webots worlds."
     )
+    version: Literal["1", "2"] | None = Field(
+        None, description="Of an e-puck, which gives its mass; 1 by default."
+    )
     units: Literal["metres", "pixels"] = Field("metres", description="Of all lengths.")
     radius: _Size = Field(description="Of the disc around the body.")
     axle_length: _Size = Field(
@@ -119,6 +122,8 @@ class RobotFile(StrictModel):
     def _check(self) -> Self:
         if (self.scanner is None) != (self.drives == "e-puck"):
             raise ValueError("a robot on maps (`drives: disc`) needs a `scanner`")
+        if self.version is not None and self.drives != "e-puck":
+            raise ValueError("version: only an e-puck has one (`drives: e-puck`)")
         if (
             self.scanner is not None
             and self.scanner.range_min >= self.scanner.range_max
@@ -142,7 +147,7 @@ class RobotFile(StrictModel):
         written = self.model_dump(
             exclude_unset=True, exclude={"sources", "description"}
         )
-        about = {"schema_version", "name", "drives", "units"}
+        about = {"schema_version", "name", "drives", "units", "version"}
         found: dict[str, Any] = {}
         for key, value in written.items():
             if key in about:

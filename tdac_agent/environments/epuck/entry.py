@@ -28,7 +28,8 @@ class EPuckEnvironment(Environment):
     id = "TDAC-EPuck-v0"
     folder = Path(__file__).parent
     units = METRES
-    keys = ("world", "ignore", "left_out")
+    keys = ("world", "robot", "ignore", "left_out")
+    robot_keys = frozenset({"file", "stopping_distance"})
     names = Names(
         constants=(
             *("WORLD_FILE", "TIME_STEP", "MAX_WHEEL_SPEED", "SENSOR_RANGE"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,11 @@ from tdac_envs.drive.task import with_tolerance_note
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.infrared import TABLE
+from tdac_envs.epuck.robot_options import e_puck_of, with_version
 from tdac_envs.epuck.source import open_world
 from tdac_envs.epuck.task import TOLERANCE, EPuckTask, make_task
+from tdac_envs.robots.bundled import placed_robot
+from tdac_envs.robots.robot_file import RobotFile
 from tdac_envs.worlds.bundled import bundled_worlds, world_file
 from tdac_envs.worlds.wbt.reader import load_world
 from tdac_envs.worlds.wbt.writer import write_world
@@ -42,6 +45,8 @@ class EPuckSetting:
         text: The flat world file.
         file: The original world file.
         left_out: Descriptions of the ignored nodes that may be solid.
+        disturbances: Errors of the robot that the task names, as arguments.
+        stopping_distance: Of this robot, m; None without one.
     """
 
     params: WorldParams
@@ -49,6 +54,8 @@ class EPuckSetting:
     text: str
     file: Path
     left_out: tuple[str, ...]
+    disturbances: dict[str, Any] = field(default_factory=dict)
+    stopping_distance: float | None = None
 
     @property
     def original(self) -> Original | None:
@@ -95,8 +102,9 @@ class EPuckSetting:
 
     def env_kwargs(self) -> dict[str, Any]:
         """Returns the constructor arguments of this task's `EPuckEnv`."""
-        nominal = self.nominal
+        nominal, stops = self.nominal, self.stopping_distance
         return {
+            **({} if stops is None else {"stopping_distance": stops}),
             "world": nominal.ground.world,
             "start": tuple(nominal.start),
             "goal": nominal.goal,
@@ -118,11 +126,6 @@ class EPuckSetting:
     def has_dropouts(self) -> bool:
         """False: infra-red sensors have no largest range."""
         return False
-
-    @property
-    def disturbances(self) -> dict[str, Any]:
-        """Empty: worlds name no robot file."""
-        return {}
 
     def length_of(self, length: float) -> float:
         """Returns the length: both are in metres."""
@@ -163,6 +166,8 @@ class EPuckSetting:
         own: dict[str, Any] = {"world": WORLD_FILE}
         if self.left_out:
             own["left_out"] = list(self.left_out)
+        if self.stopping_distance is not None:
+            own["robot"] = {"stopping_distance": self.stopping_distance}
         return own
 
 
@@ -199,15 +204,25 @@ def open_world_task(spec: TaskFile, base: Path) -> tuple[str, EPuckSetting]:
             "rad (`start: [X, Y, YAW]` in a task.yaml)"
         )
     left_out = spec.left_out or tuple(map(_describe, ignored))
-    setting = _setting(world, file, spec, left_out)
+    name = spec.robot.file
+    robot = None if name is None else e_puck_of(placed_robot(name, base))
+    setting = _setting(world, file, spec, left_out, robot)
     return file.stem, setting
 
 
 def _setting(
-    world: World, file: Path, spec: TaskFile, left_out: tuple[str, ...]
+    world: World,
+    file: Path,
+    spec: TaskFile,
+    left_out: tuple[str, ...],
+    robot: RobotFile | None,
 ) -> EPuckSetting:
     dt = world.time_step / 1e3 if spec.dt is None else spec.dt
     opened = open_world(world, spec.start, spec.goal, spec.ignore)
+    stops = spec.robot.stopping_distance
+    if robot is not None:
+        opened = with_version(opened, robot)
+        stops = robot.stopping_distance if stops is None else stops
     flat = flat_world(opened, dt)
     assert flat.goal is not None
     nominal = make_task(
@@ -223,7 +238,8 @@ def _setting(
     digest = sha256_of(text)
     notes = with_tolerance_note(world.notes, nominal, METRES.length_text)
     params = params_of(nominal, file.name, digest, notes)
-    return EPuckSetting(params, nominal, text, file, left_out)
+    errors = {} if robot is None else robot.disturbances()
+    return EPuckSetting(params, nominal, text, file, left_out, errors, stops)
 
 
 def _describe(node: Unmodelled) -> str:

@@ -15,6 +15,7 @@ from tdac_agent.tasks.task import lay_out
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs import load_robot
 from tdac_envs.core.errors import TaskError
+from tdac_envs.webots.stage import open_stage
 
 BURGER = "turtlebot3-burger"
 
@@ -249,3 +250,57 @@ def test_the_sensors_of_a_controller_are_those_of_the_robot(floor, tmp_path):
     predicted = rays.ranges(*seen["pose"].tolist())
     assert predicted.min() > robot["range_min"]
     np.testing.assert_allclose(predicted, seen["ranges"], atol=1e-3)
+
+
+def world_task(folder, **keys):
+    """A task in a bundled world."""
+    file = folder / "task.yaml"
+    file.write_text(yaml.safe_dump({"env": "TDAC-EPuck-v0", "world": "crates", **keys}))
+    return load_task(file)
+
+
+def test_an_e_puck_has_the_values_of_its_version(tmp_path):
+    """In the task, in the world that is exported, and after it is laid out."""
+    task = world_task(tmp_path, robot="e-puck2")
+    robot = task.nominal.ground.world.robot
+    assert (robot.version, robot.mass, robot.axle_length) == ("2", 0.14, 0.057)
+    assert task.nominal.max_wheel_speed == 7.536
+    assert task.setting.make_env().required_gap == 0.005
+    assert template_of(task.setting).facts["kept_gap"] == 0.005
+    again = load_task(lay_out(task, tmp_path / "out") / "task.yaml")
+    assert again.sha256() == task.sha256()
+    assert again.setting.make_env().required_gap == 0.005
+    params = json.loads((tmp_path / "out" / "params.json").read_text())["robot"]
+    assert params["max_wheel_speed"] == 7.536
+    assert 'version "2"' in (tmp_path / "out" / "world.wbt").read_text()
+    exported = open_stage(tmp_path / "out" / "world.wbt").make_env(steps=10)
+    assert exported.nominal.max_wheel_speed == 7.536
+    assert exported.nominal.ground.world.robot.mass == 0.14
+
+
+def test_its_errors_disturb_confirmations_in_worlds(tmp_path):
+    """As those of a robot on maps; a plain world has the usual ones."""
+    own = load_robot("e-puck").model_dump(by_alias=True, exclude_unset=True)
+    own |= {"name": "own", "wheels": {"slip": 0.05}}
+    own["sources"]["wheels.slip"] = "measured"
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump(own))
+    task = world_task(tmp_path, robot="own.yaml")
+    assert task.own_disturbance() == Disturbance.none().changed({"wheel_slip": 0.05})
+    assert task.disturbed_env(task.own_disturbance()).disturbances.wheel_slip == 0.05
+    assert world_task(tmp_path, robot="e-puck").own_disturbance() == Disturbance()
+
+
+@pytest.mark.parametrize(
+    ("robot", "reason"),
+    [
+        ("jackal", "robot: jackal drives on maps, not in Webots worlds"),
+        ({"radius": 0.05}, "robot.radius: only valid with env: TDAC-Map2D-v0"),
+        ({"file": "e-puck", "n_rays": 5}, "robot.n_rays: only valid with env: TDAC-M"),
+        ("e-pukc", "unknown robot 'e-pukc'.*did you mean 'e-puck'"),
+    ],
+)
+def test_what_is_no_e_puck_is_refused_in_worlds(tmp_path, robot, reason):
+    """In one line."""
+    with pytest.raises(TaskError, match=reason) as caught:
+        world_task(tmp_path, robot=robot)
+    assert "\n" not in str(caught.value)
