@@ -30,42 +30,46 @@ class Frozen(NamedTuple):
 
 
 CODE = {
-    ON_MAPS_OF_SETS: "4b0f032f9121c41410cd111be6664c2f345f2f53a85a019b96f0e08f4c542818",
-    ON_PLATES: "643703d9d8b7ce73050a08c827d40f0edde49d85c4f05098f30be6d7628d63da",
+    ON_MAPS_OF_SETS: "f079ad585506417f45e2814b4540e4c79b4a53a637488a39acd0c5d90c053ef0",
+    ON_PLATES: "decf6518a16335669927ffe4474ef63db0997f86d6450813edf4d9787bd3ffd1",
 }
 """Hashes of the code of this ladder."""
 FROZEN: dict[str, Frozen] = {
     "known": Frozen(
         "7cd7606b6276646f57999a90d81eee4a83f7b195386c467dd69cb76388ac218f",
-        "27039d0862284a44c158211495f9e07e54c0076e47582bbf44c2a597ada72451",
+        "86d0c94f3cd02df2796ff73f1386525185190d246a459e4f23c52ac3a0afb19e",
     ),
     "unknown": Frozen(
         "a95bc6cc55cd46d86b71535da6009fd7a23510ec82cd2fd90f1c0484bce42cb4",
-        "ae15c7acfc3d8c6f28df23f76cb9f87391c30d6a3d8578d26736cd269dfa0a58",
+        "109e9a3b57fa7919b2e83583d4ef46f23aaecf3bb1e4a8c24534d0e33fb686fd",
     ),
     "lost": Frozen(
         "6ecbed8a359e0683cd64b6dbf341b629a93828854c724bc5e1ba6f60b95e29a4",
-        "611bb9a95ddc80c8934ee1f7925ceacfe4256ca73c45231aad55bd2e93923e56",
+        "d352776074c8129f1b289109eb98fddacf8dbb595e6b81464ddc1f888542136e",
     ),
     "moving": Frozen(
         "fcabb48d5d2ee33aaeb9397e1028dfa123b43fea2e14abbf3468bc5c42e65835",
-        "a5409c184440c76cc81d39b937b81a77c3e66b8c5f3029043bdbeb0a6ff1ef77",
+        "53f4ef1e3a693402aaaa4bef68c167127b0a6c1c8b6ca279a69f2a24c89b0335",
     ),
     "crowd": Frozen(
         "535b797efa54b4a55dc7986a4be163783927317b75ec2c1a4facf4b5f737974c",
-        "2e1664da3a0f4637c416b82a41fc4f74acb6a1d30b5bc61e8b84e2379f43204f",
+        "5253ed42ecbc55130412401857ddf999f610c184960659b6710578dc0d73f427",
     ),
     "epuck": Frozen(
         "f14e67b3a6302229283054585b4c435c02fca0fdc70ece5733dc87fcf89eeb52",
-        "82759f4b7a52c6fd098f10795bef4746ac21b365e57d9775f01e59fc18ce525d",
+        "50d9f37e0a2b1ad16dae4c71063100d3cbaf785147a94b9d002c668c3cd75b6d",
+    ),
+    "floor": Frozen(
+        "cbfaeb76d11da8e106a9d4f20815b3358a85ddab57945a180bd96494e35ba580",
+        "aaefcef372ed3af775990fc19dee902dde66d8356edcdf9aeb45c5abe6a5bf80",
     ),
     "barn": Frozen(
         "57468e2ffea454090dc0a56c2f71ff84396bf818ab061c281dcb0fe5d956700c",
-        "47e0e596334814fb423264213a4094abd3d99889b8d65d042bc27910b3210a4a",
+        "7e655b9c044086b1156812bbfab99334df077d1aba85cfa24322a80e93226683",
     ),
     "barn-slow": Frozen(
         "8595432ce3f749f02d9bfd9eceabd32eb4e5e7e40579e80110597e64b73e3894",
-        "cbb5cde160dea8ad2dc2bdea79a08adb4c30629456c7684c3d48154ef0574ba5",
+        "dfe6d1f61d1147cbdb355f55ecb1fe0e77f4b8baf43c67ea4532d7e55c2ff692",
     ),
 }
 """The sets of this ladder by name; `python -m tools.frozen` prints the present ones."""
