@@ -62,7 +62,7 @@ CONFIGURATION = {
 }
 
 NOT_TO_BE_RESUMED = {"version", "dynamics"}
-"""Fields that no option of a command restores."""
+"""Fields that no option of a command restores, if the task is the same."""
 
 
 def existing_run(folder: Path) -> Run | None:
@@ -97,6 +97,8 @@ def check_same(before: Run, now: Run, further: Mapping[str, Any] | None = None) 
     others = [
         name for name in CONFIGURATION if getattr(before, name) != getattr(now, name)
     ]
+    if before.task_sha256 != now.task_sha256:  # it says what differs, dynamics or not
+        others = [name for name in others if name != "dynamics"]
     differences = [
         _difference(CONFIGURATION[name], getattr(before, name), getattr(now, name))
         for name in others
