@@ -38,8 +38,9 @@ class TaskDraft:
         start: Start, px or m.
         goal: Goal.
         heading: Start heading, rad, from +x towards +y; None for that of the file.
-        radius: Body radius, px; of a map only.
+        radius: Body radius, px; of a map only. A named robot has its own.
         polarity: Which pixels of the map are obstacles; None to infer it.
+        robot: Name of a robot; None for a disc of this radius, or the world's e-puck.
     """
 
     kind: Kind
@@ -49,6 +50,7 @@ class TaskDraft:
     heading: float | None = None
     radius: float | None = None
     polarity: str | None = None
+    robot: str | None = None
 
     @classmethod
     def of(
@@ -67,7 +69,9 @@ class TaskDraft:
                 words += [flag, *(f"{value:g}" for value in place)]
         if self.heading is not None and self.start is not None:
             words += ["--heading", f"{self.heading:g}"]
-        if self.radius is not None:
+        if self.robot is not None:
+            words += ["--robot", self.robot]
+        elif self.radius is not None:
             words += ["--robot-radius", f"{self.radius:g}"]
         if self.kind == "map" and has_resolution(self.source):
             words += ["--frame", "pixels"]
@@ -96,10 +100,14 @@ class TaskDraft:
         if start is not None and self.heading is not None:
             start = (*start, self.heading)
         values: dict[str, Any] = {"start": start, "goal": self.goal}
+        if self.robot is not None:
+            values["robot"] = {"file": self.robot}
+        elif self.radius is not None:
+            values["robot"] = {"radius": self.radius}
         if self.kind == "world":
             values |= {"env": "TDAC-EPuck-v0", "world": self.source}
             return TaskFile(**values)
-        values |= {"map": self.source, "robot": {"radius": self.radius}}
+        values |= {"map": self.source}
         return TaskFile(**values, polarity=self.polarity)
 
 
@@ -168,6 +176,8 @@ def snapped(draft: TaskDraft, place: Path) -> TaskDraft:
 def fitting_radius(draft: TaskDraft, checked: Checked | None) -> float | None:
     """The largest radius of the slider that gets through; None if that is no help."""
     if checked is None or checked.widest is None or draft.radius is None:
+        return None
+    if draft.robot is not None:
         return None
     fitting = math.floor(checked.widest / RADIUS_STEP) * RADIUS_STEP
     return fitting if LEAST_RADIUS <= fitting < draft.radius else None

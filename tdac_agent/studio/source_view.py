@@ -21,6 +21,8 @@ from tdac_envs.mapping.params import ReadingOptions
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates
 from tdac_envs.mapping.score import widest_radius
 from tdac_envs.mapping.wording import obstacles_text, scale_text
+from tdac_envs.robots.bundled import bundled_robots, load_robot
+from tdac_envs.robots.robot_file import RobotFile
 from tdac_envs.worlds.bodies import bodies
 from tdac_envs.worlds.bundled import bundled_worlds, world_file
 from tdac_envs.worlds.picture import WorldCanvas, bounds_of, draw_things
@@ -54,6 +56,7 @@ class SourceView:
         radius: Body radius of a bundled map, or the usual one, px.
         widest: Largest body radius that gets from one place to another, in the unit;
             negative for none. None for worlds, whose robot has one size.
+        resolution: Metres per px of a map that gives them.
         laid_over: The picture with another occupied grid over it: the reading of a
             map may depend on start and goal. None for worlds.
     """
@@ -72,6 +75,16 @@ class SourceView:
     radius: float | None = None
     widest: Callable[[Place, Place], float] | None = None
     laid_over: Callable[[BoolGrid], bytes] | None = None
+    resolution: float | None = None
+
+    @property
+    def robots(self) -> tuple[RobotFile, ...]:
+        """The bundled robots that drive here: in metres, where metres are known."""
+        if self.kind == "map" and self.resolution is None:
+            return ()
+        drives = "disc" if self.kind == "map" else "e-puck"
+        known = map(load_robot, bundled_robots())
+        return tuple(r for r in known if (r.drives, r.unit) == (drives, "m"))
 
     def at(self, places: ArrayLike) -> NDArray[np.float64]:
         """Points of the picture for places, shape (n, 2)."""
@@ -151,6 +164,7 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
         bundled.robot_radius if bundled else params.robot.radius,
         widest,
         laid_over,
+        params.resolution,
     )
 
 

@@ -89,6 +89,22 @@ def to_point(i: float, j: float) -> tuple[float, float]:
     return x, y0 + math.sin(yaw) * right + math.cos(yaw) * up
 
 
+def ray_ends(
+    ranges: Sequence[float], pose: Sequence[float] = (0.0, 0.0, 0.0)
+) -> NDArray[np.float64]:
+    """Where the rays of a scan end; it accounts for `scanner_offset`.
+
+    Args:
+        ranges: The scan, in the order of `ray_angles`; no hit ends at `range_max`.
+        pose: x, y, heading of the robot. Without it, places are relative to the robot:
+            ahead of its centre, and to the side of positive angles.
+
+    Returns:
+        Shape (n_rays, 2), px or m.
+    """
+    return _ends(ranges, pose, *_scanner())
+
+
 class Ultrasonic:
     """The robot's range sensor: a fan of exact rays over the occupancy grid.
 
@@ -226,12 +242,14 @@ class Graphics:
         centre = self._to_screen(x, y)
         self._trail.append(centre)
         screen.blit(self._map, (0, 0))
-        turns = _ray_angles(len(ranges), self._robot["field_of_view_deg"])
-        for turn, distance in zip(turns.tolist(), map(float, ranges), strict=True):
-            tip_x = x + distance * math.cos(heading + turn)
-            tip_y = y + distance * math.sin(heading + turn)
-            tip = self._to_screen(tip_x, tip_y)
-            pygame.draw.aaline(screen, (226, 150, 70), centre, tip)
+        rays = len(ranges), self._robot["field_of_view_deg"]
+        scanner = _ray_angles(*rays), _scanner_offset(*rays)
+        begins = _ends([0.0] * len(ranges), pose, *scanner).tolist()
+        for begin, end in zip(
+            begins, _ends(ranges, pose, *scanner).tolist(), strict=True
+        ):
+            ends = self._to_screen(*begin), self._to_screen(*end)
+            pygame.draw.aaline(screen, (226, 150, 70), *ends)
         if len(self._trail) > 1:
             pygame.draw.lines(screen, (98, 84, 190), False, self._trail, 2)
         self._draw_body(centre, to_pixels(x, y, heading)[2])
@@ -327,6 +345,29 @@ def _frame() -> tuple[float, float, float, float, float] | None:
 def _is_down(params: Mapping[str, Any]) -> bool:
     """Whether y points down, as it does in pixels."""
     return bool(params.get("frame", "pixels") != "metres")
+
+
+def _ends(
+    ranges: Sequence[float],
+    pose: Sequence[float],
+    angles: NDArray[np.float64],
+    offset: tuple[float, float],
+) -> NDArray[np.float64]:
+    """Where rays end that start at an offset from the centre; see `ray_ends`."""
+    x, y, heading = (float(value) for value in pose)
+    (ahead, aside), far = offset, np.asarray(ranges, np.float64)
+    c, s = math.cos(heading), math.sin(heading)
+    x, y = x + ahead * c - aside * s, y + ahead * s + aside * c
+    turns = heading + angles
+    return np.column_stack([x + far * np.cos(turns), y + far * np.sin(turns)])
+
+
+@functools.lru_cache(maxsize=1)
+def _scanner() -> tuple[NDArray[np.float64], tuple[float, float]]:
+    """Angles of the rays of params.json, and where they start from the centre."""
+    robot = load_params()["robot"]
+    ahead, aside = robot.get("scanner_offset", (0.0, 0.0))
+    return np.array(robot["ray_angles"]), (float(ahead), float(aside))
 
 
 def _ray_angles(n_rays: int, field_of_view_deg: float) -> NDArray[np.float64]:

@@ -22,6 +22,8 @@ DT = PARAMS["dt"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
 TOLERANCE = 0.95 * PARAMS["goal_tolerance"]
 FAN = np.array(ROBOT["ray_angles"])  # rad from the heading
+OFFSET = ROBOT.get("scanner_offset") or (0.0, 0.0)  # where the rays start: ahead,
+# and to positive angles, px
 
 EDGE = 36  # occupied pixels that are added around the map
 REACH = 40  # px up to which clearances are known
@@ -244,8 +246,15 @@ def new_people(x, y, from_x, from_y):
     return [Person(centre_x, centre_y, USUAL, *(PAIR if n == 2 else SINGLE))]
 
 
+def scanner_at(x, y, heading):
+    """The place where the rays start, for the robot's centre at a place."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    ahead, aside = OFFSET
+    return x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
+
+
 def track(people, pose, ranges):
-    """The people after this step, by the rays."""
+    """The people after this step, by the rays, which start at this pose."""
     x, y, heading = pose
     for person in people:
         person.expect()
@@ -545,7 +554,11 @@ def policy(obs):
     if STATE["pose"] is not None:
         measure(pose)
     STATE["pose"] = pose
-    STATE["people"] = track(STATE["people"], pose, obs["ranges"].astype(float))
+    STATE["people"] = track(
+        STATE["people"],
+        (*scanner_at(*pose), pose[2]),
+        obs["ranges"].astype(float),
+    )
     wheels = chosen(STATE["people"], pose)
     STATE["last"] = np.clip(wheels / STATE["gains"], -1.0, 1.0)
     return STATE["last"].astype(np.float32)

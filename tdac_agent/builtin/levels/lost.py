@@ -24,6 +24,8 @@ FAN = np.array(ROBOT["ray_angles"])  # rad from the heading, an even fan
 FAN = np.where(np.abs(FAN) > math.pi, FAN - np.copysign(2.0 * math.pi, FAN), FAN)
 ORDER = np.argsort(FAN)  # of the rays, from the left to the right
 FAN = FAN[ORDER]
+OFFSET = ROBOT.get("scanner_offset") or (0.0, 0.0)  # where the rays start: ahead,
+# and to positive angles, px
 RAYS, VIEW = FAN.size, max(float(FAN[-1] - FAN[0]), 1e-9)
 SLIP = max(NOISES.get("wheel_slip", 0.0) * math.sqrt(0.1 / DT), 0.01)
 GAINS = max(NOISES.get("wheel_gains", 0.0), 0.01)
@@ -166,7 +168,7 @@ class Filter:
         for turn in range(4):
             angles = self.state[2] + fan
             rays = np.column_stack([np.cos(angles), np.sin(angles)])
-            offsets = distances[:, None] * rays
+            offsets = distances[:, None] * rays + scanner_at(0.0, 0.0, self.state[2])
             means, normals, rough, good = surfaces.lines(self.state[:2] + offsets)
             gaps = ((self.state[:2] + offsets - means) * normals).sum(axis=1)
             slant = (rays * normals).sum(axis=1)
@@ -187,6 +189,13 @@ class Filter:
                 break
         self.spread = spread - spread[:, :3] @ solved @ known @ spread[:3]
         self.spread = 0.5 * (self.spread + self.spread.T)
+
+
+def scanner_at(x, y, heading):
+    """The place where the rays start, for the robot's centre at a place."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    ahead, aside = OFFSET
+    return x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
 
 
 def wall_angles(ranges, hit):
@@ -325,13 +334,16 @@ class Maps:
 
     def carve(self, x, y, heading, ranges, hit):
         """Marks as free what the rays have crossed, and the place of the body."""
+        rows, columns, dx, dy = self.square(x, y, int(RADIUS) + 1)
+        within = dx[None, :] ** 2 + dy[:, None] ** 2 <= RADIUS * RADIUS
+        self.free[rows, columns] |= within
+        x, y = scanner_at(x, y, heading)
         rows, columns, dx, dy = self.square(x, y, int(RANGE) + 1)
         dx, dy = dx[None, :], dy[:, None]
         cosine, sine = math.cos(heading), math.sin(heading)
         ahead, aside = cosine * dx + sine * dy, cosine * dy - sine * dx
         distance = np.sqrt(ahead * ahead + aside * aside)
         part = self.free[rows, columns]
-        part |= distance <= RADIUS
         seen = np.nonzero((ahead > -0.1 * distance) & (distance <= RANGE))
         ahead, aside, distance = ahead[seen], aside[seen], distance[seen]
         place = (np.arctan2(aside, ahead) - FAN[0]) * ((RAYS - 1) / VIEW)
@@ -353,6 +365,8 @@ class Maps:
     def clean(self, x, y, heading, ranges):
         """Weakens hits that rays pass through, and those within the body."""
         (px, py), at = self.surfaces.points(x, y, RANGE)
+        within = np.hypot(px - x, py - y) < RADIUS - 1.0
+        x, y = scanner_at(x, y, heading)
         dx, dy = px - x, py - y
         distance = np.hypot(dx, dy)
         bearing = np.remainder(np.arctan2(dy, dx) - heading + math.pi, 2.0 * math.pi)
@@ -361,7 +375,7 @@ class Maps:
         beside = np.abs(place - nearest) * distance * (VIEW / (RAYS - 1))
         reading = ranges[nearest]
         passed = (beside < 0.5) & (distance < reading - 1.5 - 3.0 * RAY_NOISE * reading)
-        passed |= distance < RADIUS - 1.0
+        passed |= within
         if passed.any():
             self.surfaces.drop(at[passed])
 
@@ -781,7 +795,10 @@ def policy(obs):
     STATE["steps"] += 1
     x, y, heading = filter_.pose()
     angles = heading + FAN
-    tips = np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles)])
+    from_x, from_y = scanner_at(x, y, heading)
+    tips = np.column_stack(
+        [from_x + ranges * np.cos(angles), from_y + ranges * np.sin(angles)]
+    )
     maps.clean(x, y, heading, ranges)
     maps.surfaces.add(tips[hit], RAY_NOISE * ranges[hit])
     maps.carve(x, y, heading, ranges, hit)

@@ -23,6 +23,8 @@ DT = PARAMS["dt"]
 STEP = ROBOT["max_wheel_speed"] * DT  # px at full speed
 TOLERANCE = 0.95 * PARAMS["goal_tolerance"]
 FAN = np.array(ROBOT["ray_angles"])  # rad from the heading
+OFFSET = ROBOT.get("scanner_offset") or (0.0, 0.0)  # where the rays start: ahead,
+# and to positive angles, px
 
 HALF = 330  # px from the start to the border of the map
 SIDE = 2 * HALF + 1
@@ -298,8 +300,18 @@ def met(disc, hits):
     return disc
 
 
+def scanner_at(x, y, heading):
+    """The place where the rays start, for the robot's centre at a place."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    ahead, aside = OFFSET
+    return x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
+
+
 def track(discs, chart, pose, hits, numbers, ranges):
-    """The discs after this step, by the hits that are of discs."""
+    """The discs after this step, by the hits that are of discs.
+
+    The rays start at this pose.
+    """
     if discs:
         for disc, *now in zip(discs, *chart.ahead(*motion(discs)), strict=True):
             disc.expect(*now)
@@ -626,9 +638,11 @@ def policy(obs):
     ranges = obs["ranges"].astype(float)
     chart, field = STATE["chart"], STATE["field"]
     cos, sin = np.cos(pose[2] + FAN), np.sin(pose[2] + FAN)
-    numbers = np.flatnonzero(chart.add(x, y, cos, sin, ranges))
-    points = np.column_stack([x + ranges * cos, y + ranges * sin])[numbers]
-    STATE["discs"] = track(STATE["discs"], chart, pose, points, numbers, ranges)
+    at_x, at_y = scanner_at(*pose)
+    numbers = np.flatnonzero(chart.add(at_x, at_y, cos, sin, ranges))
+    points = np.column_stack([at_x + ranges * cos, at_y + ranges * sin])[numbers]
+    seen_from = at_x, at_y, pose[2]
+    STATE["discs"] = track(STATE["discs"], chart, seen_from, points, numbers, ranges)
     if STATE["step"] % REPLAN == 0:
         field.replan(chart, x, y)
     STATE["step"] += 1

@@ -30,6 +30,8 @@ ORDER = np.argsort(FAN)  # of the rays, from the left to the right
 FAN = FAN[ORDER]
 VIEW = float(FAN[-1] - FAN[0])
 GAP = VIEW / max(FAN.size - 1, 1)  # rad between two rays
+OFFSET = ROBOT.get("scanner_offset") or (0.0, 0.0)  # where the rays start: ahead,
+# and to positive angles, px
 ROUND = 2.0 * math.pi - VIEW < 1.01 * GAP  # whether the robot sees behind itself
 MARGIN = 0.06  # px that are kept from walls
 WISH, FEAR = 0.5, 1.0  # px that are kept where there is room; price of a px less
@@ -120,13 +122,14 @@ class Maps:
         cosines, sines = np.cos(heading + FAN), np.sin(heading + FAN)
         along = np.minimum(SAMPLES, ranges[:, None] - 0.02)
         along = np.maximum(along, 0.0)
+        from_x, from_y = scanner_at(x, y, heading)
         rows, columns = self.indices(
-            x + along * cosines[:, None], y + along * sines[:, None]
+            from_x + along * cosines[:, None], from_y + along * sines[:, None]
         )
         self.crossed[rows, columns] = True
         hit = ranges < SHARP - 1e-3
         tips = ranges + 1e-3
-        rows, columns = self.indices(x + tips * cosines, y + tips * sines)
+        rows, columns = self.indices(from_x + tips * cosines, from_y + tips * sines)
         rows, columns = rows[hit], columns[hit]
         fresh = {
             (j, i)
@@ -150,7 +153,8 @@ class Maps:
         # Behind the last ray nothing is seen, unless the first one is next to it.
         least = np.append(least if ROUND else least[:-1], 0.0)
         far = float(least.max())
-        rows, columns, dx, dy = self.square(x, y, int(far) + 1)
+        from_x, from_y = scanner_at(x, y, heading)
+        rows, columns, dx, dy = self.square(from_x, from_y, int(far) + 1)
         square = dx * dx + (dy * dy)[:, None]
         filled = self.filled[rows, columns]
         j, i = np.nonzero(~filled & (square <= far * far))
@@ -730,16 +734,26 @@ def look(near, x, y, heading, unseen):
     return share, -share
 
 
+def scanner_at(x, y, heading):
+    """The place where the rays start, for the robot's centre at a place."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    ahead, aside = OFFSET
+    return x + ahead * cosine - aside * sine, y + ahead * sine + aside * cosine
+
+
+def tips_of(x, y, heading, ranges):
+    """The places that the rays of a scan hit."""
+    x, y = scanner_at(x, y, heading)
+    angles = heading + FAN
+    tips = np.column_stack([x + ranges * np.cos(angles), y + ranges * np.sin(angles)])
+    return tips[ranges < RANGE - 1e-3]
+
+
 def observe(x, y, heading, ranges, goal):
     """Adds a scan; returns the maps, whether a wall is new, and the pose on them."""
     if STATE["maps"] is None:
         STATE["scans"].append((x, y, heading, ranges))
-        places = [
-            np.column_stack([a + r * np.cos(h + FAN), b + r * np.sin(h + FAN)])[
-                r < RANGE - 1e-3
-            ]
-            for a, b, h, r in STATE["scans"]
-        ]
+        places = [tips_of(*scan) for scan in STATE["scans"]]
         angle = 0.0 if NOISE else lattice(np.vstack(places))
         scans = STATE["scans"]
         if angle is not None:

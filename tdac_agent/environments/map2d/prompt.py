@@ -18,6 +18,8 @@ HOW_THE_MAP_WAS_MADE = {
     *("score", "score_terms", "notes"),
 }
 """Fields of `params.json` that no controller needs."""
+FROM_A_SCANNER = ("ray_ends",)
+"""Those that only a controller needs whose rays do not start at the centre."""
 CONVERSIONS = ("to_pixels", "to_cell", "to_point")
 """Functions of `sensors.py` that only a controller in metres needs."""
 METRES = """\
@@ -32,7 +34,7 @@ disc swept along this arc is tested exactly against the occupied squares, so no 
 jump through a thin wall."""
 RAYS = """\
 Ray i points at `ray_angles[i]` from the heading (rad, counter-clockwise; see
-params.json). Rays start at the centre; no hit gives `range_max`."""
+params.json). {}o hit gives `range_max`."""
 
 
 def facts_of(task: Task) -> dict[str, Any]:
@@ -62,7 +64,7 @@ def facts_of(task: Task) -> dict[str, Any]:
         "radius": nominal.body_radius,
         "sensors_text": needed_part(
             SENSORS_FILE.read_text(encoding="utf-8"),  # raw read: shipped
-            CONVERSIONS if setting.view is None else (),
+            _not_needed(setting),
         ),
         "length": setting.task_units.length,
         "robot_lines": robot_lines(task, setting),
@@ -71,10 +73,18 @@ def facts_of(task: Task) -> dict[str, Any]:
     }
 
 
+def _not_needed(setting: Map2DSetting) -> tuple[str, ...]:
+    """Functions of `sensors.py` that a controller of this task does not need."""
+    without = CONVERSIONS if setting.view is None else ()
+    return without if setting.nominal.robot.scanner_offset else without + FROM_A_SCANNER
+
+
 def _in_metres(setting: Map2DSetting) -> dict[str, str]:
     """What differs if a controller observes metres."""
     table = interface_of(setting.observed()).observation.partition("\n\n")[0]
+    offset = setting.nominal.robot.scanner_offset
+    rays = RAYS.format("N" if offset else "Rays start at the centre; n")
     return {
         "env_description": METRES,
-        "observation_table": f"{table.replace('px', 'm')}\n\n{RAYS}",
+        "observation_table": f"{table.replace('px', 'm')}\n\n{rays}",
     }

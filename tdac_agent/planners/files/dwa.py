@@ -112,7 +112,8 @@ def policy(obs):
     pose.update(obs)
     STATE["time"] += DT
     ranges = np.asarray(obs["ranges"], float)[ORDER]
-    grid.scan(pose.x, pose.y, pose.heading, ranges, ranges < MARKED, STATE["time"])
+    there = scanner_at(pose)
+    grid.scan(*there, pose.heading, ranges, ranges < MARKED, STATE["time"])
     later = pose.ahead(commands)
     grid.replan(later.x, later.y)
     turns = recovers(grid, pose, STUCK, keep_no_margin)

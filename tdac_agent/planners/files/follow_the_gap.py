@@ -27,10 +27,10 @@ AHEAD = np.abs(FAN) <= math.radians(FRONT) / 2.0 + 1e-6
 BODY = RADIUS + ROOM
 
 
-def free_lengths(ranges, angles):
+def free_lengths(ranges, bearings, angles):
     """How far the body can drive in each direction, px."""
     hit = ranges < RANGE - 1e-3
-    off = FAN[hit][None, :] - angles[:, None]
+    off = bearings[hit][None, :] - angles[:, None]
     along, beside = ranges[hit] * np.cos(off), np.abs(ranges[hit] * np.sin(off))
     near = (beside < BODY) & (along > 0.0)
     back = np.sqrt(np.maximum(BODY * BODY - beside * beside, 0.0))
@@ -75,9 +75,9 @@ def policy(obs):
     goal_x, goal_y = (float(value) for value in obs["goal"])
     wanted = math.atan2(goal_y - pose.y, goal_x - pose.x) - pose.heading
     wanted = math.remainder(wanted, math.tau)
-    ranges = np.asarray(obs["ranges"], float)[ORDER]
-    angles, seen = FAN[AHEAD], ranges[AHEAD]
-    free = free_lengths(ranges, angles)
+    ranges, bearings = from_centre(np.asarray(obs["ranges"], float)[ORDER])
+    angles, seen = bearings[AHEAD], ranges[AHEAD]
+    free = free_lengths(ranges, bearings, angles)
     gap = widest_gap(free)
     if gap is None:  # turn on, on the spot, until there is one
         heading = math.copysign(math.pi, STATE["turn"])
@@ -85,7 +85,8 @@ def policy(obs):
         weight = ALPHA / max(float(seen.min()) - RADIUS, 0.5)
         heading = (weight * gap_centre(angles, seen, gap) + wanted) / (weight + 1.0)
     turn = max(-1.0, min(1.0, TURN_GAIN * heading / SPIN))
-    ahead = float(free_lengths(ranges, np.array([0.0, turn * SPIN])).min())
+    ways = np.array([0.0, turn * SPIN])
+    ahead = float(free_lengths(ranges, bearings, ways).min())
     forward = max(0.0, min(1.0, ahead / SLOW)) * (1.0 - abs(turn))
     STATE["turn"] = turn
     return forward + turn, forward - turn

@@ -116,7 +116,7 @@ def policy(obs):
     STATE["time"] += DT
     ranges = np.asarray(obs["ranges"], float)[ORDER]
     hit = ranges < RANGE - 1e-3
-    grid.scan(pose.x, pose.y, pose.heading, ranges, hit, STATE["time"])
+    grid.scan(*scanner_at(pose), pose.heading, ranges, hit, STATE["time"])
     later = pose.ahead(commands)
     grid.replan(later.x, later.y)
     if recovers(grid, pose, STUCK, forget_sequence):

@@ -124,13 +124,14 @@ def hidden(free, x, y):
 def track(grid, pose, ranges):
     """Renews the discs; returns which rays hit walls."""
     hit = ranges < RANGE - 1e-3
-    x = pose.x + ranges * np.cos(pose.heading + FAN)
-    y = pose.y + ranges * np.sin(pose.heading + FAN)
+    from_x, from_y = scanner_at(pose)
+    x = from_x + ranges * np.cos(pose.heading + FAN)
+    y = from_y + ranges * np.sin(pose.heading + FAN)
     walls = hit.copy()
     hit &= np.sqrt(grid.base[grid.entries(x, y)]) > 2.5
     discs, free = STATE["discs"], list(STATE["discs"])
     for group in sorted(groups(x, y, hit), key=len, reverse=True):
-        found = circle(x[group], y[group], pose.x, pose.y)
+        found = circle(x[group], y[group], from_x, from_y)
         gaps = [math.dist(found[0], disc.expected()) for disc in free] if found else []
         if gaps and min(gaps) < GATE:
             disc = free.pop(gaps.index(min(gaps)))
@@ -183,10 +184,11 @@ def disc_plane(place, velocity, radius, own):
 
 def half_planes(pose, ranges, walls, own):
     """Normals and least values along them: those of walls, then those of discs."""
-    k = np.flatnonzero(walls & (ranges < NEAR))
-    angles = pose.heading + FAN[k]
+    far, bearings = from_centre(ranges)
+    k = np.flatnonzero(walls & (far < NEAR))
+    angles = pose.heading + bearings[k]
     normals = -np.column_stack([np.cos(angles), np.sin(angles)])
-    room = ranges[k] - RADIUS - MARGIN
+    room = far[k] - RADIUS - MARGIN
     least = -np.maximum(room, 0.0) / WALL_HORIZON
     count, here = len(k), np.array([pose.x, pose.y])
     for disc in STATE["discs"]:
@@ -232,7 +234,7 @@ def policy(obs):
     STATE["time"] += DT
     ranges = np.asarray(obs["ranges"], float)[ORDER]
     walls = track(grid, pose, ranges)
-    grid.scan(pose.x, pose.y, pose.heading, ranges, walls, STATE["time"])
+    grid.scan(*scanner_at(pose), pose.heading, ranges, walls, STATE["time"])
     grid.replan(pose.x, pose.y)
     if recovers(grid, pose, STUCK):
         return 1.0, -1.0

@@ -39,8 +39,9 @@ def remembered(pose, ranges):
     """Adds the hits of a scan; all hits nearby, relative to the robot."""
     hits, now = STATE["hits"], STATE["time"]
     hit = ranges < RANGE - 1e-3
-    x = pose.x + ranges[hit] * np.cos(pose.heading + FAN[hit])
-    y = pose.y + ranges[hit] * np.sin(pose.heading + FAN[hit])
+    from_x, from_y = scanner_at(pose)
+    x = from_x + ranges[hit] * np.cos(pose.heading + FAN[hit])
+    y = from_y + ranges[hit] * np.sin(pose.heading + FAN[hit])
     for a, b in zip(x.tolist(), y.tolist(), strict=True):
         hits[round(a), round(b)] = a, b, now
     points = np.array(list(hits.values())).reshape(-1, 3)

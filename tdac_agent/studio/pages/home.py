@@ -58,9 +58,11 @@ def add(place: Path) -> None:
     """Adds the page."""
 
     @ui.page("/")
-    async def page(source: str = FIRST, task: str = "", obstacles: str = "") -> None:
+    async def page(
+        source: str = FIRST, task: str = "", obstacles: str = "", robot: str = ""
+    ) -> None:
         with framed("New controller"):
-            await StartPage(place).show(source, task, obstacles)
+            await StartPage(place).show(source, task, obstacles, robot)
 
 
 class StartPage:
@@ -77,14 +79,14 @@ class StartPage:
         self._checked: Checked | None = None
         self._turn = 0  # number of the newest choice: the work on older ones is dropped
 
-    async def show(self, source: str, task: str, obstacles: str) -> None:
+    async def show(self, source: str, task: str, obstacles: str, robot: str) -> None:
         """Builds the page, with what its address says."""
         with ui.element("div").classes("choosing"):
             with ui.column().classes("min-w-0 gap-3"):
                 self._source = SourceChoice(self._place, source, obstacles, self._open)
                 ui.label("2. Start and goal").classes("text-lg font-bold")
                 self._form = TaskForm(
-                    self._typed, self._resized, self._move, self._shrink
+                    self._typed, self._resized, self._named, self._move, self._shrink
                 )
                 self._build_start()
             with ui.column().classes("beside min-w-0 gap-2"):
@@ -92,7 +94,7 @@ class StartPage:
         await shown_first()
         if self._turn == 0:  # nobody was faster than the page
             await self._open(source)
-            await self._take(task)
+            await self._take(task, robot)
 
     def _build_start(self) -> None:
         ui.label("3. Who writes").classes("text-lg font-bold")
@@ -128,7 +130,7 @@ class StartPage:
         self._map.show(view.png)
         self._map.begin(f"{kind} {name}", view.reading, view.notes)
         self._source.show_polarity(view.kind == "map")
-        self._form.show(self._draft)
+        self._form.show(self._draft, view)
         await self._check()
 
     async def _waiting(self, text: str, work: Callable[[], T]) -> T:
@@ -171,8 +173,9 @@ class StartPage:
 
     async def _change(self, draft: TaskDraft) -> None:
         """Shows another draft, and checks it."""
+        assert self._view is not None
         self._draft = draft
-        self._form.show(draft)
+        self._form.show(draft, self._view)
         await self._check()
 
     async def _typed(self) -> None:
@@ -181,15 +184,20 @@ class StartPage:
             self._draft = self._form.written(self._draft)
             await self._check()
 
-    async def _take(self, task: str) -> None:
-        """Takes start, heading, goal and radius from the address of the page."""
-        values = numbers_in(task)
-        if self._draft is None or len(values) != 6:
+    async def _take(self, task: str, robot: str) -> None:
+        """Takes places, radius and robot from the address of the page."""
+        draft, view, values = self._draft, self._view, numbers_in(task)
+        if draft is None or view is None:
             return
-        x, y, heading, goal_x, goal_y, radius = values
-        start, goal = (x, y), (goal_x, goal_y)
-        placed = replace(self._draft, start=start, goal=goal, heading=heading)
-        await self._change(replace(placed, radius=radius))
+        if robot in (each.name for each in view.robots):
+            draft = replace(draft, robot=robot)
+        if len(values) == 6:
+            x, y, heading, goal_x, goal_y, radius = values
+            start, goal = (x, y), (goal_x, goal_y)
+            draft = replace(draft, start=start, goal=goal, heading=heading)
+            draft = replace(draft, radius=radius)
+        if draft != self._draft:
+            await self._change(draft)
 
     async def _move(self) -> None:
         """Moves start and goal to the nearest free places."""
@@ -214,6 +222,11 @@ class StartPage:
         if self._draft is not None:
             self._draft = replace(self._draft, radius=self._form.radius)
             await self._check()
+
+    async def _named(self) -> None:
+        draft, robot = self._draft, self._form.robot
+        if draft is not None and draft.robot != robot:
+            await self._change(replace(draft, robot=robot))
 
     async def _check(self) -> None:
         """Finds the path of the draft, or why there is none."""
@@ -271,6 +284,8 @@ def address_with(draft: TaskDraft) -> str:
     address = f"/?source={quote(f'{draft.kind}: {draft.source}')}"
     if draft.polarity is not None:
         address += f"&obstacles={draft.polarity}"
+    if draft.robot is not None:
+        address += f"&robot={quote(draft.robot)}"
     values = *(draft.start or ()), draft.heading, *(draft.goal or ()), draft.radius
     if len(values) < 6 or None in values:
         return address

@@ -188,6 +188,24 @@ def test_a_goal_that_cannot_be_reached(page, plan):
 
 
 @pytest.mark.slow
+def test_a_robot_is_chosen_by_its_name(page, studio, plan):
+    """Where metres are known; the command and the address say so."""
+    ros = "image: {}\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+    ros += "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    shutil.copy(plan, studio.place)
+    (studio.place / "ros.yaml").write_text(ros.format(plan.name))
+    page.get(f"{studio.base}/?source=map%3A%20ros.yaml")
+    says(page, "a disc of this radius")
+    field = page.find_element(By.CSS_SELECTOR, "input[aria-label='robot']")
+    page.execute_script("arguments[0].click()", field)
+    path = "//div[@role='option'][normalize-space(.)='turtlebot3-burger']"
+    wait(page, lambda b: b.find_elements(By.XPATH, path))[0].click()
+    says(page, "--robot turtlebot3-burger")
+    says(page, "full speed 0.22 m/s")
+    wait(page, lambda b: "robot=turtlebot3-burger" in b.current_url)
+
+
+@pytest.mark.slow
 def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
     """It is the first candidate; the report has what it failed, and its successor."""
     (tmp_path / "blind.py").write_text(BLIND)

@@ -46,6 +46,7 @@ from tdac_agent.studio.driving import KeyboardDrive
 from tdac_agent.studio.folder import deployable
 from tdac_agent.studio.jobs import JobFile, StudioJob, free_folder, job_of, jobs, start
 from tdac_agent.studio.pages.bench import named_entrants, progress_of
+from tdac_agent.studio.pages.home import address_with
 from tdac_agent.studio.pages.questions import KINDS, asked_for
 from tdac_agent.studio.pages.run_list import unpack
 from tdac_agent.studio.pages.writers import Writers
@@ -81,7 +82,13 @@ def test_a_local_model_needs_neither_key_nor_limit(monkeypatch):
 def flags_of(words):
     """The flags of a command line, as far as drafts use them."""
     given, left = {}, list(words)
-    names = {"--map": "map_image", "--world": "world", "--polarity": "polarity"}
+    names = {
+        "--map": "map_image",
+        "--world": "world",
+        "--polarity": "polarity",
+        "--robot": "robot",
+        "--frame": "frame",
+    }
     while left:
         flag = left.pop(0)
         if flag in names:
@@ -103,6 +110,50 @@ def test_a_draft_is_the_task_of_its_command(kind, source, tmp_path):
     assert checked.problem == ""
     assert chosen_task(flags_of(draft.words())).sha256() == checked.task.sha256()
     assert checked.narrowest.width > 2.0 * (view.radius or BODY_RADIUS)
+
+
+def metric_map(folder):
+    """A map of 20 x 15 m with cells of 5 cm."""
+    plan = np.full((300, 400), 255, np.uint8)
+    plan[:8] = plan[-8:] = plan[:, :8] = plan[:, -8:] = 0
+    cv2.imwrite(str(folder / "plan.png"), plan)
+    (folder / "plan.yaml").write_text(
+        "image: plan.png\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    return view_of("map", str(folder / "plan.yaml"))
+
+
+def test_robots_that_fit_are_offered(tmp_path):
+    """Those in metres where metres are known, and e-pucks in worlds."""
+    metric = metric_map(tmp_path)
+    names = [robot.name for robot in metric.robots]
+    assert names == ["create3-rplidar", "jackal", "turtlebot3-burger"]
+    world = view_of("world", "maze")
+    assert [robot.name for robot in world.robots] == ["e-puck", "e-puck2"]
+    assert view_of("map", "maze").robots == ()
+
+
+def test_a_draft_with_a_robot_is_the_task_of_its_command(tmp_path, monkeypatch):
+    """Its size is that of the robot; the slider's is kept for later."""
+    monkeypatch.chdir(tmp_path)
+    maps = TaskDraft("map", "plan.yaml", (60, 70), (340, 70), 0.0, 15.0)
+    worlds = TaskDraft.of(view_of("world", "maze"), "maze")
+    for draft, robot, view in (
+        (maps, "turtlebot3-burger", metric_map(tmp_path)),
+        (worlds, "e-puck2", view_of("world", "maze")),
+    ):
+        named = replace(draft, robot=robot)
+        checked = check(named, view, tmp_path)
+        assert checked.problem == ""
+        words = named.words()
+        assert words[words.index("--robot") :][:2] == ["--robot", robot]
+        assert "--robot-radius" not in words
+        assert chosen_task(flags_of(words)).sha256() == checked.task.sha256()
+        assert replace(named, robot=None) == draft
+    assert named.task_file().robot.file == "e-puck2"
+    assert fitting_radius(named, checked) is None
+    assert "&robot=e-puck2" in address_with(named)
 
 
 @pytest.mark.parametrize("kind", ["map", "world"])

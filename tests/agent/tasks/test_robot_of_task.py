@@ -304,3 +304,32 @@ def test_what_is_no_e_puck_is_refused_in_worlds(tmp_path, robot, reason):
     with pytest.raises(TaskError, match=reason) as caught:
         world_task(tmp_path, robot=robot)
     assert "\n" not in str(caught.value)
+
+
+def test_the_ends_of_rays_are_on_the_walls(floor, tmp_path):
+    """`ray_ends` starts them at the scanner; prompts of such robots name it."""
+    import importlib.util
+
+    task = task_of(floor, goal=[10, 6])
+    folder = lay_out(task, tmp_path / "out")
+    spec = importlib.util.spec_from_file_location(
+        "sensors_with_rays", folder / "sensors.py"
+    )
+    sensors = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(sensors)
+    env = task.setting.observed()
+    seen = env.reset(seed=0, options={"start": (1.5, 1.7, 0.4)})[0]
+    near = seen["ranges"] < 3.4
+    ends = sensors.ray_ends(seen["ranges"], seen["pose"])[near]
+    # The room's walls are one cell thick.
+    walls = np.abs(ends[:, [0, 0, 1, 1]] - (0.05, 11.95, 0.05, 7.95)).min(axis=1)
+    assert near.sum() > 100
+    assert walls.max() < 1e-3
+    own = sensors.ray_ends(seen["ranges"])[0]
+    assert own == pytest.approx((seen["ranges"][0] - 0.032, 0.0), abs=1e-6)
+    told = facts_of(task)
+    assert "def ray_ends" in told["sensors_text"]
+    assert "Rays start at the centre" not in told["observation_table"]
+    plain = facts_of(task_of(floor, robot={"radius": 0.2}))
+    assert "def ray_ends" not in plain["sensors_text"]
+    assert "Rays start at the centre" in plain["observation_table"]
