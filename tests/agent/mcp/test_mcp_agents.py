@@ -127,7 +127,7 @@ def test_from_nothing_to_verified_on_the_ladder(tmp_path, tdac):
     out = tmp_path / "run"
     server = over_stdio(tmp_path, "--set", "unknown", "--out", out)
     assert converse(server, conversation)["verified"]
-    assert record(out)["status"] == "passed"
+    assert record(out)["status"] == "verified"
 
 
 @pytest.mark.slow
