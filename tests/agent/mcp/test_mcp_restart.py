@@ -142,7 +142,7 @@ def test_killed_after_the_choice(running, tmp_path, solver):
     assert "was chosen" in told
     assert verdict["verified"]
     assert file.read_bytes() == salt
-    assert record(out)["status"] == "passed"
+    assert record(out)["status"] == "verified"
 
 
 @pytest.mark.slow
