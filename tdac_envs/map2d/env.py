@@ -363,8 +363,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         )
         params = prepared.params
         body = override(params.robot, **{name: given[name] for name in OVERRIDDEN})
-        assert params.start is not None
-        assert params.goal is not None
+        assert params.start is not None and params.goal is not None
         nominal = make_task(
             Terrain.of(prepared.grid),
             Pose(*params.start, params.heading),

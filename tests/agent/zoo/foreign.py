@@ -136,7 +136,8 @@ SUITE = r"run the tests in \S+ \(sha256 [0-9a-f]{12}\).* --suite \S+suite, or .*
 
 
 @attack(
-    r"task maze, not the bundled one \(map \w{8}, goal within 8 px \(1\.3 radii\)\) of /",
+    r"task maze, not the bundled one \(map \w{8}, goal within 8 px "
+    r"\(1\.3 radii\)\) of /",
     code=0,
     works=None,
 )
