@@ -363,7 +363,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         )
         params = prepared.params
         body = override(params.robot, **{name: given[name] for name in OVERRIDDEN})
-        assert params.start is not None and params.goal is not None
+        assert params.start is not None
+        assert params.goal is not None
         nominal = make_task(
             Terrain.of(prepared.grid),
             Pose(*params.start, params.heading),
@@ -398,8 +399,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             metric=units.frame,
             sensor=sensor,
             reception=Reception(
-                **{name: given[name] or 0 for name in RECEIVED},
-                message_drop=message_drop,
+                **{n: given[n] or 0 for n in RECEIVED}, message_drop=message_drop
             ),
         )
         notes = with_tolerance_note(params.notes, nominal, units.length)
