@@ -30,30 +30,30 @@ class Frozen(NamedTuple):
 
 
 CODE = {
-    ON_MAPS_OF_SETS: "f079ad585506417f45e2814b4540e4c79b4a53a637488a39acd0c5d90c053ef0",
+    ON_MAPS_OF_SETS: "b2bc6130054d7ffe85eaadba016f16241a321cce27965d2a4cbe16dce77c93f6",
     ON_PLATES: "decf6518a16335669927ffe4474ef63db0997f86d6450813edf4d9787bd3ffd1",
 }
 """Hashes of the code of this ladder."""
 FROZEN: dict[str, Frozen] = {
     "known": Frozen(
         "7cd7606b6276646f57999a90d81eee4a83f7b195386c467dd69cb76388ac218f",
-        "86d0c94f3cd02df2796ff73f1386525185190d246a459e4f23c52ac3a0afb19e",
+        "4732de39f792ee1ffc76a18b7bffaeba38a6d45c17bc159dba049bd5d80a8187",
     ),
     "unknown": Frozen(
         "a95bc6cc55cd46d86b71535da6009fd7a23510ec82cd2fd90f1c0484bce42cb4",
-        "109e9a3b57fa7919b2e83583d4ef46f23aaecf3bb1e4a8c24534d0e33fb686fd",
+        "0dded3cad566bf59670253f6a4512b05f2571664f54d2fdff795c37d7665b9ce",
     ),
     "lost": Frozen(
         "6ecbed8a359e0683cd64b6dbf341b629a93828854c724bc5e1ba6f60b95e29a4",
-        "d352776074c8129f1b289109eb98fddacf8dbb595e6b81464ddc1f888542136e",
+        "539f4626d2e9aaf45b35c081569332c2cb75cc7bb6e37fbe1053aae88f359327",
     ),
     "moving": Frozen(
         "fcabb48d5d2ee33aaeb9397e1028dfa123b43fea2e14abbf3468bc5c42e65835",
-        "53f4ef1e3a693402aaaa4bef68c167127b0a6c1c8b6ca279a69f2a24c89b0335",
+        "148fd28b674c7339a9f709ba174d4a22de04eac733ff62252a05f5281da884b8",
     ),
     "crowd": Frozen(
         "535b797efa54b4a55dc7986a4be163783927317b75ec2c1a4facf4b5f737974c",
-        "5253ed42ecbc55130412401857ddf999f610c184960659b6710578dc0d73f427",
+        "40014cf37bfb6b0328fdd9f808d0ca81061c3f01ef78e25e182213ce1899393f",
     ),
     "epuck": Frozen(
         "f14e67b3a6302229283054585b4c435c02fca0fdc70ece5733dc87fcf89eeb52",
@@ -61,15 +61,15 @@ FROZEN: dict[str, Frozen] = {
     ),
     "floor": Frozen(
         "cbfaeb76d11da8e106a9d4f20815b3358a85ddab57945a180bd96494e35ba580",
-        "aaefcef372ed3af775990fc19dee902dde66d8356edcdf9aeb45c5abe6a5bf80",
+        "3725b42d6762d7c2a26ad8efd229f60dfee4907e80fa47d3f6573c552a031241",
     ),
     "barn": Frozen(
         "57468e2ffea454090dc0a56c2f71ff84396bf818ab061c281dcb0fe5d956700c",
-        "7e655b9c044086b1156812bbfab99334df077d1aba85cfa24322a80e93226683",
+        "a375c1b11e3a0752f21d241b5a7a0d2ae4fcebfc1de3adeda0367c66f14be05d",
     ),
     "barn-slow": Frozen(
         "8595432ce3f749f02d9bfd9eceabd32eb4e5e7e40579e80110597e64b73e3894",
-        "dfe6d1f61d1147cbdb355f55ecb1fe0e77f4b8baf43c67ea4532d7e55c2ff692",
+        "28b4a50613594924e75b45f72fe5d06d881ce6f27cdd9cfcffd965caa8c72833",
     ),
 }
 """The sets of this ladder by name; `python -m tools.frozen` prints the present ones."""

@@ -399,8 +399,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             metric=units.frame,
             sensor=sensor,
             reception=Reception(
-                **{name: given[name] or 0 for name in RECEIVED},
-                message_drop=message_drop,
+                **{n: given[n] or 0 for n in RECEIVED}, message_drop=message_drop
             ),
         )
         notes = with_tolerance_note(params.notes, nominal, units.length)
