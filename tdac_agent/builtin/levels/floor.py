@@ -2,10 +2,11 @@
 
 The robot keeps a pose of its own: the wheels move it, each scan is fitted to the map
 that earlier scans have made, and the localiser, which errs more but never drifts,
-slowly pulls it. Cells of the map count hits and passes, so that noise averages out. A wave from the goal gives the time to it from every place;
-unseen floor costs a little more. In each step, pairs of speed and turn are tried out
-over the next second, as fast as the limits allow: the least time to the goal wins, and
-more distance from obstacles is worth a little time.
+slowly pulls it. Cells of the map count hits and passes, so that noise averages out. A
+wave from the goal gives the time to it from every place; unseen floor costs a little
+more. In each step, pairs of speed and turn are tried out over the next second, as fast
+as the limits allow: the least time to the goal wins, and more distance from obstacles
+is worth a little time.
 """
 
 import json
