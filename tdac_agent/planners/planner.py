@@ -53,7 +53,7 @@ def planner_on(name: str, problem: Task | TaskSet) -> Planner:
     entry, level = _known()[name], _level_of(problem)
     if level not in entry.levels:
         known = ", ".join(entry.levels)
-        raise TaskError(f"{name} needs what is observed in {known}")
+        raise TaskError(f"{name} needs what is observed in {known}, in their units")
     assert level is not None
     # Some sets with the observations of a level have values of their own; on the
     # others, those of the level are used.

@@ -64,7 +64,13 @@ def verified_text(report: EpisodeReport) -> str:
     if not is_verified(report):
         return text
     if gap is not None:
-        text += f", smallest gap {gap_figure(gap.gap, report.provenance.units)}"
+        units = report.provenance.units
+        text += f", smallest gap {gap_figure(gap.gap, units)}"
+        if report.too_close:
+            text += (
+                f" ({report.too_close} of {report.count} nearer than the required "
+                f"{gap_figure(gap.required, units)})"
+            )
     text += f", sandbox {report.provenance.sandbox}"
     return f"{text}; not covered: {not_covered(report)}"
 

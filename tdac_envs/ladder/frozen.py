@@ -30,46 +30,46 @@ class Frozen(NamedTuple):
 
 
 CODE = {
-    ON_MAPS_OF_SETS: "b2bc6130054d7ffe85eaadba016f16241a321cce27965d2a4cbe16dce77c93f6",
-    ON_PLATES: "decf6518a16335669927ffe4474ef63db0997f86d6450813edf4d9787bd3ffd1",
+    ON_MAPS_OF_SETS: "46a5299112cd13c1188f8899f0e1d9ef6aa22ac926b7f3b91c12e6dbe9ef96e7",
+    ON_PLATES: "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab",
 }
 """Hashes of the code of this ladder."""
 FROZEN: dict[str, Frozen] = {
     "known": Frozen(
         "7cd7606b6276646f57999a90d81eee4a83f7b195386c467dd69cb76388ac218f",
-        "4732de39f792ee1ffc76a18b7bffaeba38a6d45c17bc159dba049bd5d80a8187",
+        "11c716aa46f7f7bdd2a8b68b8fcea71a7d6486a7706e82b32dd80132f5fdccab",
     ),
     "unknown": Frozen(
         "a95bc6cc55cd46d86b71535da6009fd7a23510ec82cd2fd90f1c0484bce42cb4",
-        "0dded3cad566bf59670253f6a4512b05f2571664f54d2fdff795c37d7665b9ce",
+        "1321d15d414d244172796448b85e90a1239f95bd0d277f4ef4e44981fabe4188",
     ),
     "lost": Frozen(
         "6ecbed8a359e0683cd64b6dbf341b629a93828854c724bc5e1ba6f60b95e29a4",
-        "539f4626d2e9aaf45b35c081569332c2cb75cc7bb6e37fbe1053aae88f359327",
+        "dc6b2762f14d2ec644de05da583bd3fe3992e19513eaef7a3cf7ee217451de30",
     ),
     "moving": Frozen(
         "fcabb48d5d2ee33aaeb9397e1028dfa123b43fea2e14abbf3468bc5c42e65835",
-        "148fd28b674c7339a9f709ba174d4a22de04eac733ff62252a05f5281da884b8",
+        "59f13e0f96b6c2ee4415117d24d69667e62b4eb098145bec350daef69bb2785d",
     ),
     "crowd": Frozen(
         "535b797efa54b4a55dc7986a4be163783927317b75ec2c1a4facf4b5f737974c",
-        "40014cf37bfb6b0328fdd9f808d0ca81061c3f01ef78e25e182213ce1899393f",
+        "4e79c44256adbbc84db75098354b0f0c3ae93aa7805bd29c8774af524513545e",
     ),
     "epuck": Frozen(
         "f14e67b3a6302229283054585b4c435c02fca0fdc70ece5733dc87fcf89eeb52",
-        "50d9f37e0a2b1ad16dae4c71063100d3cbaf785147a94b9d002c668c3cd75b6d",
+        "03a759c096c9ecb9f8ae3936707aad7b14c8483a827b5490a9f2b16b664881d8",
     ),
     "floor": Frozen(
         "cbfaeb76d11da8e106a9d4f20815b3358a85ddab57945a180bd96494e35ba580",
-        "3725b42d6762d7c2a26ad8efd229f60dfee4907e80fa47d3f6573c552a031241",
+        "1819cfafeb8a77c24bc2dc54774313b6f0bb1bd214255194ebad4e5b461e0b68",
     ),
     "barn": Frozen(
         "57468e2ffea454090dc0a56c2f71ff84396bf818ab061c281dcb0fe5d956700c",
-        "a375c1b11e3a0752f21d241b5a7a0d2ae4fcebfc1de3adeda0367c66f14be05d",
+        "dc3cdaa85e26921e859a7cb95f0a6c408e434e8069fbfd93818d2d99385e25cd",
     ),
     "barn-slow": Frozen(
         "8595432ce3f749f02d9bfd9eceabd32eb4e5e7e40579e80110597e64b73e3894",
-        "28b4a50613594924e75b45f72fe5d06d881ce6f27cdd9cfcffd965caa8c72833",
+        "8f9669e3b16753a7cd38039e177b64d70dce08e09c543f6d30d7feda1919c8bd",
     ),
 }
 """The sets of this ladder by name; `python -m tools.frozen` prints the present ones."""

@@ -93,4 +93,7 @@ def _in_pixels(values: dict[str, Any], metric: MapUnits) -> dict[str, Any]:
     ):
         if key in own:
             own[key] = changed(own[key], keys, change)
+    for key in ("worlds", "files"):
+        if isinstance(own.get(key), dict) and "folder" in own[key]:
+            own[key] = {**own[key], "metres": metric.per_pixel}
     return changed(own, ("goal_tolerance",), px)  # type: ignore[no-any-return]

@@ -305,7 +305,10 @@ class TaskSet:
             )
         if split not in self.files.splits:
             own = ", ".join(self.files.splits)
-            raise TaskError(f"set {self.name!r} has the split {own}, not {split!r}")
+            raise TaskError(
+                f"set {self.name!r} has the split {own}, not {split!r}: give one of "
+                f"them (--split, or split={next(iter(self.files.splits))!r})"
+            )
 
     def _found(self, split: str, index: int) -> FileWorld:
         """World `index` of a split, from its file."""

@@ -13,6 +13,7 @@ from tdac_envs.core.errors import TaskError, TdacError, first_problem, one_line_
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, printable, read_file
 from tdac_envs.core.strict_model import LenientModel
 from tdac_envs.grid.grid import BoolGrid
+from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.ladder.files.file_world import FileWorld
 from tdac_envs.map2d.source import prepare
 from tdac_envs.mapping.image import luminance
@@ -30,7 +31,10 @@ _SHADES: dict[str, Literal["dark", "light"]] = {
 
 
 class MapEntry(LenientModel):
-    """A task of `index.json`; other keys are not read. Lengths are px, y is down."""
+    """A task of `index.json`; other keys are not read.
+
+    Places are px and y is down, or m in the frame of the map's `map.yaml`.
+    """
 
     file: str = Field(min_length=1, description="Map, relative to the folder.")
     start: tuple[float, float] = Field(description="Rounded to whole px.")
@@ -50,7 +54,10 @@ class MapEntry(LenientModel):
 
 
 def read_folder(
-    folder: Path, radius: float, skipped: list[str] | None
+    folder: Path,
+    radius: float,
+    skipped: list[str] | None,
+    metres: float | None = None,
 ) -> list[FileWorld]:
     """The worlds of a folder, in the order of its index.
 
@@ -58,6 +65,7 @@ def read_folder(
         folder: The folder.
         radius: Radius of the body, px; it helps to tell walls from floor in a picture.
         skipped: Takes the reasons why maps cannot be used; None to raise them.
+        metres: Metres per px of the maps, if places are in metres; None for px.
 
     Raises:
         TaskError: The index or a map is missing or not valid.
@@ -65,9 +73,10 @@ def read_folder(
     entries = _entries(folder)
     grids: dict[tuple[object, ...], BoolGrid] = {}
     found = []
-    for entry in entries:
-        key = (entry.truth or entry, radius)
+    for written in entries:
         try:
+            entry = written if metres is None else _in_pixels(folder, written, metres)
+            key = (entry.truth or entry, radius)
             if key not in grids:
                 grids[key] = _cells(folder, entry, radius)
         except TdacError as error:
@@ -122,6 +131,33 @@ def _entry(path: Path, number: int, value: Any) -> MapEntry:
                 f"{path}, task {number}: {printable(name)} is not in the folder"
             )
     return entry
+
+
+def _in_pixels(folder: Path, entry: MapEntry, metres: float) -> MapEntry:
+    """A task in metres of its map's frame, in px.
+
+    Raises:
+        TaskError: The map cannot be read, or has another resolution.
+    """
+    try:
+        image = load_image(folder / entry.file)
+        if image.resolution is None:
+            image = load_image(folder / entry.file, metres)
+    except TdacError as error:
+        raise TaskError(f"{entry.file}: {error}") from None
+    if not math.isclose(image.resolution or 0.0, metres, rel_tol=1e-6):
+        raise TaskError(
+            f"{entry.file}: its map has {image.resolution:g} m per px, and the set "
+            f"{metres:g}: give `resolution: {image.resolution:g}`"
+        )
+    units = MapUnits.metres(image)
+    heading = math.remainder(units.heading_in_pixels(entry.heading), math.tau)
+    places = {
+        "start": units.pixels(entry.start),
+        "goal": units.pixels(entry.goal),
+        "heading": heading,
+    }
+    return entry.model_copy(update=places)
 
 
 def _cells(folder: Path, entry: MapEntry, radius: float) -> BoolGrid:

@@ -76,6 +76,7 @@ class FileWorlds:
             splits=("test",),
             infeasible=spec.infeasible,
             runs=spec.runs,
+            metres=spec.metres,
         )
         found = opened(own, radius, tolerance)
         worlds = found.splits["test"]
@@ -138,7 +139,9 @@ def _opened(
     if spec.barn:
         found = read_barn(spec.path, spec.resolution)
     else:
-        found = read_folder(spec.path, radius, skipped if lenient else None)
+        found = read_folder(
+            spec.path, radius, skipped if lenient else None, spec.metres
+        )
     feasible = []
     for world in found:
         problem = world.problem(radius, tolerance)

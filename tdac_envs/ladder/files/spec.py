@@ -32,6 +32,9 @@ class FilesSpec(StrictModel):
     resolution: float = Field(
         0.025, ge=0.001, le=1, description="Metres per px, for BARN."
     )
+    metres: float | None = Field(
+        None, gt=0, description="Metres per px, if the index is in metres."
+    )
     splits: Annotated[tuple[FileSplit, ...], AfterValidator(_each_once)] = Field(
         FILE_SPLITS, min_length=1, description="Splits that share the worlds."
     )

@@ -88,6 +88,30 @@ def test_the_index_gives_the_tasks(folder):
     np.testing.assert_array_equal(made.field, task.field)
 
 
+METRIC = {"robot": "turtlebot3-burger", "resolution": 0.05}
+
+
+@pytest.mark.parametrize("origin", [None, (-1.0, 2.0)])
+def test_an_index_in_metres(folder, origin):
+    """Of the frame of each map; the heading turns to the left."""
+    x, y = origin or (0.0, 0.0)
+    place = {"start": [x + 1.025, y + 2.975], "goal": [x + 5.025, y + 2.975]}
+    file = "20.png" if origin is None else "20.yaml"
+    path = folder([20], [{"file": file, "heading": 0.5, **place}], **METRIC)
+    if origin is not None:
+        facts = {"image": "20.png", "resolution": 0.05, "origin": [x, y, 0.0]}
+        facts |= {"negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.2}
+        (path.parent / "maps" / file).write_text(yaml.safe_dump(facts))
+    task = load_set(path).task("test", 0)
+    assert tuple(task.start) == (20, 20, -0.5)
+    assert task.goal == (100, 20)
+    if origin is not None:
+        values = {**yaml.safe_load(path.read_text()), "resolution": 0.1}
+        path.write_text(yaml.safe_dump(values))
+        with pytest.raises(TaskError, match=r"give `resolution: 0.05`"):
+            load_set(path)
+
+
 def test_the_figures_of_a_map(folder):
     """The gap and the shortest path around the end of the wall, as brute force."""
     world = load_set(folder([20])).world("test", 0)
