@@ -97,42 +97,6 @@ def _origin(robot: RobotParams) -> str:
     return "robot's centre" if robot.scanner_offset is None else "scanner"
 
 
-def limit_lines(file: SetFile) -> Iterator[str]:
-    """Yields a line for each limit of a robot on maps beyond that of its wheels.
-
-    Args:
-        file: The set in the units that the robot observes.
-    """
-    robot, unit = file.robot, file.shown_unit
-    assert not isinstance(robot, EPuckRobotParams)
-    body = [
-        f"{text} {value:g} {of}"
-        for text, value, of in (
-            ("at most", robot.max_speed, f"{unit}/s"),
-            ("at most", robot.max_turn_rate, "rad/s"),
-        )
-        if value is not None
-    ]
-    if body:
-        yield (
-            f"The body drives {' and turns '.join(body)}: a command beyond that is "
-            "scaled down, both wheels alike."
-        )
-    slow = [
-        f"{text} {value:g} {of}"
-        for text, value, of in (
-            ("wheels by", robot.max_acceleration, f"{unit}/s²"),
-            ("the turn of the body by", robot.max_turn_acceleration, "rad/s²"),
-        )
-        if value is not None
-    ]
-    if slow:
-        yield (
-            f"Speeds change by a limited amount per second: {', '.join(slow)} at most. "
-            "A command acts as far as these allow."
-        )
-
-
 def disturbance_lines(file: SetFile) -> Iterator[str]:
     """Yields a line for each disturbance of the set: its distribution and size.
 

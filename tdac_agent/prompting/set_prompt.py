@@ -8,18 +8,20 @@ from typing import Any
 from tdac_agent.prompting.context import allowed_code
 from tdac_agent.prompting.params_text import params_text
 from tdac_agent.prompting.prompt import PromptError, PromptTemplate, fill_in
+from tdac_agent.prompting.robot_lines import robot_lines
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.prompting.set_observations import (
     disturbance_lines,
-    limit_lines,
     observation_rows,
 )
 from tdac_agent.sandbox import Limits
 from tdac_agent.verification.judge.set_files import level_params
 from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.infrared import PLACES, TABLE
+from tdac_envs.grid.map_units import PIXELS, MapFrame, MapUnits
 from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.robots import EPuckRobotParams
+from tdac_envs.ladder.set_file import SetFile
 from tdac_envs.ladder.shown import in_shown_units
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.mapping.params import RobotParams
@@ -73,7 +75,7 @@ def set_context(tasks: TaskSet) -> dict[str, Any]:
         "file": file,
         "epuck": file.is_epuck,
         "found": tasks.files is not None,
-        **_robot(tasks),
+        **_robot(tasks, file),
         "unit": file.shown_unit,
         "full_step": file.full_step,
         "observation_rows": list(observation_rows(tasks)),
@@ -86,17 +88,17 @@ def set_context(tasks: TaskSet) -> dict[str, Any]:
     }
 
 
-def _robot(tasks: TaskSet) -> dict[str, Any]:
-    """Variables of the robot and its worlds."""
-    file = in_shown_units(tasks.file)
-    robot = file.robot
+def _robot(tasks: TaskSet, file: SetFile) -> dict[str, Any]:
+    """Variables of the robot and its worlds; `file` is in the shown units."""
+    robot, own = file.robot, tasks.file.robot
     if not isinstance(robot, EPuckRobotParams):
+        assert isinstance(own, RobotParams)
         return {
             "robot": robot,
             "turn": 2.0 * file.full_step / robot.axle_length,
             "rays": _rays(robot),
             "side": tasks.largest_side * file.per_unit,
-            "limits": list(limit_lines(file)),
+            "limits": robot_lines(own, _units(file)),
         }
     floors = [each for each in file.worlds if isinstance(each, Plates)]
     table = TABLE.tolist()
@@ -113,6 +115,12 @@ def _robot(tasks: TaskSet) -> dict[str, Any]:
         "readings": ", ".join(f"{1e3 * row[0]:g}: {row[1]:g}" for row in table),
         "nothing": f"{table[-1][1]:g}",
     }
+
+
+def _units(file: SetFile) -> MapUnits:
+    if file.resolution is None:
+        return PIXELS
+    return MapUnits(MapFrame(1, file.resolution, (0.0, 0.0, 0.0)))
 
 
 def _rays(robot: RobotParams) -> str:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from tdac_agent.environments.map2d.moving import sentence_on
-from tdac_agent.environments.map2d.robot_lines import robot_lines
 from tdac_agent.environments.map2d.setting import Map2DSetting, map_setting
 from tdac_agent.prompting.manual import interface_of, needed_part
 from tdac_agent.prompting.params_text import params_text
+from tdac_agent.prompting.robot_lines import robot_lines
 from tdac_agent.tasks.task import SENSORS_FILE, Task
 from tdac_envs.drive.task import radii_text
 from tdac_envs.map2d.terrain import widest_connected_radius
@@ -67,7 +67,7 @@ def facts_of(task: Task) -> dict[str, Any]:
             _not_needed(setting),
         ),
         "length": setting.task_units.length,
-        "robot_lines": robot_lines(task, setting),
+        "robot_lines": _robot_lines(task, setting),
         "frame": setting.params.frame,
         **({} if setting.view is None else _in_metres(setting)),
     }
@@ -88,3 +88,12 @@ def _in_metres(setting: Map2DSetting) -> dict[str, str]:
         "env_description": METRES,
         "observation_table": f"{table.replace('px', 'm')}\n\n{rays}",
     }
+
+
+def _robot_lines(task: Task, setting: Map2DSetting) -> list[str]:
+    """Sentences on what not every robot has: limits, scanner, errors."""
+    lines = robot_lines(setting.nominal.robot, setting.task_units)
+    if task.says_disturbances:
+        own = task.own_disturbance()
+        lines.append(f"When the controller is confirmed, there are also: {own}.")
+    return lines

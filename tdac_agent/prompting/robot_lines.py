@@ -1,9 +1,9 @@
-"""What a prompt says of a robot's limits, scanner and disturbances."""
+"""What a prompt says of a robot's limits and scanner."""
 
 from __future__ import annotations
 
-from tdac_agent.environments.map2d.setting import Map2DSetting
-from tdac_agent.tasks.task import Task
+from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.mapping.params import RobotParams
 
 _BELOW = {
     "range_max": "`range_max`",
@@ -12,9 +12,14 @@ _BELOW = {
 }
 
 
-def robot_lines(task: Task, setting: Map2DSetting) -> list[str]:
-    """Returns a sentence for each limit and error that not every robot has."""
-    robot, length = setting.nominal.robot, setting.task_units.length
+def robot_lines(robot: RobotParams, units: MapUnits) -> list[str]:
+    """Returns a sentence for each limit that not every robot has.
+
+    Args:
+        robot: The robot, in px.
+        units: Units of the sentences.
+    """
+    length = units.length
     lines = []
     if robot.max_speed or robot.max_turn_rate:
         limits = [
@@ -52,7 +57,4 @@ def robot_lines(task: Task, setting: Map2DSetting) -> list[str]:
             f"{'ahead of' if ahead >= 0 else 'behind'} the centre"
             + (f" and {length(abs(aside), 3)} to its {side}." if aside else ".")
         )
-    if task.says_disturbances:
-        own = task.own_disturbance()
-        lines.append(f"When the controller is confirmed, there are also: {own}.")
     return lines
