@@ -123,7 +123,7 @@ class Units:
     def figure(self, length: float) -> str:
         """Formats a length of the environment with at least three digits: `12.5 px`."""
         if self.shown is not None:
-            return self.shown.length(length)
+            return self.shown.length(length * self.scale)
         shown = length * self.scale
         return f"{shown:.3g} {self.length}" if shown < 100 else self.length_text(length)
 

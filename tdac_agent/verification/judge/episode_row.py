@@ -15,6 +15,7 @@ from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.diagnosis import diagnose
 from tdac_agent.verification.diagnosis.gap import Gap
+from tdac_agent.verification.diagnosis.losses import Losses, losses_of
 from tdac_agent.verification.diagnosis.measures import spectral_arc_length
 from tdac_agent.verification.diagnosis.nearest import gap_of
 from tdac_agent.verification.diagnosis.report import Cause
@@ -46,6 +47,9 @@ class EpisodeRow(StrictRecord):
     )
     path_score: float = Field(0.0, description="Success weighted by path length, SPL.")
     barn_score: float = Field(0.0, description="Score of BARN, at most 0.5.")
+    lost: Losses | None = Field(
+        None, description="Where 1 - time score was lost; None on older records."
+    )
     seconds: float | None = Field(None, description="Simulated time.")
     driven: float | None = Field(None, description="Length of the driven path.")
     d0: float | None = Field(None, description="Remaining path at the start.")
@@ -183,6 +187,13 @@ def driven_row(
         outcome=rollout.outcome,
         collisions=rollout.collisions,
         horizon=task.horizon,
+        lost=losses_of(
+            trajectory,
+            task.full_step,
+            2.0 * task.full_step / task.axle_length,
+            facts["least_steps"],
+            success=success,
+        ),
         seconds=round(steps * trajectory.dt, _DIGITS),
         d0=round(float(distances[0]), digits),
         d_min=round(float(distances.min()), digits),
