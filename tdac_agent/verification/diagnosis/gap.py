@@ -46,7 +46,7 @@ def gap_figure(length: float, units: Units) -> str:
     """Formats a gap with three digits: `0.412 px`, `6.13 mm`."""
     if units.shown is None:
         return units.figure(length)
-    shown, name = length * units.shown.per_pixel, units.shown.name
+    shown, name = length * units.scale * units.shown.per_pixel, units.shown.name
     if name == "m" and shown < _SMALL:
         shown, name = 1000.0 * shown, "mm"
     return f"{shown:.3g} {name}"

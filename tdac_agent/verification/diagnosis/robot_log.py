@@ -31,8 +31,9 @@ LEAST_LOOKS, LEAST_RATIOS = 4, 30
 MOST_RAYS = 9
 """Most readings that get a direction of their own."""
 _AGREE = math.radians(25.0)
-_OFF = 0.3
-"""A reading that differs more from the distance is of something else."""
+_OFF, _NEAR = 0.3, 0.08
+"""A reading that differs more from the distance is of something else, or of another
+side of it."""
 
 
 @dataclass(slots=True)
@@ -80,7 +81,7 @@ class RobotLog:
 
     def _add_touch(self, trajectory: Trajectory, around: Surroundings) -> None:
         if trajectory.collisions and trajectory.movers is None:
-            reach = 0.5 * around.radius
+            reach = 1.5 * around.radius
             touch = around.touch(Pose(*trajectory.poses[-1].tolist()), reach)
             if touch is not None:
                 self._touches.append(touch.gap + around.radius)
@@ -100,8 +101,9 @@ class RobotLog:
                 continue
             ray = int(row.argmin())
             ratio = float(row[ray]) / ((touch.gap + radius) * per)
-            if abs(ratio - 1.0) < _OFF:
+            if abs(ratio - 1.0) < _NEAR:
                 self._bearings[ray].append(touch.bearing)
+            if abs(ratio - 1.0) < _OFF:
                 self._ratios.append(ratio)
 
     def _reading_lines(self, units: Units) -> list[str]:

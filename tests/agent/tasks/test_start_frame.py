@@ -9,6 +9,7 @@ from tdac_agent.environments.epuck.surroundings import WorldSurroundings
 from tdac_agent.environments.map2d.surroundings import MapSurroundings
 from tdac_agent.tasks.start_frame import StartFrame
 from tdac_agent.tasks.units import METRES, PIXELS
+from tdac_agent.verification.diagnosis.gap import gap_figure
 from tdac_envs import load_set
 from tdac_envs.drive.task import Pose
 from tdac_envs.ladder.observed import SetView
@@ -75,3 +76,10 @@ def test_mixed_up_goals_are_those_of_the_frame():
     assert frame.coordinates(*mistakes["x and y swapped"]) == pytest.approx((y, x))
     left = frame.coordinates(*mistakes["y counted to the left"])
     assert left == pytest.approx((x, -y))
+
+
+def test_lengths_in_the_frame_of_a_start():
+    """A length of an environment in metres stays one: 6 mm are not 6 micrometres."""
+    units = METRES.from_start(StartFrame.of(Pose(1.0, 2.0, 0.0), METRES))
+    assert units.figure(0.0061) == "0.0061 m"
+    assert gap_figure(0.0061, units) == "6.1 mm"

@@ -66,12 +66,14 @@ def test_wheels(late, units):
         for side in ("left", "right")
     )
     assert [*left, *right] == pytest.approx([0.9, 1.1, 0.9, 1.1], abs=0.02)
-    turn = float(re.search(r"turns by ([\d.]+)°", text)[1])
+    turn = float(re.search(r"on the spot by ([\d.]+)°", text)[1])
     assert turn == pytest.approx(np.degrees(2.0 * 3.0 / 9.0), rel=0.02)
     sense = "left" if units.up else "right"
-    assert f"headings and turns to the {sense} are positive" in text
+    assert (
+        f"headings and turns to the {sense} are positive; y is to the {sense}" in text
+    )
     step = float(re.search(r"\(1, 1\) drives ([\d.e+]+)", text)[1])
-    assert step == pytest.approx(3.0 * units.scale, rel=0.02)
+    assert step == pytest.approx(3.0 * units.scale, rel=0.02)  # px or mm
 
 
 def test_acceleration():
