@@ -18,8 +18,8 @@ class Losses(StrictRecord):
 
     After a success in T steps, each step costs 1/T. What is left of a step beyond its
     motion at full speed is lost by standing, turning on the spot, or driving slower.
-    Of the path at full speed, what exceeds the least possible one is lost by driving
-    backwards and by a detour.
+    Of the path at full speed, what exceeds the least possible one is lost by reversing,
+    up to the path in the rarer direction, and by a detour.
     """
 
     failure: float = Field(0.0, description="1 if the goal was not reached.")
@@ -27,7 +27,7 @@ class Losses(StrictRecord):
     standing: float = Field(0.0, description="Steps almost without motion.")
     turning: float = Field(0.0, description="Turns on the spot.")
     slower: float = Field(0.0, description="Driving, but not at full speed.")
-    reversing: float = Field(0.0, description="Driving backwards.")
+    reversing: float = Field(0.0, description="Driving forwards and backwards.")
 
     @property
     def total(self) -> float:
@@ -66,8 +66,9 @@ def losses_of(
     rest = 1.0 - np.abs(used)
     idle = {name: float(rest[kinds == name].sum()) for name in IDLE}
     beyond = float(np.abs(used).sum()) - least_steps
-    backwards = float(np.abs(used[used < 0.0]).sum())
-    lost = {**idle, "reversing": min(backwards, max(beyond, 0.0))}
+    # A robot may drive backwards all the way; changing between the two is lost.
+    ways = (float(np.abs(used[used * sign > 0.0]).sum()) for sign in (1.0, -1.0))
+    lost = {**idle, "reversing": min(*ways, max(beyond, 0.0))}
     if beyond < 0.0:  # a way at the very limit: only rest is lost
         whole = sum(idle.values())
         lost = {

@@ -48,6 +48,7 @@ STOP, SPIN = (0.0, 0.0), (0.0, TURN)
         ([FULL] * 10 + [SPIN] * 10, "turning"),
         ([HALF] * 20, "slower"),
         ([FULL] * 20, "detour"),
+        ([BACK] * 20, "detour"),
         ([FULL] * 10 + [BACK] * 10, "reversing"),
     ],
 )
