@@ -1,9 +1,8 @@
 """The interface of a controller writer: a language model or `builtin`.
 
-The public names of `tdac_agent.models.provider` and `picture`.
+The public names of `tdac_agent.models.provider`.
 """
 
-from tdac_agent.models.picture import Picture
 from tdac_agent.models.provider import (
     ANSWER_SECONDS,
     MAX_OUTPUT_TOKENS,
@@ -25,7 +24,6 @@ __all__ = [
     "MAX_OUTPUT_TOKENS",
     "Kind",
     "PermanentFault",
-    "Picture",
     "Provider",
     "ProviderFault",
     "RateLimited",

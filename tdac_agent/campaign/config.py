@@ -92,7 +92,7 @@ class CampaignConfig(StrictModel):
     options: dict[str, JsonValue] = Field(
         {},
         description="Further options of `tdac synth`, by the names of their flags with "
-        "_ for -, such as `candidates`, `improve` and `vision`.",
+        "_ for -, such as `candidates` and `improve`.",
     )
     max_cost: float | None = Field(None, ge=0, description="Limit for all runs, USD.")
     max_tokens: int | None = Field(None, ge=0, description="Token limit for all runs.")

@@ -125,7 +125,6 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
         patience=cell.patience,
         candidates=further.candidates,
         refine=cell.refine,
-        vision=further.vision,
         variations=shares(cell.episodes, further.improve).asked,
         base_url=cell.base_url,
         max_output=cell.max_output,

@@ -17,7 +17,6 @@ from tdac_agent.models.vendors import vendor_of
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 from tdac_agent.synthesis.options import SynthOptions
-from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.synthesis.synthesize import book_of
 from tdac_agent.synthesis.workload import shares
 
@@ -30,7 +29,6 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
         check_name(name)
     template, book = load_template(options.prompt), book_of(options.rules)
     problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
-    checked_vision(options.vision, names[1], options.patience, options.improve)
     server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]
     episodes = options.episodes if problem.has_hidden else None
@@ -43,7 +41,6 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
         patience=options.patience,
         candidates=options.candidates,
         refine=options.refine,
-        vision=options.vision,
         variations=shares(episodes, options.improve).asked,
         base_url=options.base_url,
         max_output=options.max_output,
@@ -77,10 +74,7 @@ def _estimates(forecast: CostForecast) -> list[str]:
     whole = f"whole run: {forecast.questions} questions (K={k}, J={j}"
     if forecast.variations:
         whole += f", and {forecast.variations} to improve what works"
-    whole += ")"
-    if forecast.pictures:
-        whole += f" with {forecast.pictures} pictures"
-    whole += " if no controller passes"
+    whole += ") if no controller passes"
     if forecast.variations:
         whole += " before the last one"
     if forecast.cost_once is not None and forecast.cost_most is not None:

@@ -35,7 +35,6 @@ from tdac_agent.runs.resume import (
 )
 from tdac_agent.runs.run_record import AGENT, RUN_FILE, Run, load_run
 from tdac_agent.synthesis.options import SynthOptions
-from tdac_agent.synthesis.setup import checked_vision
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task import Task, display_name
@@ -176,7 +175,6 @@ def check_models(options: SynthOptions) -> None:
     """Checks the models of a new run before its task is loaded; see `check_ready`."""
     learner = str(options.learner)
     names = [learner, str(options.optimizer or learner)]
-    checked_vision(options.vision, names[1], options.patience, options.improve)
     limits = (*RECORDED, "key_over_http")
     check_ready(names, {name: getattr(options, name) for name in limits})
 

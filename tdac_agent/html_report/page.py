@@ -19,7 +19,6 @@ from tdac_agent.html_report.overview import format_seconds, overview_of
 from tdac_agent.html_report.scene import TaskPicture, scene_of
 from tdac_agent.html_report.section import (
     grouped_failures,
-    question_picture,
     section_of,
 )
 from tdac_agent.models.budget import format_usd
@@ -167,7 +166,6 @@ def _environment() -> jinja2.Environment:
         "gap_text": gap_text,
         "too_close_text": too_close_text,
         "learner": learner_named,
-        "picture": question_picture,
         "python": highlighted,
         "shortened": shortened,
         "test": short_test,

@@ -12,28 +12,23 @@ from tdac_agent.errors import RunError
 from tdac_agent.html_report.animation import animations
 from tdac_agent.html_report.figures import drawn
 from tdac_agent.html_report.overview import format_seconds
-from tdac_agent.html_report.scene import TaskPicture, data_address
+from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.html_report.set_part import set_part_of
 from tdac_agent.models.budget import format_usd
-from tdac_agent.models.picture import MEDIA_TYPE, PNG_SIGNATURE
-from tdac_agent.models.picture import MOST_BYTES as MOST_PICTURE_BYTES
-from tdac_agent.models.provider import PICTURED
 from tdac_agent.plots import plot_breakdown
-from tdac_agent.runs.history import CandidateHistory, RunHistory, learner_named
+from tdac_agent.runs.history import RunHistory, learner_named
 from tdac_agent.runs.improvement_record import read_improvement
 from tdac_agent.runs.resume import resume_line
 from tdac_agent.runs.run_record import (
     AGENT,
     GIVEN_FILE,
     GIVEN_RULES_FILE,
-    PICTURE_FILE,
     PROMPT_FILE,
 )
 from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
-from tdac_envs.core.intake import read_file
 from tdac_envs.ladder.frozen import BEFORE
 
 DIFF_LINES = (100, 600)
@@ -129,20 +124,6 @@ def grouped_failures(report: Report) -> list[FailureGroup]:
     return rows
 
 
-def question_picture(candidate: CandidateHistory) -> str | None:
-    """The picture that went with the question for a candidate, as a data URL."""
-    for kind in PICTURED:
-        try:
-            content = read_file(
-                candidate.folder / f"{kind}.{PICTURE_FILE}", MOST_PICTURE_BYTES
-            )
-        except OSError:
-            continue
-        if content.startswith(PNG_SIGNATURE):
-            return data_address(content, MEDIA_TYPE)
-    return None
-
-
 def spent(history: RunHistory) -> str:
     """Tokens and cost of a run, as text."""
     run = history.run
@@ -218,7 +199,7 @@ def _commands(history: RunHistory, name: str) -> Iterator[tuple[str, str]]:
         "--rules": f"{name}/{GIVEN_RULES_FILE}" if run.given_rules else None,
         "--candidates": run.candidates if run.candidates > 1 else None,
     }
-    limits = _flags(flags) + ["--vision"] * run.vision
+    limits = _flags(flags)
     kept = (run.folder / PROMPT_FILE).is_file()
     prompt = f"{name}/{PROMPT_FILE}" if kept else run.prompt
     own: dict[str, object] = {

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tdac_agent.html_report.scene import data_address
-from tdac_agent.models.picture import MEDIA_TYPE
 from tdac_agent.runs.history import RunHistory
 from tdac_agent.runs.ownership import remark_on
 from tdac_agent.runs.run_record import candidate_at
@@ -128,5 +127,5 @@ def _drawn(tasks: TaskSet, driven: list[_Driven]) -> Iterator[DrawnFailure]:
         causes = {name: str(each.cause or each.outcome) for name, each in named}
         place = folder / "trajectories"
         for name, picture in world_pictures(tasks, named, place, SIDE):
-            address = data_address(picture.png, MEDIA_TYPE)
+            address = data_address(picture, "image/png")
             yield DrawnFailure(name, causes[name], address)

@@ -9,7 +9,6 @@ from tdac_agent.environments.map2d.pictures import MapPictures
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.errors import RunError
 from tdac_agent.mcp.answers import Refused
-from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.problems.problem import Problem
 from tdac_agent.runs.world_pictures import world_pictures
 from tdac_agent.synthesis.candidates import Candidate
@@ -23,6 +22,8 @@ from tdac_envs.mapping.map_folder import png
 
 FEEDBACK = "feedback-1"
 """Subfolder with the episodes of a submission for a task set."""
+LARGEST_SIDE = 1024
+"""Most width and height of the picture of a failure, px."""
 
 
 def draw(problem: Problem, submission: Candidate, episode: str) -> bytes:
@@ -62,7 +63,7 @@ def _of_task(task: Task, submission: Candidate, episode: str) -> bytes:
 
 
 def _of_world(tasks: TaskSet, submission: Candidate, episode: str) -> bytes:
-    """A failure as models see it; a success with its whole path."""
+    """A failure as reports show it; a success with its whole path."""
     episodes = [each for report in submission.feedback for each in report.episodes]
     known = {str(each.number): each for each in episodes}
     figures = known.get(episode.strip().lower().removeprefix("world").strip())
@@ -73,7 +74,7 @@ def _of_world(tasks: TaskSet, submission: Candidate, episode: str) -> bytes:
         submission.folder / FEEDBACK / TRAJECTORIES,
     )
     failed = world_pictures(tasks, [(name, figures)], folder, LARGEST_SIDE)
-    drawn = next((picture.png for _, picture in failed), None)
+    drawn = next((picture for _, picture in failed), None)
     if drawn is not None:
         return drawn
     trajectory = _trajectory(folder / f"{figures.number}.npz", name)

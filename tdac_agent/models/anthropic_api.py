@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from tdac_agent.models.bounds import check_count
 from tdac_agent.models.faults import as_faults
-from tdac_agent.models.picture import MEDIA_TYPE, Picture
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.streamed import Stop, StreamedAnswer
 from tdac_agent.models.vendor_model import VendorModel
@@ -14,11 +13,7 @@ from tdac_agent.models.vendors import VENDORS
 
 if TYPE_CHECKING:
     import anthropic
-    from anthropic.types import (
-        ImageBlockParam,
-        RawMessageStreamEvent,
-        TextBlockParam,
-    )
+    from anthropic.types import RawMessageStreamEvent, TextBlockParam
 
 STOPS: dict[str, Stop] = {
     "end_turn": "end",
@@ -52,28 +47,14 @@ class AnthropicModel(VendorModel["anthropic.Anthropic"]):
             return gathered.reply()
 
 
-def _content(request: Request) -> list[TextBlockParam | ImageBlockParam]:
-    """Returns the prompt's parts; the stable one is marked for caching.
-
-    Pictures follow it, since a cached part ends where a question differs from others.
-    """
+def _content(request: Request) -> list[TextBlockParam]:
+    """Returns the prompt's parts; the stable one is marked for caching."""
     blocks: list[TextBlockParam] = [
         {"type": "text", "text": part} for part in request.parts
     ]
     if len(blocks) > 1:
         blocks[0]["cache_control"] = {"type": "ephemeral"}
-    return [*blocks[:-1], *map(_image, request.images), *blocks[-1:]]
-
-
-def _image(picture: Picture) -> ImageBlockParam:
-    return {
-        "type": "image",
-        "source": {
-            "type": "base64",
-            "media_type": MEDIA_TYPE,
-            "data": picture.base64,
-        },
-    }
+    return blocks
 
 
 def _add_event(gathered: StreamedAnswer, event: RawMessageStreamEvent) -> None:

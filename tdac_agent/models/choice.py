@@ -53,9 +53,6 @@ WITHOUT_TASK = frozenset({"command", "replay"})
 """Providers, besides vendors, that can be made before the task is known, without side
 effects."""
 
-BLIND = frozenset({"builtin", "scripted"})
-"""Providers that ignore pictures; a replay needs them, to find the same questions."""
-
 
 @dataclass(frozen=True, slots=True)
 class Options:

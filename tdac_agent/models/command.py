@@ -65,8 +65,8 @@ class Command:
 
     def complete(self, request: Request) -> Reply:
         """Answers one request; see `Provider`."""
-        prompt = request.prompt_naming(lambda picture: str(picture.file))
-        answer = self._run(prompt.encode("utf-8", "replace"), request.seconds)
+        prompt = request.prompt.encode("utf-8", "replace")
+        answer = self._run(prompt, request.seconds)
         return Reply(without_secrets(check_length(decode_answer(answer))))
 
     def _run(self, prompt: bytes, seconds: float) -> bytes:

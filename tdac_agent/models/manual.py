@@ -40,8 +40,7 @@ class Manual:
     """A provider that waits for `NNN.reply.md` without a time limit; see `Provider`.
 
     A question that is already in the folder keeps its number, so that a restarted run
-    finds the earlier answers. `Request.repeat` tells identical questions apart. A
-    picture is beside its question, as `NNN.picture.png`.
+    finds the earlier answers. `Request.repeat` tells identical questions apart.
 
     Args:
         folder: Folder of the questions and answers.
@@ -69,29 +68,17 @@ class Manual:
     def _number(self, request: Request) -> int:
         """Returns the number of a question; writes the question if it is new."""
         repeat = request.repeat
+        question = request.prompt.encode("utf-8", "surrogatepass")
         for number in itertools.count(1):
             path = self._folder / f"{number:03}.prompt.md"
-            files = self._files(request, number)
             if not path.exists():
-                for file, content in files.items():
-                    write_atomic(file, content)
+                write_atomic(path, question)
                 return number
-            if all(_has(file, content) for file, content in files.items()):
+            if read_file(path, RECORD_BYTES) == question:
                 if repeat == 0:
                     return number
                 repeat -= 1
         raise AssertionError("unreachable")
-
-    def _files(self, request: Request, number: int) -> dict[Path, bytes]:
-        """The files of a question; the prompt, which names the others, is last."""
-        names = {
-            picture: f"{number:03}.picture{f'-{n}' if n > 1 else ''}.png"
-            for n, picture in enumerate(request.images, 1)
-        }
-        files = {self._folder / name: image.png for image, name in names.items()}
-        prompt = request.prompt_naming(names.__getitem__)
-        path = self._folder / f"{number:03}.prompt.md"
-        return {**files, path: prompt.encode("utf-8", "surrogatepass")}
 
     def _announce(self, number: int, reply: Path, *, exists: bool) -> None:
         """Prints which answer is awaited, or which existing one is used."""
@@ -111,8 +98,3 @@ class Manual:
                 return check_length(decode_answer(now))
             before = now
             time.sleep(self._poll)
-
-
-def _has(path: Path, content: bytes) -> bool:
-    """Whether a file has this content."""
-    return path.exists() and read_file(path, RECORD_BYTES) == content

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from tdac_agent.models.bounds import check_count
 from tdac_agent.models.faults import as_faults
-from tdac_agent.models.picture import MEDIA_TYPE, Picture
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.streamed import Stop, StreamedAnswer
 from tdac_agent.models.vendor_model import VendorModel
@@ -14,12 +13,7 @@ from tdac_agent.models.vendors import VENDORS
 
 if TYPE_CHECKING:
     import openai
-    from openai.types.chat import (
-        ChatCompletionChunk,
-        ChatCompletionContentPartImageParam,
-        ChatCompletionContentPartParam,
-        ChatCompletionContentPartTextParam,
-    )
+    from openai.types.chat import ChatCompletionChunk
 
 STOPS: dict[str, Stop] = {
     "stop": "end",
@@ -44,7 +38,7 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
         with as_faults((openai.OpenAIError, httpx2.HTTPError)):
             with client.chat.completions.create(
                 model=self._model,
-                messages=[{"role": "user", "content": _content(request)}],
+                messages=[{"role": "user", "content": request.prompt}],
                 max_completion_tokens=request.max_tokens if is_openai else openai.omit,
                 max_tokens=openai.omit if is_openai else request.max_tokens,
                 stream=True,
@@ -54,25 +48,6 @@ class OpenAIModel(VendorModel["openai.OpenAI"]):
                 for chunk in stream:
                     _add_chunk(gathered, chunk)
             return gathered.reply()
-
-
-def _content(request: Request) -> str | list[ChatCompletionContentPartParam]:
-    """Returns the prompt; with pictures, its parts.
-
-    Pictures follow the stable part, since a cached part ends where a question differs
-    from others.
-    """
-    if not request.images:
-        return request.prompt
-    texts: list[ChatCompletionContentPartTextParam] = [
-        {"type": "text", "text": part} for part in request.parts
-    ]
-    return [*texts[:-1], *map(_image, request.images), *texts[-1:]]
-
-
-def _image(picture: Picture) -> ChatCompletionContentPartImageParam:
-    url = f"data:{MEDIA_TYPE};base64,{picture.base64}"
-    return {"type": "image_url", "image_url": {"url": url, "detail": "high"}}
 
 
 def _add_chunk(gathered: StreamedAnswer, chunk: ChatCompletionChunk) -> None:

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, cast
 
-from tdac_agent.models.picture import Picture
 from tdac_agent.verification.diagnosis.report import Report
 
 Kind = Literal["generate", "edit", "summarise", "improve"]
 Role = Literal["learner", "optimizer"]
-PICTURED: tuple[Kind, ...] = ("edit", "improve")
-"""Kinds of questions that a picture may go with."""
 MAX_OUTPUT_TOKENS = 16_000
 """Limit of an answer, thinking included; doubled after a truncated answer."""
 ANSWER_SECONDS = 900.0
@@ -37,8 +33,6 @@ class Request:
         seconds: Time limit of the answer.
         turn: Number of earlier questions of this kind for this candidate.
         repeat: Number of earlier questions with the same prompt in this run.
-        images: Pictures that go with the prompt, which names them; a provider that
-            cannot show them ignores them.
     """
 
     kind: Kind
@@ -52,7 +46,6 @@ class Request:
     seconds: float = ANSWER_SECONDS
     turn: int = 0
     repeat: int = 0
-    images: tuple[Picture, ...] = ()
 
     @property
     def role(self) -> Role:
@@ -64,17 +57,6 @@ class Request:
         """The stable beginning of the prompt and the rest; empty parts are left out."""
         halves = (self.prompt[: self.stable], self.prompt[self.stable :])
         return tuple(part for part in halves if part)
-
-    def prompt_naming(self, place: Callable[[Picture], str]) -> str:
-        """Returns the prompt with other names of its pictures.
-
-        Args:
-            place: Where a picture is, for whoever reads the prompt.
-        """
-        prompt = self.prompt
-        for picture in self.images:
-            prompt = prompt.replace(picture.name, place(picture))
-        return prompt
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,8 @@ from tdac_agent.models.provider import (
     missing_for,
     served_at,
 )
-from tdac_agent.models.tokens import most_tokens, picture_tokens
-from tdac_agent.models.vendors import MOST_PICTURE_TOKENS, vendor_of
+from tdac_agent.models.tokens import most_tokens
+from tdac_agent.models.vendors import vendor_of
 
 MAX_COST = 2.0
 """Default limit of a run, USD."""
@@ -34,19 +34,16 @@ class Tariff:
     Attributes:
         free: Whether no language model is asked at all.
         price: Price of the model; None if it is unknown.
-        picture_tokens: Most tokens of a picture.
     """
 
     free: bool = False
     price: Price | None = None
-    picture_tokens: int = MOST_PICTURE_TOKENS
 
     def worst(self, request: Request) -> Amount:
         """Returns the worst-case amount of an answer."""
         if self.free:
             return NOTHING
-        pictures = len(request.images) * self.picture_tokens
-        return self.most(most_tokens(request.prompt) + pictures, request.max_tokens)
+        return self.most(most_tokens(request.prompt), request.max_tokens)
 
     def most(self, tokens_in: int, tokens_out: int) -> Amount:
         """Returns the highest amount for these tokens, cached or not."""
@@ -85,8 +82,7 @@ def tariffs_of(models: Iterable[Provider]) -> dict[str, Tariff]:
 def _tariff(model: Provider) -> Tariff:
     if not model.paid:
         return Tariff(free=True)
-    price = load_prices().price_of(model.name, served_at(model))
-    return Tariff(price=price, picture_tokens=picture_tokens(model.name))
+    return Tariff(price=load_prices().price_of(model.name, served_at(model)))
 
 
 def bounds_of(

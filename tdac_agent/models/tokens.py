@@ -4,18 +4,10 @@ from __future__ import annotations
 
 import math
 
-from tdac_agent.models.vendors import MOST_PICTURE_TOKENS, vendor_of
-
 WRAPPING = 64
 """Tokens that a vendor may add to a prompt."""
 BYTES_PER_TOKEN = 3.0
 """Prose has about four, code and numbers about three; a lower value is safer."""
-
-
-def picture_tokens(model: str) -> int:
-    """Returns the upper bound of the tokens of a picture, by the name of the model."""
-    vendor = vendor_of(model)
-    return MOST_PICTURE_TOKENS if vendor is None else vendor.picture_tokens
 
 
 def estimate_tokens(text: str) -> int:

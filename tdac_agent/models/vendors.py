@@ -13,18 +13,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-MOST_PICTURE_TOKENS = 25_600
-"""Upper bound of the tokens of a picture of 1024 x 1024 px, for all vendors.
-
-At OpenAI, models that count 32 x 32 px take at most 2.46 x 1,024 = 2,520; the others
-scale the shorter side to 768 px and count 512 x 512 px, here at most four times 170,
-and with gpt-4o-mini 2,833 + 4 x 5,667 = 25,501
-(developers.openai.com/api/docs/guides/images-vision).
-"""
-ANTHROPIC_PICTURE_TOKENS = 1_600
-"""Anthropic counts a token for each 28 x 28 px, 1,369, or for 750 px, 1,399, and at
-most about 1,600 (platform.claude.com/docs/en/build-with-claude/vision)."""
-
 
 @dataclass(frozen=True, slots=True)
 class Api:
@@ -54,7 +42,6 @@ class Vendor:
         api: How its models are asked.
         example: Example of a model ID.
         url: URL of its server; None for the one that the package knows.
-        picture_tokens: Upper bound of the tokens of a picture of 1024 x 1024 px.
         serves: Words that the studio adds to "a model of COMPANY".
     """
 
@@ -63,7 +50,6 @@ class Vendor:
     api: Api
     example: str
     url: str | None = None
-    picture_tokens: int = MOST_PICTURE_TOKENS
     serves: str = ""
 
     @property
@@ -97,13 +83,7 @@ OPENAI = Api(
 VENDORS = {
     each.name: each
     for each in (
-        Vendor(
-            "anthropic",
-            "Anthropic",
-            ANTHROPIC,
-            example="claude-sonnet-5-5",
-            picture_tokens=ANTHROPIC_PICTURE_TOKENS,
-        ),
+        Vendor("anthropic", "Anthropic", ANTHROPIC, example="claude-sonnet-5-5"),
         Vendor(
             "openai",
             "OpenAI",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jinja2
 from jinja2.sandbox import ImmutableSandboxedEnvironment
@@ -22,27 +22,9 @@ from tdac_agent.tasks.task import Task
 from tdac_envs.core.errors import TdacError
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
-if TYPE_CHECKING:
-    from tdac_agent.verification.diagnosis.model_picture import FailurePicture
-
 VARIANTS = ("full", "underspecified")
 ONE_TASK = "this map or world"
 """What the scope `task` of a rule means in a run on one task."""
-
-
-@dataclass(frozen=True, slots=True)
-class NamedPicture:
-    """A picture that goes with a question, for its template.
-
-    Attributes:
-        name: Name of its file.
-        shown: The picture.
-        on_set: Whether it shows a world of a task set.
-    """
-
-    name: str
-    shown: FailurePicture
-    on_set: bool
 
 
 class PromptError(TdacError):
@@ -186,7 +168,6 @@ def repair_question(
     unchanged: bool = False,
     scope: str = ONE_TASK,
     aim: str = "",
-    picture: NamedPicture | None = None,
 ) -> str:
     """Returns the prompt to edit a controller, to improve it, or to learn rules.
 
@@ -200,7 +181,6 @@ def repair_question(
         unchanged: Whether the last edit returned the same code.
         scope: What the scope `task` of a rule means.
         aim: What an improved controller shall do better.
-        picture: The picture that goes with the question.
     """
     return (
         _templates()
@@ -214,7 +194,6 @@ def repair_question(
             unchanged=unchanged,
             scope=scope,
             aim=aim,
-            picture=picture,
             most_operations=MAX_OPERATIONS,
             longest_rule=MAX_RULE_CHARS,
         )

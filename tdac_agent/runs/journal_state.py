@@ -42,8 +42,6 @@ def call_key(model: Provider, request: Request) -> str:
         "sample": request.sample,
         "turn": request.turn,
     }
-    if request.images:
-        facts["images"] = [image.sha256 for image in request.images]
     return sha256_of_json(facts)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.models.budget import Amount, Enough
-from tdac_agent.models.provider import Kind, Reply, Request
+from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.retry import FailedCall
 from tdac_agent.problems.problem import Problem
 from tdac_agent.prompting.prompt import PromptTemplate
@@ -22,7 +22,6 @@ from tdac_agent.runs.ownership import suite_in
 from tdac_agent.runs.run_record import (
     GIVEN_FILE,
     GIVEN_RULES_FILE,
-    PICTURE_FILE,
     PROMPT_FILE,
     RULES_FILE,
     RUN_FILE,
@@ -63,7 +62,7 @@ class Recorder:
     _clock: float = field(default_factory=time.monotonic)
     _previous: str = ""
     _turns: Counter[tuple[str, int, int]] = field(default_factory=Counter)
-    _asked: Counter[tuple[str, ...]] = field(default_factory=Counter)
+    _asked: Counter[str] = field(default_factory=Counter)
     _files: Files = field(default_factory=Files)
     _journal: MarkedJournal = field(init=False)
 
@@ -141,19 +140,15 @@ class Recorder:
     def numbered(self, request: Request) -> Request:
         """The request with `turn` and `repeat`, counted from earlier requests."""
         _, k, j = request.sample
-        question = (request.prompt, *(image.sha256 for image in request.images))
-        turn, repeat = self._turns[request.kind, k, j], self._asked[question]
+        turn = self._turns[request.kind, k, j]
+        repeat = self._asked[request.prompt]
         self._turns[request.kind, k, j] += 1
-        self._asked[question] += 1
+        self._asked[request.prompt] += 1
         return replace(request, turn=turn, repeat=repeat)
 
     def asked(self, request: Request, model: str, key: str, reserved: Amount) -> None:
-        """Records a prompt and its pictures before they are sent to a model."""
+        """Records a prompt before it is sent to a model."""
         self._write_question(request)
-        images = [
-            {"file": image.name, "sha256": image.sha256, "caption": image.caption}
-            for image in request.images
-        ]
         self.event(
             "call.intent",
             **_about(request, key),
@@ -161,7 +156,6 @@ class Recorder:
             prompt=self._blobs.put(request.prompt),
             max_tokens=request.max_tokens,
             reserved=asdict(reserved),
-            **({"images": images} if images else {}),
         )
 
     def missed(
@@ -217,14 +211,7 @@ class Recorder:
             self.tell(record)
         return reply
 
-    def picture_file(self, kind: Kind, k: int, j: int) -> Path:
-        """Absolute path of the picture of a question about candidate (k, j)."""
-        return self._folder(k, j).absolute() / f"{kind}.{PICTURE_FILE}"
-
     def _write_question(self, request: Request) -> None:
-        # The prompt names the pictures.
-        for image in request.images:
-            write_if_changed(image.file, image.png)
         write_if_changed(self._call_file(request, "prompt"), request.prompt)
 
     def _count(self, request: Request, reply: Reply, cost: float | None) -> None:

@@ -61,7 +61,7 @@ CONFIGURATION = {
     "improve": "number of improving episodes",
 }
 
-NOT_TO_BE_RESUMED = {"version", "dynamics"}
+NOT_TO_BE_RESUMED = {"version", "dynamics", "vision"}
 """Fields that no option of a command restores, if the task is the same."""
 
 
@@ -216,7 +216,6 @@ def settings_of(run: Run) -> dict[str, Any]:
         "start_from": _text(folder) if initial.is_file() else None,
         "base_url": run.base_url,
         "refine": run.refine,
-        "vision": run.vision,
         "rules": book,
         "prompt": run.prompt if run.prompt in VARIANTS else str(prompt),
         "max_output": run.max_output,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -42,8 +43,6 @@ RULES_FILE = "rules.json"
 GIVEN_FILE = "given.py"
 GIVEN_RULES_FILE = "given_rules.md"
 PROMPT_FILE = "prompt.j2"
-PICTURE_FILE = "picture.png"
-"""Ending of the name of a question's picture, after its kind."""
 
 
 class Attempt(PrintableRecord):
@@ -118,7 +117,10 @@ class Run(PrintableRecord):
     prompt: str = Field("full", description="Template of the first question.")
     refine: bool = Field(True, description="Whether failures become rules.")
     vision: bool = Field(
-        False, description="Whether a picture of the failure goes with its feedback."
+        False,
+        exclude_if=operator.not_,
+        description="Whether pictures went with questions, as an option of earlier "
+        "versions said.",
     )
     max_output: int = Field(0, description="Token limit of an answer.")
     index: int = Field(0, description="Index among otherwise equal runs.")

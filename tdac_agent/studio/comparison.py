@@ -93,7 +93,6 @@ def _of_loop(run: Run) -> dict[str, str]:
         "candidates side by side": str(run.candidates),
         "failures become rules": yes[run.refine],
         "rules given at the start": str(len(run.given_rules)),
-        "pictures of failures": yes[run.vision],
         "maximum tokens per answer": str(run.max_output or NONE),
         "cost limit": limit,
         "begun with a controller": yes[run.given_sha256 is not None],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
@@ -12,7 +12,6 @@ from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.diagnosis.gap import Gap
-from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
@@ -114,10 +113,6 @@ class Figures:
         return all(a >= b for a, b in pairs) and any(a > b for a, b in pairs)
 
 
-def _nothing() -> None:
-    return None
-
-
 @dataclass(frozen=True, slots=True)
 class Explored:
     """What came of a candidate in the episodes of a search.
@@ -131,7 +126,6 @@ class Explored:
         seed: Seed of its jittered starts, if its tests had one.
         episodes: Number of episodes.
         feedback: How it failed in them; None if it never did.
-        picture: Draws such a failure; it returns None if there is none to draw.
     """
 
     figures: Figures | None
@@ -142,7 +136,6 @@ class Explored:
     seed: int | None = None
     episodes: int = 0
     feedback: str | None = None
-    picture: Callable[[], FailurePicture | None] = _nothing
 
 
 @dataclass(slots=True)

@@ -8,7 +8,7 @@ from tdac_agent.models.budget import NOTHING, Amount, Budget, BudgetExhausted
 from tdac_agent.models.prices import PriceList
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.models.tariff import MAX_COST, UNKNOWN_COST, UNPRICED_TOKENS, Tariff
-from tdac_agent.models.tokens import estimate_tokens, most_tokens, picture_tokens
+from tdac_agent.models.tokens import estimate_tokens, most_tokens
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.synthesis.dialogue import MAX_ASKS
 from tdac_agent.synthesis.workload import tokens_asked, whole
@@ -41,7 +41,6 @@ class CostForecast(PrintableRecord):
         description="Questions of the run, if no candidate passes before the last one."
     )
     variations: int = Field(description="Part of them that vary what works, at most.")
-    pictures: int = Field(description="Most pictures that go with them.")
     cost_once: float | None = Field(
         description="Maximum in USD if each first answer can be used."
     )
@@ -67,7 +66,6 @@ def cost_of(
     refine: bool = True,
     candidates: int = 1,
     variations: int = 0,
-    vision: bool = False,
     base_url: str | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
@@ -86,7 +84,6 @@ def cost_of(
         refine: Whether failures become rules.
         candidates: N, asked for side by side.
         variations: Most variations of what works (`most_variations`).
-        vision: Whether pictures go with questions to edit or improve a controller.
         base_url: URL of the models' server; by default the vendor's.
         max_output: Token limit of an answer.
         max_cost: Limit in USD; by default 2.
@@ -95,8 +92,6 @@ def cost_of(
     tokens = estimate_tokens(prompt)
     terms = {"candidates": candidates, "variations": variations}
     work = whole(iterations, patience, refine=refine, **terms)
-    pictures = whole(iterations, patience, refine=False, **terms).optimizer
-    pictures = pictures if vision else 0
     sizes = tokens_asked(tokens, max_output)
     prices_of = [prices.price_of(m, base_url) for m in (learner, optimizer)]
     first, second = prices_of
@@ -108,7 +103,6 @@ def cost_of(
         once, most = (
             work.learner * first.most(times * sizes.learner, out)
             + work.optimizer * second.most(times * sizes.optimizer, out)
-            + pictures * second.most(times * picture_tokens(optimizer), 0)
             for times, out in ((1, max_output), (MAX_ASKS, answers))
         )
     without = [
@@ -139,7 +133,6 @@ def cost_of(
         first_needs=_needed(Budget(limit, max_tokens), worst),
         questions=work.questions,
         variations=variations,
-        pictures=pictures,
         cost_once=once,
         cost_most=most,
         unknown_prices=tuple(dict.fromkeys(n for n in without if n not in own)),

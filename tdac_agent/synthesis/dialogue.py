@@ -6,9 +6,8 @@ import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from tdac_agent.models.picture import Picture
 from tdac_agent.models.provider import (
     Kind,
     Provider,
@@ -20,20 +19,12 @@ from tdac_agent.problems.problem import Problem
 from tdac_agent.prompting.extract import Answer, read_answer
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.given_rules import GIVEN, RUN_HEADING, written
-from tdac_agent.prompting.prompt import (
-    FULL,
-    NamedPicture,
-    PromptTemplate,
-    repair_question,
-)
+from tdac_agent.prompting.prompt import FULL, PromptTemplate, repair_question
 from tdac_agent.prompting.rule_answer import RuleAnswerError, apply, parse_operations
 from tdac_agent.prompting.rules import BEGIN, RuleBook
 from tdac_agent.storage.secrets import one_line
 from tdac_agent.synthesis.calls import Calls
 from tdac_agent.synthesis.side_by_side import side_by_side
-
-if TYPE_CHECKING:
-    from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 
 MAX_ASKS = 3
 MAX_EARLIER = 12
@@ -121,14 +112,7 @@ class Dialogue:
             return [ask() for ask in asking]
         return side_by_side(asking)
 
-    def edit(
-        self,
-        k: int,
-        j: int,
-        source: str,
-        failure: Feedback,
-        picture: FailurePicture | None = None,
-    ) -> ModelAnswer:
+    def edit(self, k: int, j: int, source: str, failure: Feedback) -> ModelAnswer:
         """Asks for a repaired controller, candidate (k, j).
 
         Args:
@@ -136,19 +120,11 @@ class Dialogue:
             j: Its edit.
             source: Source of the failed controller.
             failure: How it failed.
-            picture: A picture of that.
         """
-        request = self._repair("edit", source, failure, self._at(k, j), picture)
+        request = self._repair("edit", source, failure, self._at(k, j))
         return self._code(self.optimizer, request)
 
-    def improve(
-        self,
-        k: int,
-        source: str,
-        text: str,
-        aim: str,
-        picture: FailurePicture | None = None,
-    ) -> ModelAnswer:
+    def improve(self, k: int, source: str, text: str, aim: str) -> ModelAnswer:
         """Asks for a better controller, candidate (k, 0).
 
         Args:
@@ -156,17 +132,8 @@ class Dialogue:
             source: Source of the controller.
             text: How it drives, and what was tried with it.
             aim: What to raise.
-            picture: A picture of a failure.
         """
-        images = self._images("improve", k, 0, picture)
-        question = repair_question(
-            "improve",
-            self._question(),
-            source,
-            text,
-            aim=aim,
-            picture=self._named(images, picture),
-        )
+        question = repair_question("improve", self._question(), source, text, aim=aim)
         request = Request(
             "improve",
             question,
@@ -175,7 +142,6 @@ class Dialogue:
             sample=self._at(k, 0),
             stable=_stable(question),
             max_tokens=self.calls.max_output,
-            images=images,
         )
         return self._code(self.optimizer, request)
 
@@ -223,31 +189,13 @@ class Dialogue:
     def _question(self) -> str:
         return self.problem.question(self.book.in_force, self.template)
 
-    def _images(
-        self, kind: Kind, k: int, j: int, picture: FailurePicture | None
-    ) -> tuple[Picture, ...]:
-        """The pictures of a question about candidate (k, j)."""
-        if picture is None:
-            return ()
-        file = self.calls.recorder.picture_file(kind, k, j)
-        return (Picture(file, picture.png, picture.caption),)
-
-    def _named(
-        self, images: tuple[Picture, ...], picture: FailurePicture | None
-    ) -> NamedPicture | None:
-        if picture is None:
-            return None
-        return NamedPicture(images[0].name, picture, self.problem.has_hidden)
-
     def _repair(
         self,
         kind: Kind,
         source: str,
         failure: Feedback,
         sample: tuple[int, int, int],
-        picture: FailurePicture | None = None,
     ) -> Request:
-        images = self._images(kind, *sample[1:], picture)
         question = repair_question(
             kind,
             self._question(),
@@ -258,7 +206,6 @@ class Dialogue:
             rules=self.book.in_force,
             unchanged=self._unchanged,
             scope=self.problem.scope,
-            picture=self._named(images, picture),
         )
         stable = _stable(question)
         return Request(
@@ -270,7 +217,6 @@ class Dialogue:
             sample,
             stable=stable,
             max_tokens=self.calls.max_output,
-            images=images,
         )
 
     def _code(self, model: Provider, request: Request) -> ModelAnswer:

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from statistics import fmean
 
-from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.prompting.feedback import Feedback, cut
-from tdac_agent.runs.episode_pictures import failure_pictures, scene_of
 from tdac_agent.runs.improvement_record import goals_text
 from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.hashes import number_of
@@ -18,11 +15,9 @@ from tdac_agent.tasks.units import UNITS, Units
 from tdac_agent.verification.confirmation import CONFIRMATION
 from tdac_agent.verification.diagnosis.gap import too_close_text
 from tdac_agent.verification.diagnosis.measures import least_steps
-from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.diagnosis.report import Diagnosis, Failure, Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.episode_row import EpisodeRow
-from tdac_agent.verification.store import TRAJECTORIES
 from tdac_agent.verification.verdict import confirmed_text
 from tdac_envs.drive.scores import time_score
 
@@ -38,7 +33,7 @@ RANKED = {"robustness": "goals reached", "time": "mean time score"}
 
 
 def named(number: int) -> str:
-    """Name of an episode in texts and pictures, by its number from 1."""
+    """Name of an episode in texts, by its number from 1."""
     return f"disturbed episode {number}"
 
 
@@ -136,14 +131,3 @@ def task_figures(task: Task, report: Report, driven: EpisodeReport) -> Figures:
         "clearance": fmean(each.gap_left for each in driven.episodes),
     }
     return Figures(figures, RANKED)
-
-
-def failed_picture(
-    task: Task, driven: EpisodeReport, folder: Path
-) -> FailurePicture | None:
-    """A picture of the first failed episode that drove; None if there is none."""
-    numbered = enumerate(driven.episodes, 1)
-    episodes = ((named(number), each) for number, each in numbered)
-    place = folder / TRAJECTORIES
-    found = failure_pictures(lambda _: scene_of(task), episodes, place, LARGEST_SIDE)
-    return next((picture for _, picture in found), None)

@@ -85,14 +85,9 @@ class ImprovingSearch:
 
     def _varied(self, parent: Member) -> bool:
         """Asks for a variation, and drives it; returns whether a new one drove."""
-        run, explored = self._recorder.run, _explored(parent)
-        k = run.iterations + self.asked + 1
+        k = self._recorder.run.iterations + self.asked + 1
         answer = self._dialogue.improve(
-            k,
-            parent.candidate.source,
-            self._text(parent),
-            self._trials.aim,
-            explored.picture() if run.vision else None,
+            k, parent.candidate.source, self._text(parent), self._trials.aim
         )
         self.asked += 1
         return self._tried(k, parent, answer)

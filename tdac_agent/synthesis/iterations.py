@@ -135,8 +135,7 @@ class Iterations:
         k, j, parent = at.k, at.j + 1, at.candidate
         failure = self._trials.result(parent).failure
         assert failure is not None
-        picture = self._trials.picture(parent) if self._recorder.run.vision else None
-        source, notes = self._dialogue.edit(k, j, at.source, failure, picture)
+        source, notes = self._dialogue.edit(k, j, at.source, failure)
         if source is None:
             self._no_code(k, j, notes)
             return None

@@ -83,11 +83,6 @@ class SynthOptions:
         recorded=False,
     )
     suite: Path | None = option(None, SUITE, metavar="DIR", recorded=False)
-    vision: bool = option(
-        False,
-        "Show the optimizer a picture of the failure that it is to repair.",
-        identity=True,
-    )
     confirm: bool = option(
         True,
         "Drive what passes all tests blind, from about a hundred disturbed starts; a "

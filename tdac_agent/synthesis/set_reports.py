@@ -1,18 +1,12 @@
-"""Reports on worlds of a task set: feedback, figures, a picture; what is on record."""
+"""Reports on worlds of a task set: feedback and figures."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from statistics import fmean
 
-from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.prompting.feedback import Feedback, cut
-from tdac_agent.runs.world_pictures import world_pictures
 from tdac_agent.synthesis.candidates import Figures
-from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.store import TRAJECTORIES
-from tdac_envs.ladder.task_sets import TaskSet
 
 RANKED = {"time": "mean time score"}
 WORST = 4
@@ -61,26 +55,3 @@ def figures_of(report: EpisodeReport) -> Figures:
         "worst": fmean(times[: max(1, len(times) // WORST)]),
     }
     return Figures(figures, RANKED)
-
-
-def world_picture(
-    tasks: TaskSet, report: EpisodeReport, folder: Path
-) -> FailurePicture | None:
-    """The picture of the first failed episode of a report that has a diagnosis.
-
-    Args:
-        tasks: The task set.
-        report: A report on worlds of `dev`.
-        folder: Folder of the report, with the trajectories.
-
-    Returns:
-        None if no such episode drove.
-
-    Raises:
-        ValueError: The worlds are of another split.
-    """
-    if report.provenance.split != "dev":
-        raise ValueError(f"expected worlds of dev, got {report.provenance.split}")
-    named = ((f"world {each.number}", each) for each in report.episodes)
-    found = world_pictures(tasks, named, folder / TRAJECTORIES, LARGEST_SIDE)
-    return next((picture for _, picture in found), None)

@@ -11,13 +11,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.errors import ProviderError, RunError
+from tdac_agent.errors import RunError
 from tdac_agent.models.budget import Budget
-from tdac_agent.models.choice import BLIND
 from tdac_agent.models.provider import Author, Provider, recorded_seed, served_at
 from tdac_agent.models.ready import check_servers
 from tdac_agent.models.tariff import Tariff, bounds_of, tariffs_of
-from tdac_agent.models.vendors import forms
 from tdac_agent.problems.problem import Problem
 from tdac_agent.prompting.prompt import FULL, PromptTemplate
 from tdac_agent.runs.journal_state import read_past
@@ -114,33 +112,6 @@ def new_run(
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         **facts,
     )
-
-
-def checked_vision(
-    vision: bool, optimizer: str, patience: int, improve: int = 0
-) -> bool:
-    """Whether pictures go to the optimizer; as given.
-
-    Args:
-        vision: Whether they should.
-        optimizer: Name of the model that gets them.
-        patience: J.
-        improve: Simulated episodes to improve what works.
-
-    Raises:
-        ProviderError: They would have no effect.
-    """
-    if vision and optimizer.partition(":")[0] in BLIND:
-        raise ProviderError(
-            f"--vision has no effect: {optimizer}, which edits controllers, sees "
-            f"no pictures; give --optimizer {', '.join(forms())}, "
-            "command:PROGRAM or manual:DIR, or leave out --vision"
-        )
-    if vision and not patience and not improve:
-        raise ProviderError(
-            "--vision has no effect without edits: give -J 1 or more, or leave it out"
-        )
-    return vision
 
 
 def settled_seed(

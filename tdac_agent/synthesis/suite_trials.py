@@ -7,10 +7,8 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from queue import SimpleQueue
 
-from tdac_agent.models.picture import LARGEST_SIDE
 from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
 from tdac_agent.runs.run_record import Confirmation, Status
 from tdac_agent.storage.files import write_atomic
@@ -28,7 +26,6 @@ from tdac_agent.synthesis.delivery import (
 )
 from tdac_agent.synthesis.disturbed import (
     disturbed_feedback,
-    failed_picture,
     seeds_for,
     successes_of,
     task_figures,
@@ -40,17 +37,12 @@ from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.synthesis.tested import failed_tests, recorded_report, suite_result
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.confirmation import CONFIRMATION
-from tdac_agent.verification.diagnosis.model_picture import (
-    FailurePicture,
-    failure_picture,
-)
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verdict import confirmed_text, is_verified
-from tdac_agent.verification.verify import kept_report, load_trajectories, verify
+from tdac_agent.verification.verify import kept_report, verify
 
 IMPROVE = "improve"
 """Folder of the episodes of a search, inside that of a candidate."""
@@ -165,17 +157,6 @@ class SuiteTrials:
             return result
         return confirmed_result(result, report, confirmation)
 
-    def picture(self, candidate: Candidate) -> FailurePicture | None:
-        """See `Trials`."""
-        confirmation = candidate.confirmation
-        if confirmation is not None and not is_verified(confirmation):
-            folder = candidate.folder / CONFIRMATION
-            return failed_picture(self.task, confirmation, folder)
-        trajectories = load_trajectories(candidate.folder / "trajectories")
-        return failure_picture(
-            self.task, _report(candidate), trajectories, LARGEST_SIDE
-        )
-
     def can_explore(self, asked: int) -> bool:
         """See `Trials`."""
         shares = self.terms.shares
@@ -189,7 +170,6 @@ class SuiteTrials:
         report = _report(candidate)
         if not report.passed:
             return failed_tests(report)
-        folder = candidate.folder / IMPROVE
         driven = self._drive(candidate, IMPROVE, self.terms.shares.block)
         figures = task_figures(self.task, report, driven)
         if not is_variation:
@@ -203,7 +183,6 @@ class SuiteTrials:
             seed=report.provenance.seed,
             episodes=len(driven.episodes),
             feedback=disturbed_feedback(driven),
-            picture=partial(failed_picture, self.task, driven, folder),
         )
 
     def lines(self, member: Member, best: Member) -> list[str]:

@@ -28,7 +28,6 @@ from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.selection import select
 from tdac_agent.synthesis.setup import (
     account_of,
-    checked_vision,
     hold_folder,
     new_run,
     open_record,
@@ -95,7 +94,7 @@ def synthesize(
         TaskError: A number is out of range, or the problem cannot be used.
         RunError: The folder cannot be used, or contains another run.
         ProviderError: A model cannot be used, e.g. without its key, or nothing bounds
-            what it costs; or pictures would have no effect.
+            what it costs.
         PriceError: The user's price file is broken.
         PromptError: The template cannot be used.
         Fault: The sandbox, suite or provider is broken; the fault is also recorded.
@@ -189,7 +188,6 @@ def _recorded(
     # The worlds of a set, and the episodes of a search, follow from it.
     needed = problem.has_hidden or wanted.improve > 0
     facts["seed"] = settled_seed(wanted.seed, models[0], before, needed=needed)
-    checked_vision(wanted.vision, models[1].name, wanted.patience, wanted.improve)
     return facts
 
 

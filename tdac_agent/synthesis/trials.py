@@ -11,7 +11,6 @@ from tdac_agent.synthesis.archive import Archive, Member
 from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.suite_trials import SuiteTrials
 from tdac_agent.synthesis.terms import Chosen, Terms
-from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.verdict import confirmed_text, word_of
 
@@ -66,9 +65,6 @@ class Trials(Protocol):
 
     def result(self, candidate: Candidate) -> Result:
         """What came of its tests so far."""
-
-    def picture(self, candidate: Candidate) -> FailurePicture | None:
-        """A picture of its failure."""
 
     def can_explore(self, asked: int) -> bool:
         """Whether another variation may be asked for.

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from tdac_agent.models.budget import NOTHING, Amount
-from tdac_agent.models.provider import PICTURED, Request
+from tdac_agent.models.provider import Request
 from tdac_agent.models.tariff import Tariff
 from tdac_agent.models.tokens import estimate_tokens
 from tdac_agent.prompting.rules import MAX_RULE_TOKENS
@@ -179,7 +179,6 @@ def rest_of(
         variations=shares(run.episodes, run.improve).asked,
     )
     tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
-    shown = _pictures_left(run, request)
     this = Workload(1, 0) if request.role == "learner" else Workload(0, 1)
     most = worst
     models = (run.learner, run.optimizer)
@@ -187,22 +186,4 @@ def rest_of(
         tariff = tariffs[name]
         one = NOTHING if tariff.free else tariff.most(size, max_output)
         most = most.plus(one.times(count - mine))
-    tariff = tariffs[run.optimizer]
-    if shown and not tariff.free:
-        most = most.plus(tariff.most(tariff.picture_tokens, 0).times(shown))
     return Rest(left.questions, most)
-
-
-def _pictures_left(run: Run, request: Request) -> int:
-    """Most pictures of the questions that follow one; rules are made without any."""
-    if not run.vision:
-        return 0
-    left = from_here(
-        request,
-        run.iterations,
-        run.patience,
-        refine=False,
-        candidates=run.candidates,
-        variations=shares(run.episodes, run.improve).asked,
-    )
-    return left.optimizer - (request.kind in PICTURED)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 
 from tdac_agent.runs.improvement_record import PairedChange
@@ -25,7 +24,6 @@ from tdac_agent.synthesis.set_reports import (
     figures_of,
     set_feedback,
     summary_of,
-    world_picture,
 )
 from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.synthesis.tested import (
@@ -35,7 +33,6 @@ from tdac_agent.synthesis.tested import (
     suite_result,
 )
 from tdac_agent.synthesis.workload import MOST_EPISODES
-from tdac_agent.verification.diagnosis.model_picture import FailurePicture
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.own_tests import kept_tests, run_own_tests
@@ -49,8 +46,8 @@ PURPOSES = ("feedback", "validation", "improve", "comparison")
 STANDS_STILL = b"def policy(obs):\n    return 0.0, 0.0\n"
 FINALISTS = 4
 """Most candidates that go on to the selection, beside the best one of the loop."""
-FEEDBACK, EXPLORED = "feedback-{}", "improve-1"
-"""Folders of reports, inside that of a candidate."""
+FEEDBACK = "feedback-{}"
+"""Folders of the tests of a candidate, inside its own."""
 
 
 def first_world(seed: int, index: int) -> int:
@@ -170,15 +167,6 @@ class WorldTrials:
             ),
         )
 
-    def picture(self, candidate: Candidate) -> FailurePicture | None:
-        """See `Trials`."""
-        failed = candidate.first_failure
-        if failed is None:
-            return None
-        # It ended the tests.
-        folder = candidate.folder / FEEDBACK.format(len(candidate.feedback))
-        return world_picture(self.tasks, failed, folder)
-
     def can_explore(self, asked: int) -> bool:
         """See `Trials`."""
         del asked
@@ -195,7 +183,6 @@ class WorldTrials:
             said, failed = set_feedback(report).line, tuple(report.told)
             return Explored(None, said, failed=failed, drove=False)
         all_reached = report.successes == report.count
-        folder = candidate.folder / EXPLORED
         return Explored(
             figures_of(report),
             f"the goal reached in {report.successes} of {report.count} worlds",
@@ -203,7 +190,6 @@ class WorldTrials:
             failed=tuple(report.causes),
             episodes=report.count,
             feedback=None if all_reached else set_feedback(report).text,
-            picture=partial(world_picture, self.tasks, report, folder),
         )
 
     def lines(self, member: Member, best: Member) -> list[str]:

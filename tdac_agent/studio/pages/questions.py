@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from nicegui import ui
 
 from tdac_agent.runs.run_record import JOURNAL
-from tdac_agent.runs.run_record import PICTURE_FILE as PICTURE
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.journal import read_records
 from tdac_agent.storage.plain import printable
@@ -65,10 +63,6 @@ class Questions:
                     on_click=lambda: copied(text),
                 )  # fmt: skip
                 ui.label(f"{len(text):,} characters").classes("note")
-            picture = question.with_name(question.name.replace("prompt.md", PICTURE))
-            if picture.is_file():
-                ui.label(f"and give it the picture {picture}:")
-                ui.image(picture).classes("w-full max-w-2xl")
             shown = ui.expansion("Show the prompt").classes("w-full")
             with shown, ui.element("pre").classes("output"):
                 ui.label(text)
@@ -85,9 +79,8 @@ class Questions:
 
 def asked_for(folder: Path, question: str) -> str:
     """What a question asks for, by the name under which the run keeps it."""
-    asked = _unnamed(question)
     for path in folder.glob("iterations/*/*/*.prompt*.md"):
-        if _unnamed(_text(path)) == asked:
+        if _text(path) == question:
             return KINDS.get(path.name.partition(".")[0], "an answer")
     return "an answer"
 
@@ -98,11 +91,6 @@ def _text(file: Path) -> str:
         return printable(read_file(file, RECORD_BYTES).decode("utf-8", "replace"))
     except OSError:
         return ""
-
-
-def _unnamed(question: str) -> str:
-    """A question without the name of its picture, which depends on the folder."""
-    return re.sub(rf"\w+\.{re.escape(PICTURE)}", PICTURE, question)
 
 
 def _last_unused(folder: Path) -> str:

@@ -14,10 +14,11 @@ from unconfirmed import synthesize
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
+from tdac_agent.html_report import make_page
 from tdac_agent.models.provider import PermanentFault, Reply
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.prompt import generate_prompt
-from tdac_agent.runs.ownership import mark_anew
+from tdac_agent.runs.ownership import is_own_folder, mark_anew
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import read_records
@@ -121,6 +122,39 @@ def test_a_run_that_has_ended(once_verified, out, tdac, done):
     (out / "run.json").write_text(json.dumps(record | {"status": "not verified"}))
     mark_anew(load_run(out))
     assert tdac("synth", "--resume", out)[0] == 1
+
+
+def test_a_run_with_pictures_is_shown_but_not_resumed(policy_task, halted, warm):
+    """Earlier versions could send pictures, and said in each record whether they did.
+
+    Without them, it is the same run as one of today. With them, it is still one's own
+    and says so, but its questions cannot be asked again.
+    """
+    record = json.loads((halted / "run.json").read_text())
+    assert "vision" not in record
+
+    def changed(*, vision):
+        text = json.dumps(record | {"vision": vision})
+        (halted / "run.json").write_text(text)
+        return load_run(halted)
+
+    assert is_own_folder(changed(vision=False))
+    model = Script(PermanentFault("401 no such key"))
+    with pytest.raises(Fault):
+        synthesize(policy_task, model, out=halted, judge=warm)
+    assert model.asked() == [("edit", 1, 1)]
+    assert not is_own_folder(changed(vision=True))
+    mark_anew(load_run(halted))
+    kept = json.loads((halted / "run.json").read_text())
+    assert kept["vision"]
+    assert is_own_folder(load_run(halted))
+    assert "a failure, with each question" in make_page(halted).html.decode()
+    with pytest.raises(RunError) as caught:
+        synthesize(policy_task, Script(), out=halted, judge=warm)
+    assert str(caught.value).endswith(
+        "contains another run (pictures True instead of False): "
+        "give a new folder with --out"
+    )
 
 
 def test_another_run_is_refused(policy_task, small_task, halted, warm):

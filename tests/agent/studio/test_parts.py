@@ -402,14 +402,13 @@ def test_a_run_tells_what_became_of_a_given_controller(tmp_path):
     assert text.endswith("is another one, by the built-in template.")
 
 
-def test_a_question_with_a_picture_is_recognised(tmp_path):
-    """Its picture has another name in the folder of the questions."""
+def test_what_a_question_asks_for(tmp_path):
+    """By the name under which the run keeps it."""
     kept = tmp_path / "iterations" / "k01" / "j1" / "edit.prompt.md"
     kept.parent.mkdir(parents=True)
-    kept.write_text("Repair it. The picture `edit.picture.png` shows more.")
-    asked = "Repair it. The picture `002.picture.png` shows more."
-    assert asked_for(tmp_path, asked) == KINDS["edit"]
-    assert asked_for(tmp_path, f"{asked} Please.") == "an answer"
+    kept.write_text("Repair it.")
+    assert asked_for(tmp_path, "Repair it.") == KINDS["edit"]
+    assert asked_for(tmp_path, "Repair it. Please.") == "an answer"
 
 
 def test_what_differs_between_two_runs(tmp_path):

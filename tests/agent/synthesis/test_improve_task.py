@@ -159,24 +159,6 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
 
 
 @pytest.mark.slow
-def test_models_that_see_get_a_picture_of_a_failure(
-    improve, on_task, fragile, good_source
-):
-    """None if all goals were reached."""
-    model = Script(*map(code, (fragile, good_source, *[STILL] * 12)))
-    improve(on_task, model, vision=True)
-    generated, first, *others = model.requests
-    assert generated.images == ()
-    (picture,) = first.images
-    assert picture.caption == "disturbed episode 1: no motion"
-    assert "`improve.picture.png`" in first.prompt
-    for request in others:
-        failed = "LATE.append" in request.controller
-        assert len(request.images) == failed
-    assert any(not request.images for request in others)
-
-
-@pytest.mark.slow
 def test_without_a_better_one_the_first_stays(
     improve, on_task, task, fragile, good_source, tmp_path, warm
 ):

@@ -37,7 +37,7 @@ def test_defaults_are_those_of_the_providers_and_the_record():
     """The record keeps options under their own names."""
     assert SynthOptions().max_output == MAX_OUTPUT_TOKENS
     kept = SynthOptions().recorded("set").keys()
-    assert {"iterations", "refine", "base_url", "vision", "episodes"} <= kept
+    assert {"iterations", "refine", "base_url", "improve", "episodes"} <= kept
     assert kept <= Run.model_fields.keys()
     on_task = SynthOptions().recorded("task").keys()
     assert on_task - kept == {"confirm"}
