@@ -17,7 +17,7 @@ from tdac_agent.runs.run_record import LoopSetting
 from tdac_agent.storage.hashes import sha256_of_file
 from tdac_agent.storage.shipped import shipped, shipped_names
 from tdac_agent.storage.yaml_file import read_yaml
-from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.options import PAPER, USUAL, SynthOptions
 from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.trust import Wish, asking, suite_wish
@@ -69,7 +69,7 @@ class CampaignConfig(StrictModel):
         "may request: K·(J + 2).",
     )
     episodes: int = Field(
-        _USUAL.episodes,
+        USUAL[PAPER]["episodes"],
         ge=2,
         le=MOST_EPISODES,
         description="As for --episodes, on sets.",

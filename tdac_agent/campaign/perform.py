@@ -189,6 +189,7 @@ def _synthesize(
     folder.parent.mkdir(parents=True, exist_ok=True)
     limits = SET_LIMITS if problem.has_hidden else ()
     settings = {name: getattr(cell, name) for name in (*SETTINGS, *limits)}
+    settings["search"] = "race" if cell.setting == "race" else "paper"
     settings |= dict(cell.options)
     return synthesize(
         problem,

@@ -315,6 +315,7 @@ def loop_of(config: CampaignConfig, setting: LoopSetting) -> tuple[int, int, boo
         "prompt only": (iterations, 0, True),
         "best of N": (samples, 0, False),
         "one shot": (1, 0, False),
+        "race": (iterations, 0, False),
     }[setting]
 
 

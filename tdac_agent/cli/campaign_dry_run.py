@@ -29,7 +29,7 @@ from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.prices import PriceList, load_prices, price_file
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
-from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.options import RACE, SynthOptions
 from tdac_agent.synthesis.workload import shares
 
 FOLDER = Path("campaigns")
@@ -123,7 +123,8 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
         prices,
         iterations=cell.iterations,
         patience=cell.patience,
-        candidates=further.candidates,
+        candidates=further.candidates or 1,
+        ask=further.ask if cell.setting == RACE else "",
         refine=cell.refine,
         variations=shares(cell.episodes, further.improve).asked,
         base_url=cell.base_url,

@@ -19,7 +19,7 @@ from tdac_agent.runs.ownership import remark_on
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.resume import check_same, existing_run
 from tdac_agent.runs.run_record import AGENT, Agent, Run
-from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.options import PAPER, USUAL, SynthOptions
 from tdac_agent.synthesis.setup import Account, hold_folder, new_run, open_record
 from tdac_agent.synthesis.terms import Terms
 from tdac_agent.synthesis.trials import trials_of
@@ -31,7 +31,7 @@ from tdac_agent.verification.suite.starts import JITTERS
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.ladder.task_sets import TaskSet
 
-EPISODES = SynthOptions().episodes
+EPISODES = USUAL[PAPER]["episodes"]
 """Default limit of simulated episodes."""
 FEEDBACK_EPISODES = SynthOptions().feedback_episodes
 """Most episodes of a submission on a task set."""

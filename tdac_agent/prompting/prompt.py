@@ -157,6 +157,18 @@ def _render(
         raise PromptError(f"the prompt {template.name}: {error}") from error
 
 
+def informed_question(prompt: str, known: str, count: int) -> str:
+    """Returns the prompt for a new controller, with what earlier ones have shown.
+
+    Args:
+        prompt: The prompt for a new controller, with the current rules.
+        known: What they have shown.
+        count: Their number.
+    """
+    template = _templates().get_template("informed.md.j2")
+    return template.render(prompt=prompt.rstrip(), known=known, count=count)
+
+
 def repair_question(
     kind: str,
     prompt: str,

@@ -32,7 +32,9 @@ DELIVERED = ("verified", "passed", "selected")
 """Status of a run that has ended with a controller, as far as was asked for."""
 FINISHED = (*DELIVERED, "not verified")
 """Status of a run with nothing left to do."""
-LoopSetting = Literal["dual tier", "edit only", "prompt only", "best of N", "one shot"]
+LoopSetting = Literal[
+    "dual tier", "edit only", "prompt only", "best of N", "one shot", "race"
+]
 Setting = LoopSetting | Literal["agent"]
 Agent = Literal["", "unconfined", "over HTTP"]
 AGENT = "mcp"
@@ -64,7 +66,15 @@ class Attempt(PrintableRecord):
         False, description="Same code as an earlier candidate, whose report is reused."
     )
     parent: tuple[int, int] | None = Field(
-        None, description="(k, j) of the candidate that it improves; k is then above K."
+        None, description="(k, j) of the candidate that it was to improve, in a race."
+    )
+    merged: tuple[int, int] | None = Field(
+        None,
+        exclude_if=lambda value: value is None,
+        description="(k, j) of the candidate that it was to be merged with.",
+    )
+    asked: str = Field(
+        "", exclude_if=operator.not_, description="Kind of the question, in a race."
     )
 
 
@@ -96,6 +106,14 @@ class Run(PrintableRecord):
     optimizer: str
     iterations: int = Field(description="K")
     patience: int = Field(description="J")
+    search: str = Field(
+        "",
+        exclude_if=operator.not_,
+        description="`paper` or `race`; empty in records of earlier versions: paper.",
+    )
+    ask: str = Field(
+        "", exclude_if=operator.not_, description="Kinds of questions of a race."
+    )
     candidates: int = Field(
         1, description="N: new controllers that are asked for side by side."
     )
@@ -188,7 +206,7 @@ class Run(PrintableRecord):
     @property
     def of_loop(self) -> list[Attempt]:
         """The attempts of the loop: those that are no variations of what works."""
-        return [each for each in self.attempts if each.parent is None]
+        return [each for each in self.attempts if each.k <= self.iterations]
 
     @property
     def verified(self) -> bool:
@@ -218,6 +236,8 @@ class Run(PrintableRecord):
         """Which parts of the loop were used."""
         if self.learner == AGENT:
             return "agent"
+        if self.search == "race":
+            return "race"
         return setting_of(self.iterations, self.patience, refine=self.refine)
 
     @property

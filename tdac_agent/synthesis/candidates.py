@@ -107,11 +107,6 @@ class Figures:
         """The figures that decide."""
         return tuple(self.by_name[name] for name in self.ranked)
 
-    def beats(self, other: Figures) -> bool:
-        """Whether they are nowhere worse than others, and better somewhere."""
-        pairs = [(own, other.by_name[name]) for name, own in self.by_name.items()]
-        return all(a >= b for a, b in pairs) and any(a > b for a, b in pairs)
-
 
 @dataclass(frozen=True, slots=True)
 class Explored:
@@ -151,7 +146,9 @@ class Candidate:
         confirmation: The report of its blind confirmation, if there was one.
         feedback: Reports on feedback worlds, in order.
         validation: Its episodes on validation worlds.
-        explored: What came of it in a search, if it took part in one.
+        pool: Its episodes in the pool of a race.
+        pool_folders: Folders of their reports.
+        explored: What came of it in a race, if it took part in one.
     """
 
     k: int
@@ -162,7 +159,14 @@ class Candidate:
     confirmation: EpisodeReport | None = None
     feedback: list[EpisodeReport] = field(default_factory=list)
     validation: list[EpisodeRow] = field(default_factory=list)
+    pool: list[EpisodeRow] = field(default_factory=list)
+    pool_folders: list[Path] = field(default_factory=list)
     explored: Explored | None = None
+
+    @property
+    def name(self) -> str:
+        """Its number in texts for models."""
+        return f"{self.k}.{self.j}" if self.j else str(self.k)
 
     @property
     def place(self) -> str:
@@ -199,6 +203,11 @@ class Candidate:
     def feedback_score(self) -> float:
         """Mean time score on feedback worlds; 0 if it did not drive."""
         return _mean([each for report in self.feedback for each in report.episodes])
+
+    @property
+    def pool_score(self) -> float:
+        """Mean time score in the pool of a race; 0 if it has not driven there."""
+        return _mean(self.pool)
 
     @property
     def score(self) -> float:

@@ -11,7 +11,7 @@ from tdac_agent.models.tariff import MAX_COST, UNKNOWN_COST, UNPRICED_TOKENS, Ta
 from tdac_agent.models.tokens import estimate_tokens, most_tokens
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.synthesis.dialogue import MAX_ASKS
-from tdac_agent.synthesis.workload import tokens_asked, whole
+from tdac_agent.synthesis.workload import Workload, of_race, tokens_asked, whole
 
 
 class CostForecast(PrintableRecord):
@@ -66,6 +66,7 @@ def cost_of(
     refine: bool = True,
     candidates: int = 1,
     variations: int = 0,
+    ask: str = "",
     base_url: str | None = None,
     max_output: int = MAX_OUTPUT_TOKENS,
     max_cost: float | None = None,
@@ -84,6 +85,7 @@ def cost_of(
         refine: Whether failures become rules.
         candidates: N, asked for side by side.
         variations: Most variations of what works (`most_variations`).
+        ask: Kinds of questions of a race; empty for the loop.
         base_url: URL of the models' server; by default the vendor's.
         max_output: Token limit of an answer.
         max_cost: Limit in USD; by default 2.
@@ -92,7 +94,11 @@ def cost_of(
     tokens = estimate_tokens(prompt)
     terms = {"candidates": candidates, "variations": variations}
     work = whole(iterations, patience, refine=refine, **terms)
+    if ask:
+        work = of_race(iterations, candidates, ask)
     sizes = tokens_asked(tokens, max_output)
+    if ask:  # new controllers are asked for with what is known
+        sizes = Workload(sizes.optimizer, sizes.optimizer)
     prices_of = [prices.price_of(m, base_url) for m in (learner, optimizer)]
     first, second = prices_of
     once = most = first_cost = None

@@ -156,14 +156,15 @@ def _member(member: Member) -> MemberFigures:
 
 
 def _candidate(candidate: Candidate) -> CandidateFigures:
-    drives, explored = candidate.feedback, candidate.explored
+    explored = candidate.explored
+    drives = [row for report in candidate.feedback for row in report.episodes]
     figures = None if explored is None else explored.figures
     return CandidateFigures(
         k=candidate.k,
         j=candidate.j,
         controller_sha256=candidate.sha256,
-        feedback_worlds=sum(report.count for report in drives),
-        feedback_reached=sum(report.successes for report in drives),
+        feedback_worlds=len(drives),
+        feedback_reached=sum(each.success for each in drives),
         validation_worlds=len(candidate.validation),
         validation_reached=sum(each.success for each in candidate.validation),
         validation_time=candidate.score if candidate.validation else None,

@@ -19,7 +19,12 @@ from tdac_agent.problems.problem import Problem
 from tdac_agent.prompting.extract import Answer, read_answer
 from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.given_rules import GIVEN, RUN_HEADING, written
-from tdac_agent.prompting.prompt import FULL, PromptTemplate, repair_question
+from tdac_agent.prompting.prompt import (
+    FULL,
+    PromptTemplate,
+    informed_question,
+    repair_question,
+)
 from tdac_agent.prompting.rule_answer import RuleAnswerError, apply, parse_operations
 from tdac_agent.prompting.rules import BEGIN, RuleBook
 from tdac_agent.storage.secrets import one_line
@@ -144,6 +149,25 @@ class Dialogue:
             max_tokens=self.calls.max_output,
         )
         return self._code(self.optimizer, request)
+
+    def informed(self, k: int, known: str, count: int) -> ModelAnswer:
+        """Asks for a new controller (k, 0), with what earlier ones have shown.
+
+        Args:
+            k: Number of the candidate.
+            known: What they have shown.
+            count: Their number.
+        """
+        question = informed_question(self._question(), known, count)
+        request = Request(
+            "generate",
+            question,
+            rules=self._texts(),
+            sample=self._at(k, 0),
+            stable=_stable(question),
+            max_tokens=self.calls.max_output,
+        )
+        return self._code(self.learner, request)
 
     def summarise(self, k: int, j: int, source: str, failure: Feedback) -> None:
         """Asks for changes of the rules after a failure, and applies them.

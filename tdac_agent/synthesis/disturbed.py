@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from statistics import fmean
 
 from tdac_agent.prompting.feedback import Feedback, cut
@@ -44,14 +45,14 @@ def seeds_for(run: Run, purpose: str, count: int) -> range:
     return range(first, first + count)
 
 
-def successes_of(driven: EpisodeReport) -> list[float]:
+def successes_of(rows: Sequence[EpisodeRow]) -> list[float]:
     """1 for each episode that reached the goal, else 0."""
-    return [float(each.success) for each in driven.episodes]
+    return [float(each.success) for each in rows]
 
 
-def times_of(driven: EpisodeReport) -> list[float]:
+def times_of(rows: Sequence[EpisodeRow]) -> list[float]:
     """Time score of each episode."""
-    return [each.time_score for each in driven.episodes]
+    return [each.time_score for each in rows]
 
 
 def told(driven: EpisodeReport) -> str:
@@ -114,20 +115,20 @@ def _as_failure(episode: EpisodeRow, units: Units) -> Failure:
     )
 
 
-def task_figures(task: Task, report: Report, driven: EpisodeReport) -> Figures:
+def task_figures(task: Task, report: Report, rows: Sequence[EpisodeRow]) -> Figures:
     """Share of goals, mean time score, time of the nominal episode, clearance.
 
     Args:
         task: The task.
         report: The report that verified the candidate.
-        driven: Its disturbed episodes.
+        rows: Its disturbed episodes.
     """
     nominal = next(each for each in report.episodes if each.name == "nominal")
     least = least_steps(task.nominal)
     figures = {
-        "robustness": fmean(successes_of(driven)),
-        "time": fmean(times_of(driven)),
+        "robustness": fmean(successes_of(rows)),
+        "time": fmean(times_of(rows)),
         "nominal": time_score(nominal.outcome == "reached", nominal.steps, least),
-        "clearance": fmean(each.gap_left for each in driven.episodes),
+        "clearance": fmean(each.gap_left for each in rows),
     }
     return Figures(figures, RANKED)

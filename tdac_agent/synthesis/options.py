@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from tdac_agent.models.vendors import forms
 from tdac_agent.option_fields import Flag, flag_of, option
+from tdac_agent.synthesis.question_kinds import ASKED, KINDS
+from tdac_envs.core.arguments import one_of
 
 if TYPE_CHECKING:
     from tdac_agent.models.provider import Provider
@@ -17,6 +19,12 @@ if TYPE_CHECKING:
 MODELS, BUDGET, SETS = "Models", "Budget", "Task set"
 """Headings of the help."""
 SUITE = "Folder with additional test_*.py files to run."
+PAPER, RACE = SEARCHES = "paper", "race"
+USUAL = {
+    PAPER: {"iterations": 20, "candidates": 1, "episodes": 128},
+    RACE: {"iterations": 8, "candidates": 4, "episodes": 512},
+}
+"""Defaults that depend on the search."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,16 +40,29 @@ class SynthOptions:
     says otherwise (`Flag.identity`, `Flag.recorded`).
     """
 
-    iterations: int = option(
-        20, "Maximum iterations.", "-K", "--iterations", least=1, identity=True
+    search: str | None = option(
+        None,
+        "`paper`: repair the latest controller, as Algorithm 2 of the paper. `race`: "
+        "first answers drive in the same episodes, then further questions build on "
+        "the best ones.  [default: paper on a task, race on a task set]",
+        metavar="NAME",
+        identity=True,
+    )
+    iterations: int | None = option(
+        None,
+        "Maximum iterations; in a race, all answers.  [default: 20; 8 in a race]",
+        *("-K", "--iterations"),
+        least=1,
+        identity=True,
     )
     patience: int = option(
         1, "Maximum edits per iteration.", "-J", "--patience", least=0, identity=True
     )
-    candidates: int = option(
-        1,
+    candidates: int | None = option(
+        None,
         "Number of new controllers to request at the same time; the best one is "
-        "repaired. Each counts as an iteration.",
+        "repaired. Each counts as an iteration. In a race, the first answers.  "
+        "[default: 1; 4 in a race]",
         *("-N", "--candidates"),
         least=1,
         identity=True,
@@ -51,6 +72,13 @@ class SynthOptions:
         "After a success, try variations of the controllers that work, in N further "
         "simulated episodes (disturbed ones on a task), and deliver the best.",
         least=32,
+        identity=True,
+    )
+    ask: str = option(
+        ",".join(ASKED),
+        "Kinds of questions of a race after the first answers, separated by commas: "
+        f"{', '.join(f'`{kind}`' for kind in KINDS)}.",
+        metavar="KINDS",
         identity=True,
     )
     start_from: str | Path | None = option(
@@ -161,10 +189,12 @@ class SynthOptions:
         panel=BUDGET,
         recorded=False,
     )
-    episodes: int = option(
-        128,
+    episodes: int | None = option(
+        None,
         "Maximum number of simulated episodes of all candidates together: half for "
-        "feedback, half for the selection.",
+        "feedback, half for the selection. In a race, a quarter of them compares the "
+        "selected controller with the best first answer.  [default: 128; 512 in a "
+        "race]",
         least=2,
         panel=SETS,
         scope="set",
@@ -186,6 +216,32 @@ class SynthOptions:
         scope="set",
         recorded=False,
     )
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of questions of a race.
+
+        Raises:
+            TaskError: There is no such kind.
+        """
+        found = tuple(dict.fromkeys(filter(None, map(str.strip, self.ask.split(",")))))
+        for kind in found:
+            one_of("ask", kind, KINDS)
+        return found
+
+    def settled(self, *, on_set: bool) -> SynthOptions:
+        """The same, with a search and the defaults that depend on it.
+
+        Raises:
+            TaskError: There is no such search.
+        """
+        search = self.search or (RACE if on_set else PAPER)
+        one_of("search", search, SEARCHES)
+        usual = USUAL[search]
+        missing: dict[str, Any] = {
+            name: usual[name] for name in usual if getattr(self, name) is None
+        }
+        return replace(self, search=search, **missing)
 
     def changed(self, **values: Any) -> SynthOptions:
         """The same with other values.
@@ -227,7 +283,8 @@ class SynthOptions:
         return {
             field.name: int(flag.least)
             for field, flag in _flags(self)
-            if type(field.default) is int and flag.least is not None
+            if type(field.default) is int or field.name in USUAL[PAPER]
+            if flag.least is not None
             if getattr(self, field.name) is not field.default
         }
 

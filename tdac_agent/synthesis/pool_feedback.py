@@ -7,7 +7,7 @@ drives show of the robot: all of it in the frame that a controller observes.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
 
@@ -20,6 +20,7 @@ from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.losses import Losses
 from tdac_agent.verification.diagnosis.robot_log import RobotLog
 from tdac_agent.verification.diagnosis.track import told_pieces, told_sibling
+from tdac_agent.verification.episode_report import named
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.store import TRAJECTORIES
 
@@ -40,13 +41,15 @@ class PoolFeedback:
 
     Attributes:
         word: What an episode is called, such as `world`.
+        first: Number of the first one of the pool; in texts, it is 1.
         scene: Where an episode took place.
         log: What all drives show of the robot.
     """
 
     word: str
+    first: int
     scene: Scene
-    log: RobotLog
+    log: RobotLog = field(default_factory=RobotLog)
 
     def note(self, candidate: Candidate) -> None:
         """Adds the drives of a candidate to what is known of the robot."""
@@ -75,7 +78,7 @@ class PoolFeedback:
         lines = [_line(head), _line(["---"] * len(head))]
         shown = rows[:MOST_ROWS]
         for row in shown:
-            cells = [str(row.number), *_seconds(row), f"{row.time_score:.2f}"]
+            cells = [self._name(row), *_seconds(row), f"{row.time_score:.2f}"]
             lost = row.lost or Losses(failure=1.0)
             cells += [_share(share) for share in lost.by_cause.values()]
             cells += [_score(one.get(row.number)) for one in scores]
@@ -112,8 +115,8 @@ class PoolFeedback:
             return ""
         seconds, least = _seconds(row)[::-1]
         lines = [
-            f"{self.word} {row.number}: score {row.time_score:.2f}, {seconds} s, least "
-            f"{least} s"
+            f"{self.word} {self._name(row)}: score {row.time_score:.2f}, {seconds} s, "
+            f"least {least} s"
         ]
         lines += [f"- {line}" for line in told_pieces(trajectory, *scene)]
         best = _best_in(others, row)
@@ -135,8 +138,14 @@ class PoolFeedback:
         most = min(MOST_FAILURES, max(1, len(failed) // OF))
         told = [row for row in failed if row.text or row.error][:most]
         lines = [f"{len(failed)} of {len(candidate.pool)} failed:"]
-        lines += [f"- {cut(row.text or str(row.error), FAILURE_CHARS)}" for row in told]
+        for row in told:
+            text, name = row.text or str(row.error), f"{self.word} {self._name(row)}"
+            text = text.replace(named(row), name, 1)
+            lines.append(f"- {cut(text, FAILURE_CHARS)}")
         return "\n".join(lines)
+
+    def _name(self, row: EpisodeRow) -> str:
+        return str(row.number - self.first + 1)
 
 
 def trajectory_of(candidate: Candidate, row: EpisodeRow) -> Trajectory | None:

@@ -36,7 +36,7 @@ class Bandit:
 
     def __init__(self, kinds: Collection[str], random: np.random.Generator) -> None:
         self._random = random
-        self._counts = {kind: list(PRIOR.get(kind, (1.0, 1.0))) for kind in kinds}
+        self._counts = {kind: PRIOR.get(kind, (1.0, 1.0)) for kind in kinds}
 
     def choose(self, possible: Collection[str]) -> str:
         """The kind to ask now.
@@ -45,12 +45,16 @@ class Bandit:
             possible: Kinds for which there is something to ask about; at least one.
         """
         # All draws, so that what is possible does not change later ones.
-        draws = {kind: self._random.beta(*ab) for kind, ab in self._counts.items()}
+        draws = {
+            kind: float(self._random.beta(a, b))
+            for kind, (a, b) in self._counts.items()
+        }
         return max((kind for kind in draws if kind in possible), key=draws.__getitem__)
 
     def learn(self, kind: str, *, paid: bool) -> None:
         """Notes whether a question of a kind has paid."""
-        self._counts[kind][not paid] += 1.0
+        a, b = self._counts[kind]
+        self._counts[kind] = (a + paid, b + (not paid))
 
     @property
     def odds(self) -> dict[str, float]:

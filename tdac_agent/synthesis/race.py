@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tdac_agent.models.provider import is_fixed
+from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.python_source import same_code
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.synthesis.archive import Archive, Member, Refused
@@ -20,6 +21,7 @@ from tdac_agent.synthesis.candidates import Candidate, Explored
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer, Notes, same_as
 from tdac_agent.synthesis.paired_drop import is_clearly_worse
 from tdac_agent.synthesis.question_kinds import (
+    ASKED,
     FASTER,
     FRESH,
     INFORMED,
@@ -37,6 +39,8 @@ REPAIRED = 2
 """The best of so many controllers are repaired."""
 MOST_STALE = 3
 """Questions in a row without a new controller that drives, after which it ends."""
+POOL = "pool"
+"""What rules are made for, if nothing failed."""
 BLOCK = 8
 """Episodes after which a candidate is compared with what it is to improve."""
 
@@ -63,7 +67,7 @@ class Race:
         written: list[Candidate],
         *,
         most: int,
-        kinds: Sequence[str],
+        kinds: Sequence[str] = ASKED,
     ) -> None:
         self._recorder = trials.terms.recorder
         run = self._recorder.run
@@ -123,6 +127,11 @@ class Race:
             return str(error)
         return ""
 
+    @property
+    def found(self) -> tuple[Archive, int]:
+        """The archive, and the number of questions that were answered."""
+        return self.archive, self.asked
+
     def _possible(self) -> set[str]:
         """Kinds of questions for which there is something to ask about."""
         fixed, live = is_fixed(self._dialogue.learner), self.archive.live
@@ -165,9 +174,9 @@ class Race:
         if kind in (INFORMED, RULES):
             known = self._texts.known()
             if kind == RULES:
-                self._dialogue.learn_rules(k, known)
+                self._learn_rules(k, known)
                 return self._dialogue.generate_all([k])[0]
-            return self._dialogue.informed(k, known)
+            return self._dialogue.informed(k, known, len(self._written))
         text, aim = self._texts.about(kind, parents)
         source = parents[0].candidate.source
         return self._dialogue.improve(k, source, text, aim)
@@ -227,7 +236,8 @@ class Race:
         if explored.figures is None:
             self.archive.refused.append(Refused(candidate, parent, explored.said))
             return explored.said, False
-        member = Member(candidate, explored.figures, parent, kind)
+        founder = self.asked == 0
+        member = Member(candidate, explored.figures, parent, kind, founder)
         told = explored.said
         if len(candidate.pool) < self._trials.pool_size:
             reference = parent or top
@@ -246,6 +256,17 @@ class Race:
         if paid:
             self.archive.replace(parents)
         return f"{said}; {told}", paid and reference is not None
+
+    def _learn_rules(self, k: int, known: str) -> None:
+        """Has rules made of what is known, which then stand in the question."""
+        best = self.archive.top
+        candidate = self._written[-1] if best is None else best.candidate
+        explored = candidate.explored
+        said, failed = (
+            ("", ()) if explored is None else (explored.said, explored.failed)
+        )
+        failure = Feedback(known, said, failed or (POOL,))
+        self._dialogue.summarise(k, 0, candidate.source, failure)
 
     def _learn(self, kind: str, *, paid: bool) -> None:
         if kind in self._bandit.odds:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from statistics import fmean
 
 from tdac_agent.prompting.feedback import Feedback, cut
 from tdac_agent.synthesis.candidates import Figures
 from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 
 RANKED = {"time": "mean time score"}
 WORST = 4
@@ -44,9 +46,8 @@ def summary_of(report: EpisodeReport) -> str:
     return f"{reached}; {causes}" if causes else reached
 
 
-def figures_of(report: EpisodeReport) -> Figures:
+def figures_of(episodes: Sequence[EpisodeRow]) -> Figures:
     """Mean time and path scores, success, and time score on the worst worlds."""
-    episodes = report.episodes
     times = sorted(each.time_score for each in episodes)
     figures = {
         "time": fmean(times),

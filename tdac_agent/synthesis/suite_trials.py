@@ -7,12 +7,17 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import cached_property
 from queue import SimpleQueue
 
-from tdac_agent.runs.improvement_record import IMPROVEMENT_FILE, drive_text
+from tdac_agent.runs.improvement_record import (
+    IMPROVEMENT_FILE,
+    drive_text,
+    goals_text,
+)
 from tdac_agent.runs.run_record import Confirmation, Status
 from tdac_agent.storage.files import write_atomic
-from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.archive import Archive
 from tdac_agent.synthesis.candidates import Candidate, Explored, Result
 from tdac_agent.synthesis.confirming import (
     confirmed_result,
@@ -25,17 +30,15 @@ from tdac_agent.synthesis.delivery import (
     task_improvement,
 )
 from tdac_agent.synthesis.disturbed import (
-    disturbed_feedback,
     seeds_for,
     successes_of,
     task_figures,
     times_of,
-    told,
 )
 from tdac_agent.synthesis.driving import drive_candidate
+from tdac_agent.synthesis.pool_feedback import PoolFeedback
 from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.synthesis.tested import failed_tests, recorded_report, suite_result
-from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
@@ -44,8 +47,8 @@ from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verdict import confirmed_text, is_verified
 from tdac_agent.verification.verify import kept_report, verify
 
-IMPROVE = "improve"
-"""Folder of the episodes of a search, inside that of a candidate."""
+POOL = "improve"
+"""Episodes of a race, and their folders inside that of a candidate."""
 
 
 class SuiteTrials:
@@ -61,8 +64,8 @@ class SuiteTrials:
     needs_new_code = False
     tests_left = None
     aim = (
-        "Raise the number of goals that it reaches in disturbed episodes that nobody "
-        "has seen yet, and then its mean time score. It must still pass all tests."
+        "What counts is the number of goals reached in disturbed episodes that nobody "
+        "has seen yet, and then the mean time score. All tests must still pass."
     )
 
     def __init__(self, task: Task, terms: Terms) -> None:
@@ -162,45 +165,46 @@ class SuiteTrials:
         shares = self.terms.shares
         return asked < shares.asked and self.used + shares.block <= shares.explore
 
-    def explore(self, candidate: Candidate) -> Explored:
-        """See `Trials`: only a verified candidate drives."""
-        is_variation = candidate.report is None
-        if is_variation:
+    @property
+    def pool_size(self) -> int:
+        """See `Trials`."""
+        return self.terms.shares.block
+
+    @cached_property
+    def pool_feedback(self) -> PoolFeedback:
+        """See `Trials`: starts of disturbed episodes lie near that of the task."""
+        scene = self.task.nominal, self.task.setting.units
+        first = seeds_for(self.terms.recorder.run, POOL, 0).start
+        return PoolFeedback("episode", first, lambda _: scene)
+
+    def admit(self, candidate: Candidate) -> Explored | None:
+        """See `Trials`: only what passes all tests drives."""
+        if candidate.report is None:
             self.test([candidate])
         report = _report(candidate)
-        if not report.passed:
-            return failed_tests(report)
-        driven = self._drive(candidate, IMPROVE, self.terms.shares.block)
-        figures = task_figures(self.task, report, driven)
-        if not is_variation:
-            said = drive_text(figures.time, driven.successes, len(driven.episodes))
-            about = {"k": candidate.k, "j": candidate.j, "said": said}
-            self.terms.recorder.tell({"event": "improve.begin", **about})
+        return None if report.passed else failed_tests(report)
+
+    def drive_pool(self, candidate: Candidate, count: int) -> Explored | None:
+        """See `Trials`."""
+        report = self._drive(candidate, POOL, count, len(candidate.pool))
+        candidate.pool += report.episodes
+        return None
+
+    def pool_result(self, candidate: Candidate) -> Explored:
+        """See `Trials`."""
+        report, rows = _report(candidate), candidate.pool
+        figures, reached = task_figures(self.task, report, rows), successes_of(rows)
+        told = drive_text(figures.time, int(sum(reached)), len(rows))
+        # A candidate of the loop is on record already.
+        about = {"k": candidate.k, "j": candidate.j, "said": told}
+        self.terms.recorder.tell({"event": "improve.begin", **about})
         return Explored(
             figures,
-            told(driven),
+            goals_text(int(sum(reached)), len(rows)),
             passed=True,
             seed=report.provenance.seed,
-            episodes=len(driven.episodes),
-            feedback=disturbed_feedback(driven),
+            episodes=len(rows),
         )
-
-    def lines(self, member: Member, best: Member) -> list[str]:
-        """See `Trials`."""
-        own, top = member.figures.by_name, best.figures.rank
-        explored = member.candidate.explored
-        assert explored is not None
-        clearance = self.task.setting.units.figure(own["clearance"])
-        return [
-            f"It passes all tests. In {explored.episodes} disturbed episodes, the same "
-            f"for all controllers ({Disturbance()}):",
-            f"- goals reached: {own['robustness']:.3f}; the best controller so far has "
-            f"{top[0]:.3f}",
-            f"- mean time score (success weighted by time): {own['time']:.3f}; the "
-            f"best controller so far has {top[1]:.3f}",
-            f"- least gap between body and obstacles, on average: {clearance}",
-            f"- time score of the episode without disturbances: {own['nominal']:.3f}",
-        ]
 
     def finalists(self, archive: Archive) -> list[Candidate]:
         """See `Trials`: the best member has been decided on."""
@@ -216,8 +220,9 @@ class SuiteTrials:
 
     def compare(self, candidate: Candidate) -> dict[str, list[float]]:
         """See `Trials`."""
-        driven = self._drive(candidate, "comparison", self.terms.shares.comparison)
-        return {"robustness": successes_of(driven), "time": times_of(driven)}
+        count = self.terms.shares.comparison
+        rows = self._drive(candidate, "comparison", count).episodes
+        return {"robustness": successes_of(rows), "time": times_of(rows)}
 
     def secure(self, candidate: Candidate) -> None:
         """See `Trials`."""
@@ -235,7 +240,7 @@ class SuiteTrials:
         if chosen.archive is None:
             self.secure(chosen.candidate)
             return chosen.candidate
-        terms, first = self.terms, chosen.archive.members[0].candidate
+        terms, first = self.terms, chosen.archive.base
         chosen = self._confirmed(chosen, first)
         changes = compared(self.compare, first, chosen.candidate)
         found = task_improvement(
@@ -244,7 +249,7 @@ class SuiteTrials:
             chosen,
             changes,
             used=self.used,
-            first_seed=seeds_for(terms.recorder.run, IMPROVE, 0).start,
+            first_seed=seeds_for(terms.recorder.run, POOL, 0).start,
             first_comparison=seeds_for(terms.recorder.run, "comparison", 0).start,
         )
         text = found.model_dump_json(indent=2) + "\n"
@@ -290,17 +295,21 @@ class SuiteTrials:
                 keep_confirmation(self.terms, candidate)
         return candidate.confirmation
 
-    def _drive(self, candidate: Candidate, purpose: str, count: int) -> EpisodeReport:
-        """Drives episodes, the same for all candidates; those on record are reused."""
-        terms, out = self.terms, candidate.folder / purpose
+    def _drive(
+        self, candidate: Candidate, purpose: str, count: int, done: int = 0
+    ) -> EpisodeReport:
+        """Drives the same episodes as others, after `done`; reuses those on record."""
+        terms, out = self.terms, candidate.folder / f"{purpose}-{done + 1}"
         about = {"k": candidate.k, "j": candidate.j, "what": purpose, "episodes": count}
         terms.recorder.event("drive.start", **about)
-        seeds = seeds_for(terms.recorder.run, purpose, count)
+        seeds = seeds_for(terms.recorder.run, purpose, done + count)[done:]
         found = drive_candidate(
             *(terms, candidate, self.task, seeds, out, about),
             disturbance=self.task.own_disturbance(),
         )
         self.used += count
+        if purpose == POOL:
+            candidate.pool_folders.append(out)
         terms.recorder.event("drive.end", **about, reached=found.successes)
         return found
 

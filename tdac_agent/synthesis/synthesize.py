@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.models.budget import Budget
@@ -21,10 +21,11 @@ from tdac_agent.runs.recorder import Event
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
+from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.dialogue import Dialogue
-from tdac_agent.synthesis.improve import ImprovingSearch
 from tdac_agent.synthesis.iterations import Iterations
-from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.options import RACE, SynthOptions
+from tdac_agent.synthesis.race import Race
 from tdac_agent.synthesis.selection import select
 from tdac_agent.synthesis.setup import (
     account_of,
@@ -103,6 +104,7 @@ def synthesize(
     given = {name: value for name, value in named.items() if value is not None}
     wanted = (options or SynthOptions()).changed(**keywords, **given)
     about = problem_of(problem)
+    wanted = wanted.settled(on_set=about.has_hidden)
     if wanted.suite is not None:
         about = about.permitted(wanted.suite)
     _check(wanted, about)
@@ -131,7 +133,8 @@ def synthesize(
         dialogue = Dialogue(about, *models, calls, book, template)
         dialogue.begin()
         warm = judge or stack.enter_context(WarmJudge(task=about.task))
-        parts = shares(run.episodes, wanted.improve)
+        race = run.iterations if run.search == RACE else 0
+        parts = shares(run.episodes, wanted.improve, race)
         terms = Terms(recorder, warm, parts, wanted)
         return _run(dialogue, trials_of(about, terms), source)
 
@@ -161,13 +164,35 @@ def _check(wanted: SynthOptions, problem: Problem) -> None:
     for name, least in wanted.least.items():
         whole_number(name, getattr(wanted, name), least)
     if problem.has_hidden:
-        whole_number("episodes", wanted.episodes, 2, MOST_EPISODES)
+        whole_number("episodes", wanted.episodes or 0, 2, MOST_EPISODES)
         whole_number("feedback_episodes", wanted.feedback_episodes, 1, MOST_EPISODES)
     elif wanted.then_verify:
         raise TaskError(f"then_verify: {problem.called} has no hidden worlds")
     if wanted.improve:
         whole_number("improve", wanted.improve, LEAST_IMPROVE, MOST_EPISODES)
+    if wanted.search == RACE:
+        _check_race(wanted, problem)
     problem.check(wanted.improve)
+
+
+def _check_race(wanted: SynthOptions, problem: Problem) -> None:
+    """Checks that a race has episodes, and that its options have an effect.
+
+    Raises:
+        TaskError: One of them cannot be used.
+    """
+    if (wanted.iterations or 0) > (wanted.candidates or 0) and not wanted.kinds:
+        raise TaskError("ask: expected a kind of question; give -K as many as -N")
+    if problem.has_hidden and wanted.improve:
+        raise TaskError(
+            "improve: a race goes on after a success anyway; give more answers (-K) or "
+            "episodes instead"
+        )
+    if not problem.has_hidden and not wanted.improve:
+        raise TaskError(
+            "search: a race on a task needs --improve N, the number of its disturbed "
+            "episodes"
+        )
 
 
 def _recorded(
@@ -243,28 +268,12 @@ def _run(dialogue: Dialogue, trials: Trials, given: str | None) -> Run:
 
 
 def _write(dialogue: Dialogue, trials: Trials, given: str | None) -> None:
-    """Algorithm 2: the iterations, the search for improvements, the selection."""
+    """Writes controllers, selects one of them, and delivers it."""
     if dialogue.learner.paid or dialogue.optimizer.paid:
         trials.prove()
-    loop = Iterations(dialogue, trials, given)
-    written, stopped = loop.written, ""
-    try:
-        stopped = loop.run()
-    except OutOfBudget as error:
-        # With more money, the run can go on; what is good for something is selected.
-        if not any(trials.result(each).works for each in written):
-            raise
-        stopped = str(error)
-    able = [each for each in written if not trials.result(each).unfit]
-    archive, asked = None, 0
-    works = any(trials.result(each).works for each in able)
-    if trials.terms.recorder.run.improve and works:
-        trials.secure(max(able, key=lambda each: trials.result(each).rank))
-        search = ImprovingSearch(dialogue, trials, written)
-        stopped = search.run(able) or stopped
-        archive, asked = search.archive, search.asked
-        able = trials.finalists(archive)
-    validation = trials.terms.shares.validation
+    search = _race if trials.terms.recorder.run.search == RACE else _loop
+    found = search(dialogue, trials, given)
+    validation, able = trials.terms.shares.validation, found.able
     if not validation:  # the tests have decided
         able.sort(key=lambda each: trials.result(each).rank, reverse=True)
     chosen = select(able, validation, trials.validate) if able else None
@@ -272,4 +281,55 @@ def _write(dialogue: Dialogue, trials: Trials, given: str | None) -> None:
         reason = trials.why_none(able)
         trials.terms.recorder.finish("not verified", reason=reason)
         return
-    conclude(trials, Chosen(chosen, written, archive, asked, stopped))
+    archive, asked = (None, 0) if found.race is None else found.race.found
+    conclude(trials, Chosen(chosen, found.written, archive, asked, found.stopped))
+
+
+class _Found(NamedTuple):
+    """What a search came to.
+
+    Attributes:
+        written: All candidates.
+        able: Those to select from.
+        stopped: What ended it early.
+        race: The race, if there was one.
+    """
+
+    written: list[Candidate]
+    able: list[Candidate]
+    stopped: str
+    race: Race | None = None
+
+
+def _loop(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
+    """Algorithm 2: the iterations, then a race for improvements, if one is wanted."""
+    loop = Iterations(dialogue, trials, given)
+    written, stopped = loop.written, ""
+    try:
+        stopped = loop.run()
+    except OutOfBudget as error:
+        # With more money, the run can go on; what works for something is selected.
+        if not any(trials.result(each).works for each in written):
+            raise
+        stopped = str(error)
+    able = [each for each in written if not trials.result(each).unfit]
+    works = any(trials.result(each).works for each in able)
+    if not trials.terms.recorder.run.improve or not works:
+        return _Found(written, able, stopped)
+    trials.secure(max(able, key=lambda each: trials.result(each).rank))
+    race = Race(dialogue, trials, written, most=trials.terms.shares.asked)
+    race.begin_with(able)
+    stopped = race.run() or stopped
+    return _Found(written, trials.finalists(race.archive), stopped, race)
+
+
+def _race(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
+    """First answers, and questions that build on them."""
+    run, written = trials.terms.recorder.run, list[Candidate]()
+    first = min(run.candidates, run.iterations)
+    kinds, most = trials.terms.options.kinds, run.iterations - first
+    race = Race(dialogue, trials, written, most=most, kinds=kinds)
+    race.ask_first(given, first)
+    stopped = race.run()
+    able = trials.finalists(race.archive) if race.archive.members else []
+    return _Found(written, able, stopped, race)

@@ -7,8 +7,9 @@ from typing import Protocol
 
 from tdac_agent.problems.problem import Problem
 from tdac_agent.runs.run_record import Status
-from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.archive import Archive
 from tdac_agent.synthesis.candidates import Candidate, Explored, Result
+from tdac_agent.synthesis.pool_feedback import PoolFeedback
 from tdac_agent.synthesis.suite_trials import SuiteTrials
 from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.verification.episode_report import EpisodeReport
@@ -66,18 +67,33 @@ class Trials(Protocol):
     def result(self, candidate: Candidate) -> Result:
         """What came of its tests so far."""
 
+    @property
+    def pool_size(self) -> int:
+        """Number of episodes of a race, the same for all candidates."""
+
+    @property
+    def pool_feedback(self) -> PoolFeedback:
+        """Tells models how candidates drove in a race."""
+
     def can_explore(self, asked: int) -> bool:
-        """Whether another variation may be asked for.
+        """Whether there are episodes for another candidate of a race.
 
         Args:
-            asked: Number of variations that were answered.
+            asked: Number of its questions that were answered.
         """
 
-    def explore(self, candidate: Candidate) -> Explored:
-        """Drives a candidate in the episodes of a search, the same for all."""
+    def admit(self, candidate: Candidate) -> Explored | None:
+        """Tests a candidate before a race; returns why it may not drive, or None."""
 
-    def lines(self, member: Member, best: Member) -> list[str]:
-        """The figures of a member of the archive for a model, in lines."""
+    def drive_pool(self, candidate: Candidate, count: int) -> Explored | None:
+        """Drives a candidate in its next episodes of a race.
+
+        Returns:
+            Why it did not drive, if tests refused it.
+        """
+
+    def pool_result(self, candidate: Candidate) -> Explored:
+        """What came of a candidate in its episodes of a race; it drove in some."""
 
     def finalists(self, archive: Archive) -> list[Candidate]:
         """The candidates for the selection after a search."""

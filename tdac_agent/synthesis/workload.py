@@ -12,6 +12,14 @@ from tdac_agent.models.tariff import Tariff
 from tdac_agent.models.tokens import estimate_tokens
 from tdac_agent.prompting.rules import MAX_RULE_TOKENS
 from tdac_agent.runs.run_record import Run
+from tdac_agent.synthesis.question_kinds import (
+    FASTER,
+    FRESH,
+    INFORMED,
+    MERGE,
+    REPAIR,
+    RULES,
+)
 
 FEEDBACK_TOKENS = 12_000
 """Allowance for the failures, the earlier attempts and the text around them."""
@@ -55,8 +63,12 @@ class Shares(NamedTuple):
         return self.variations * (1 if self.validation else ASKED_FOR_ONE)
 
 
-def shares(episodes: int | None, improve: int = 0) -> Shares:
+def shares(episodes: int | None, improve: int = 0, race: int = 0) -> Shares:
     """Divides the episodes of a run.
+
+    In a race, 3 of 8 episodes go to the pool, 3 of 8 to the selection, and an eighth
+    each to the two controllers of the comparison. On a task they are those of
+    `improve`, and half as many are for the comparison.
 
     Args:
         episodes: Limit of the loop on a set: half for tests, half for the selection.
@@ -64,7 +76,14 @@ def shares(episodes: int | None, improve: int = 0) -> Shares:
         improve: Further episodes. An eighth of them each goes to the two controllers
             of the comparison at the end, on a set another one to the selection, and
             the others to variations.
+        race: All answers of a race; 0 without one.
     """
+    if race:
+        whole = improve if episodes is None else episodes
+        part = whole // 8
+        validation = 0 if episodes is None else 3 * part
+        explore = whole - 2 * part - validation
+        return Shares(0, validation, explore, max(1, explore // race), part)
     part = improve // 8
     if episodes is None:
         explore = improve - 2 * part
@@ -94,6 +113,20 @@ class Rest(NamedTuple):
 
     questions: int
     most: Amount
+
+
+def of_race(answers: int, first: int, ask: str) -> Workload:
+    """The most questions of a race to each of the models.
+
+    Args:
+        answers: All answers.
+        first: Those that come first.
+        ask: Kinds of the other questions, separated by commas.
+    """
+    kinds, others = set(ask.split(",")), max(0, answers - first)
+    learner = others if kinds & {FRESH, INFORMED, RULES} else 0
+    optimizer = others if kinds & {REPAIR, FASTER, MERGE, RULES} else 0
+    return Workload(min(first, answers) + learner, optimizer)
 
 
 def whole(
@@ -142,6 +175,15 @@ def from_here(
     )
 
 
+def race_from_here(request: Request, run: Run) -> Workload:
+    """A question of a race and all that may follow it."""
+    _, k, _ = request.sample
+    first = max(0, run.candidates - k + 1)
+    left = of_race(max(run.iterations - k + 1, 1), first, run.ask)
+    role = Workload(1, 0) if request.role == "learner" else Workload(0, 1)
+    return Workload(*map(max, left, role))
+
+
 def tokens_asked(question: int, max_output: int) -> Workload:
     """Tokens of a question for a controller, and of one about a controller.
 
@@ -170,15 +212,20 @@ def rest_of(
         worst: Its maximum cost.
         max_output: Token limit of an answer.
     """
-    left = from_here(
-        request,
-        run.iterations,
-        run.patience,
-        refine=run.refine,
-        candidates=run.candidates,
-        variations=shares(run.episodes, run.improve).asked,
-    )
+    if run.search == "race":
+        left = race_from_here(request, run)
+    else:
+        left = from_here(
+            request,
+            run.iterations,
+            run.patience,
+            refine=run.refine,
+            candidates=run.candidates,
+            variations=shares(run.episodes, run.improve).asked,
+        )
     tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
+    if run.search == "race":  # new controllers are asked for with what is known
+        tokens = Workload(tokens.optimizer, tokens.optimizer)
     this = Workload(1, 0) if request.role == "learner" else Workload(0, 1)
     most = worst
     models = (run.learner, run.optimizer)

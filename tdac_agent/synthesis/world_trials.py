@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 
 from tdac_agent.runs.improvement_record import PairedChange
@@ -10,7 +11,7 @@ from tdac_agent.runs.run_record import Status
 from tdac_agent.runs.selection_record import SELECTION_FILE
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.hashes import number_of
-from tdac_agent.synthesis.archive import Archive, Member
+from tdac_agent.synthesis.archive import Archive
 from tdac_agent.synthesis.candidates import (
     Candidate,
     Explored,
@@ -20,6 +21,7 @@ from tdac_agent.synthesis.candidates import (
 from tdac_agent.synthesis.delivery import compared, selection_of
 from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.hidden import hidden_report
+from tdac_agent.synthesis.pool_feedback import PoolFeedback
 from tdac_agent.synthesis.set_reports import (
     figures_of,
     set_feedback,
@@ -33,8 +35,11 @@ from tdac_agent.synthesis.tested import (
     suite_result,
 )
 from tdac_agent.synthesis.workload import MOST_EPISODES
+from tdac_agent.tasks.setting import Nominal
+from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.report import Report
-from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.episode_report import EpisodeReport, cause_of
+from tdac_agent.verification.judge.set_worlds import shown_units
 from tdac_agent.verification.own_tests import kept_tests, run_own_tests
 from tdac_agent.verification.store import read_report
 from tdac_envs.ladder.task_sets import TaskSet
@@ -70,7 +75,7 @@ class WorldTrials:
     status: Status = "selected"
     ended = "all feedback episodes were driven"
     needs_new_code = True
-    aim = "Raise its mean time score on worlds that nobody has seen yet."
+    aim = "What counts is the mean time score on worlds that nobody has seen yet."
 
     def __init__(self, tasks: TaskSet, terms: Terms, suite: Path | None = None) -> None:
         self.tasks, self.terms, self.suite = tasks, terms, suite
@@ -173,37 +178,50 @@ class WorldTrials:
         shares = self.terms.shares
         return self.used["improve"] + shares.block <= shares.explore
 
-    def explore(self, candidate: Candidate) -> Explored:
+    @property
+    def pool_size(self) -> int:
         """See `Trials`."""
-        if not self._passes(candidate):
-            assert candidate.report is not None
-            return failed_tests(candidate.report)
-        report = self._driven(candidate, "improve", self.terms.shares.block)
-        if not report.count:
-            said, failed = set_feedback(report).line, tuple(report.told)
-            return Explored(None, said, failed=failed, drove=False)
-        all_reached = report.successes == report.count
-        return Explored(
-            figures_of(report),
-            f"the goal reached in {report.successes} of {report.count} worlds",
-            passed=all_reached,
-            failed=tuple(report.causes),
-            episodes=report.count,
-            feedback=None if all_reached else set_feedback(report).text,
-        )
+        return self.terms.shares.block
 
-    def lines(self, member: Member, best: Member) -> list[str]:
+    @cached_property
+    def pool_feedback(self) -> PoolFeedback:
         """See `Trials`."""
-        own, explored = member.figures.by_name, member.candidate.explored
-        assert explored is not None
-        return [
-            f"On {explored.episodes} worlds, the same for all controllers:",
-            f"- mean time score (success weighted by time): {own['time']:.3f}; the "
-            f"best controller so far has {best.figures.time:.3f}",
-            f"- on the worst quarter of the worlds: {own['worst']:.3f}",
-            f"- mean path score (success weighted by length): {own['path']:.3f}",
-            f"- goals reached: {own['success']:.3f}",
-        ]
+        return PoolFeedback("world", self.first_for("improve"), self._scene)
+
+    def _scene(self, number: int) -> tuple[Nominal, Units]:
+        task = self.tasks.task("dev", number)
+        return task, shown_units(self.tasks.file, task)
+
+    def admit(self, candidate: Candidate) -> Explored | None:
+        """See `Trials`: the user's own tests."""
+        if self._passes(candidate):
+            return None
+        assert candidate.report is not None
+        return failed_tests(candidate.report)
+
+    def drive_pool(self, candidate: Candidate, count: int) -> Explored | None:
+        """See `Trials`."""
+        report = self._driven(candidate, "improve", count, len(candidate.pool))
+        if not report.count:
+            found, failed = set_feedback(report), tuple(report.told)
+            return Explored(
+                None, found.line, failed=failed, drove=False, feedback=found.text
+            )
+        candidate.pool += report.episodes
+        return None
+
+    def pool_result(self, candidate: Candidate) -> Explored:
+        """See `Trials`."""
+        rows = candidate.pool
+        reached = sum(each.success for each in rows)
+        causes = {cause_of(each) for each in rows if not each.success}
+        return Explored(
+            figures_of(rows),
+            f"the goal reached in {reached} of {len(rows)} worlds",
+            passed=reached == len(rows),
+            failed=tuple(sorted(causes)),
+            episodes=len(rows),
+        )
 
     def finalists(self, archive: Archive) -> list[Candidate]:
         """See `Trials`."""
@@ -310,6 +328,8 @@ class WorldTrials:
             *(terms, candidate, self.tasks, numbers, folder, about), split="dev"
         )
         self.used[purpose] += report.count
+        if purpose == "improve":
+            candidate.pool_folders.append(folder)
         ended = {"reached": report.successes, "driven": report.count}
         terms.recorder.event("drive.end", **about, **ended)
         return report

@@ -25,7 +25,7 @@ from tdac_agent.studio.pages.layout import (
     shown_first,
 )
 from tdac_agent.studio.pages.writers import Writers
-from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.options import RACE, USUAL
 from tdac_agent.synthesis.workload import MOST_EPISODES
 from tdac_envs.core.errors import TdacError
 from tdac_envs.drawing.canvas import Image
@@ -34,7 +34,7 @@ from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.ladder.worlds import LadderWorld
 
-EPISODES = SynthOptions().episodes
+EPISODES = USUAL[RACE]["episodes"]
 LEAST = 2
 """Episodes of a run on a set: one for a test, one for the selection."""
 SECONDS = 0.05
