@@ -17,6 +17,7 @@ from tdac_agent.models.vendors import vendor_of
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
 from tdac_agent.synthesis.options import RACE, SynthOptions
+from tdac_agent.synthesis.settled import settled
 from tdac_agent.synthesis.synthesize import book_of
 from tdac_agent.synthesis.workload import shares
 
@@ -29,7 +30,7 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
         check_name(name)
     template, book = load_template(options.prompt), book_of(options.rules)
     problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
-    options = options.settled(on_set=problem.has_hidden)
+    options = settled(options, on_set=problem.has_hidden)
     server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]
     episodes = options.episodes if problem.has_hidden else None

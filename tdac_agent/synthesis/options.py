@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from tdac_agent.models.vendors import forms
 from tdac_agent.option_fields import Flag, flag_of, option
 from tdac_agent.synthesis.question_kinds import ASKED, KINDS
-from tdac_envs.core.arguments import one_of
 
 if TYPE_CHECKING:
     from tdac_agent.models.provider import Provider
@@ -217,32 +216,6 @@ class SynthOptions:
         recorded=False,
     )
 
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """Kinds of questions of a race.
-
-        Raises:
-            TaskError: There is no such kind.
-        """
-        found = tuple(dict.fromkeys(filter(None, map(str.strip, self.ask.split(",")))))
-        for kind in found:
-            one_of("ask", kind, KINDS)
-        return found
-
-    def settled(self, *, on_set: bool) -> SynthOptions:
-        """The same, with a search and the defaults that depend on it.
-
-        Raises:
-            TaskError: There is no such search.
-        """
-        search = self.search or (RACE if on_set else PAPER)
-        one_of("search", search, SEARCHES)
-        usual = USUAL[search]
-        missing: dict[str, Any] = {
-            name: usual[name] for name in usual if getattr(self, name) is None
-        }
-        return replace(self, search=search, **missing)
-
     def changed(self, **values: Any) -> SynthOptions:
         """The same with other values.
 
@@ -301,8 +274,9 @@ class SynthOptions:
                 text = ", ".join(sorted(known))
                 raise ValueError(f"there is no option {name!r}; expected one of {text}")
             field, flag = known[name]
-            kind, least = type(field.default), flag.least
-            if field.default is not None and type(value) is not kind:
+            usual = USUAL[PAPER].get(name, field.default)
+            kind, least = type(usual), flag.least
+            if usual is not None and type(value) is not kind:
                 raise ValueError(f"{name}: expected {kind.__name__}, got {value!r}")
             if least is not None and value != field.default and value < least:
                 raise ValueError(f"{name}: expected at least {least:g}, got {value!r}")

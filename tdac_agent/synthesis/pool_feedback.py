@@ -118,7 +118,10 @@ class PoolFeedback:
             f"{self.word} {self._name(row)}: score {row.time_score:.2f}, {seconds} s, "
             f"least {least} s"
         ]
-        lines += [f"- {line}" for line in told_pieces(trajectory, *scene)]
+        pieces = told_pieces(trajectory, *scene)
+        if not pieces:
+            return ""
+        lines += [f"- {line}" for line in pieces]
         best = _best_in(others, row)
         if best is not None:
             other, found = best

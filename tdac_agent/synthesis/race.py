@@ -16,6 +16,7 @@ from tdac_agent.prompting.feedback import Feedback
 from tdac_agent.prompting.python_source import same_code
 from tdac_agent.runs.run_record import Attempt
 from tdac_agent.synthesis.archive import Archive, Member, Refused
+from tdac_agent.synthesis.bandit import Bandit
 from tdac_agent.synthesis.calls import OutOfBudget
 from tdac_agent.synthesis.candidates import Candidate, Explored
 from tdac_agent.synthesis.dialogue import Dialogue, ModelAnswer, Notes, same_as
@@ -28,7 +29,6 @@ from tdac_agent.synthesis.question_kinds import (
     MERGE,
     REPAIR,
     RULES,
-    Bandit,
 )
 from tdac_agent.synthesis.race_questions import RaceQuestions
 from tdac_agent.synthesis.trials import Trials

@@ -27,6 +27,7 @@ from tdac_agent.synthesis.iterations import Iterations
 from tdac_agent.synthesis.options import RACE, SynthOptions
 from tdac_agent.synthesis.race import Race
 from tdac_agent.synthesis.selection import select
+from tdac_agent.synthesis.settled import kinds_of, settled
 from tdac_agent.synthesis.setup import (
     account_of,
     hold_folder,
@@ -104,7 +105,7 @@ def synthesize(
     given = {name: value for name, value in named.items() if value is not None}
     wanted = (options or SynthOptions()).changed(**keywords, **given)
     about = problem_of(problem)
-    wanted = wanted.settled(on_set=about.has_hidden)
+    wanted = settled(wanted, on_set=about.has_hidden)
     if wanted.suite is not None:
         about = about.permitted(wanted.suite)
     _check(wanted, about)
@@ -181,7 +182,7 @@ def _check_race(wanted: SynthOptions, problem: Problem) -> None:
     Raises:
         TaskError: One of them cannot be used.
     """
-    if (wanted.iterations or 0) > (wanted.candidates or 0) and not wanted.kinds:
+    if (wanted.iterations or 0) > (wanted.candidates or 0) and not kinds_of(wanted.ask):
         raise TaskError("ask: expected a kind of question; give -K as many as -N")
     if problem.has_hidden and wanted.improve:
         raise TaskError(
@@ -327,7 +328,7 @@ def _race(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
     """First answers, and questions that build on them."""
     run, written = trials.terms.recorder.run, list[Candidate]()
     first = min(run.candidates, run.iterations)
-    kinds, most = trials.terms.options.kinds, run.iterations - first
+    kinds, most = kinds_of(run.ask), run.iterations - first
     race = Race(dialogue, trials, written, most=most, kinds=kinds)
     race.ask_first(given, first)
     stopped = race.run()
