@@ -30,7 +30,7 @@ from tdac_agent.planners.planner import (
     TUNED,
     levels_of,
     ranges_of,
-    source_of,
+    source_on,
     with_values,
 )
 from tdac_agent.storage.files import write_atomic
@@ -50,7 +50,7 @@ SEED = 1
 
 def tune(name: str, level: str, out: Path) -> None:
     """Tunes a planner for a level, and writes what came out."""
-    source, ranges = source_of(name), ranges_of(name)
+    source, ranges = source_on(name, load_set(level)), ranges_of(name)
     rng = np.random.default_rng(SEED)
     settings = [own_values(source, ranges)]
     settings += [drawn(ranges, rng) for _ in range(SETTINGS - 1)]

@@ -78,12 +78,17 @@ def _none_for(tasks: TaskSet, instead: str) -> str:
     )
 
 
-def level_of(tasks: TaskSet) -> str | None:
+def level_of(tasks: TaskSet, any_unit: bool = False) -> str | None:
     """The level with a built-in controller whose observations are those of a set.
 
     A set with the name of a level has only the controller of this level.
+
+    Args:
+        tasks: The task set.
+        any_unit: Whether the observations may be in other units.
     """
-    equal = [name for name in set_names() if _given(load_set(name)) == _given(tasks)]
+    given = _given(tasks)[: -1 if any_unit else None]
+    equal = [k for k in set_names() if _given(load_set(k))[: len(given)] == given]
     names = [tasks.name] if tasks.name in equal else equal
     return next((name for name in names if (LEVELS / f"{name}.py").is_file()), None)
 

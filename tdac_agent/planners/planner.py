@@ -17,6 +17,12 @@ from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 
 TUNED = "tuned.json"
+_IN_METRES = (
+    ("    PARAMS = json.load(file)", "    PARAMS = in_pixels(json.load(file))"),
+    ("def reset(obs):", "@by_pixels\ndef reset(obs):"),
+    ("def policy(obs):", "@by_pixels\ndef policy(obs):"),
+)
+"""Lines of a planner that the part `metres` changes, and what they become."""
 
 
 class _Entry(BaseModel):
@@ -53,20 +59,23 @@ def planner_on(name: str, problem: Task | TaskSet) -> Planner:
     entry, level = _known()[name], _level_of(problem)
     if level not in entry.levels:
         known = ", ".join(entry.levels)
-        raise TaskError(f"{name} needs what is observed in {known}, in their units")
+        raise TaskError(f"{name} needs what is observed in {known} (on tasks: in px)")
     assert level is not None
     # Some sets with the observations of a level have values of their own; on the
     # others, those of the level are used.
     own = _tuned().get(name, {})
     values = own.get(problem.name, own.get(level, {}))
     tuned = problem.name in own if entry.ranges else None
-    return Planner(with_values(source_of(name), values), tuned)
+    return Planner(with_values(source_on(name, problem), values), tuned)
 
 
 def _level_of(problem: Task | TaskSet) -> str | None:
-    """The level whose observations a problem has; None if there is none."""
+    """The level whose observations a problem has; None if there is none.
+
+    Sets in metres that are like none in metres have those of one in px.
+    """
     if isinstance(problem, TaskSet):
-        return level_of(problem)
+        return level_of(problem) or level_of(problem, any_unit=True)
     if problem.spec.env != Map2DTask.env_id or problem.spec.frame != "pixels":
         return None
     return "crowd" if problem.spec.movers else "known"
@@ -90,6 +99,18 @@ def source_of(name: str) -> str:
     return "\n\n".join(file.read_text(encoding="utf-8") for file in files)
 
 
+def source_on(name: str, problem: Task | TaskSet) -> str:
+    """The file of a planner with its own values, for the units of a problem."""
+    source = source_of(name)
+    if not isinstance(problem, TaskSet) or problem.file.resolution is None:
+        return source
+    for line, changed in _IN_METRES:
+        source = _replaced(source, re.escape(line), changed)
+    # raw read: shipped
+    metres = (FOLDER / "parts" / "metres.py").read_text(encoding="utf-8")
+    return f"{metres}\n\n{source}"
+
+
 def with_values(source: str, values: dict[str, float]) -> str:
     """A file with other values of constants, each of them on a line `NAME = number`.
 
@@ -97,10 +118,15 @@ def with_values(source: str, values: dict[str, float]) -> str:
         ValueError: There is no such line.
     """
     for name, value in values.items():
-        line = re.compile(rf"^{name} = .*$", re.MULTILINE)
-        source, count = line.subn(f"{name} = {value!r}", source)
-        if count != 1:
-            raise ValueError(f"expected one line '{name} = ...', got {count}")
+        source = _replaced(source, f"{name} = .*", f"{name} = {value!r}")
+    return source
+
+
+def _replaced(source: str, line: str, by: str) -> str:
+    """A file with another line instead of the only one that an expression matches."""
+    source, count = re.subn(f"^{line}$", by, source, flags=re.MULTILINE)
+    if count != 1:
+        raise ValueError(f"expected one line '{line}', got {count}")
     return source
 
 
