@@ -27,6 +27,8 @@ from tdac_agent.runs.selection_record import (
     CandidateFigures,
     Improvement,
     Selection,
+    asked_text,
+    losses_text,
 )
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.verification.confirmation import CONFIRMATION_FILE, read_confirmation
@@ -194,7 +196,8 @@ def _show_selected(run: Run, console: Console) -> None:
             highlight=False,
         )
     if selection.improvement is not None:
-        console.print(f"  {_improvement(selection.improvement)}", highlight=False)
+        for line in _improvement(selection.improvement):
+            console.print(f"  {line}", highlight=False)
     hidden = run.folder / HIDDEN_FILE
     if run.status != "selected" and hidden.is_file():
         text = read_file(hidden, RECORD_BYTES)
@@ -204,38 +207,60 @@ def _show_selected(run: Run, console: Console) -> None:
     print_plain(console, f"  not verified yet: {shlex.join(words)}")
 
 
-def _improvement(search: Improvement) -> str:
-    """What the search for improvements brought, in one line."""
+def _improvement(search: Improvement) -> list[str]:
+    """What the search for improvements brought, in lines."""
     count = f"{search.variations} variation{'' if search.variations == 1 else 's'}"
     base = f"k={search.k} j={search.j}"
     if not search.worlds:
-        return f"improving: {count}; none was better than {base}, which stays"
+        return [f"improving: {count}; none was better than {base}, which stays"]
     assert search.before is not None
     assert search.after is not None
     assert search.low is not None
     assert search.high is not None
     caution = "" if is_shown(search.low, search.p) else f"; {NOT_SHOWN}"
-    return (
+    line = (
         f"improving: {count}; time score {search.before:.3f} ({base}) -> "
         f"{search.after:.3f} on {search.worlds} other worlds: "
         f"{search.after - search.before:+.3f} "
         f"(95 % interval {search.low:+.3f} to {search.high:+.3f})"
         f"{caution}"
     )
+    lost = losses_text(search.lost_before, search.lost_after)
+    return [line, *([f"lost there: {lost}"] if lost else [])]
 
 
 def _candidates(selection: Selection) -> Table:
-    """The candidates of the loop, and the variations that went on to the selection."""
+    """The candidates of the loop or race, and how those did that were selected from."""
+    raced = selection.search == "race"
     table, searched = Table(box=SIMPLE, padding=(0, 1, 0, 0)), selection.improve > 0
-    search = ("improving",) if searched else ()
-    for name in ("k", "j", "feedback", *search, "validation", "time score"):
+    columns = ("k", "asked for", "pool", "time score", "lost most by")
+    if not raced:
+        columns = ("k", "j", "feedback", *(("improving",) if searched else ()))
+    for name in columns:
+        left = name in {"asked for", "lost most by"}
+        table.add_column(name, justify="left" if left else "right")
+    for name in ("validation", "time score"):
         table.add_column(name, justify="right")
     for each in selection.candidates:
-        if each.feedback_worlds or each.validation_worlds:
+        if raced or each.feedback_worlds or each.validation_worlds:
             chosen = (each.k, each.j) == (selection.k, selection.j)
-            cells = _cells(each, searched=searched)
+            cells = _raced(each) if raced else _cells(each, searched=searched)
             table.add_row(*cells, style="bold" if chosen else None)
     return table
+
+
+def _raced(each: CandidateFigures) -> tuple[str, ...]:
+    """The cells of a candidate of a race."""
+    worst = max(each.lost, key=each.lost.__getitem__, default="")
+    return (
+        str(each.k),
+        asked_text(each.asked, each.parents),
+        _part(each.pool_reached, each.pool_worlds),
+        _score(each.improve_time),
+        f"{worst} {each.lost[worst]:.2f}" if worst and each.lost[worst] else "",
+        _part(each.validation_reached, each.validation_worlds),
+        _score(each.validation_time),
+    )
 
 
 def _cells(each: CandidateFigures, *, searched: bool) -> tuple[str, ...]:

@@ -25,9 +25,11 @@ from tdac_agent.runs.run_record import (
     GIVEN_RULES_FILE,
     PROMPT_FILE,
 )
+from tdac_agent.runs.selection_record import asked_text
 from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.diagnosis.losses import Losses
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 from tdac_envs.ladder.frozen import BEFORE
 
@@ -90,6 +92,8 @@ def section_of(
         "commands": list(_commands(history, name)),
         "set_part": set_part_of(history),
         "improvement": read_improvement(run.folder) if run.improve else None,
+        "causes": tuple(Losses().by_cause),
+        "asked_text": asked_text,
         "units": None if report is None else UNITS[report.provenance.unit],
     }
 

@@ -112,6 +112,10 @@ class TaskImprovement(StrictRecord):
         description="Episodes of the comparison, which decided nothing; 0 if the first "
         "candidate that passed was selected."
     )
+    lost_before: dict[str, float] = Field(
+        {}, description="Mean shares of the score that the first one lost, by cause."
+    )
+    lost_after: dict[str, float] = Field({}, description="Those of the selected one.")
     robustness: PairedChange | None = None
     time: PairedChange | None = None
     stopped: str = Field("", description="What ended the search early.")

@@ -77,6 +77,11 @@ class Attempt(PrintableRecord):
         "", exclude_if=operator.not_, description="Kind of the question, in a race."
     )
 
+    @property
+    def parents(self) -> tuple[tuple[int, int], ...]:
+        """(k, j) of the candidates that its question was about, in a race."""
+        return tuple(each for each in (self.parent, self.merged) if each is not None)
+
 
 class Confirmation(PrintableRecord):
     """The blind confirmation of a candidate that passed all tests."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from pydantic import AliasChoices, ConfigDict, Field
@@ -12,6 +13,23 @@ from tdac_agent.verification.judge.episode_row import Scores
 SELECTION_FILE = "report.json"
 HIDDEN_FILE = "hidden.json"
 """Report on the selected controller on hidden worlds: sums alone."""
+
+
+def asked_text(kind: str, parents: Sequence[tuple[int, int]]) -> str:
+    """What a candidate was asked for: `first answer`, `repair of 3`, `informed`."""
+    names = " and ".join(f"{k}.{j}" if j else f"{k}" for k, j in parents)
+    word = {"fresh": "first question", "given": "given"}.get(kind, kind)
+    return f"{word} of {names}" if names else word
+
+
+def losses_text(before: Mapping[str, float], after: Mapping[str, float]) -> str:
+    """How the losses by cause changed: `failure 0.100 -> 0.030, detour …`."""
+    parts = [
+        f"{name} {before[name]:.3f} -> {after.get(name, 0.0):.3f}"
+        for name in before
+        if max(before[name], after.get(name, 0.0)) >= 0.001
+    ]
+    return ", ".join(parts)
 
 
 class CandidateFigures(StrictRecord):
@@ -28,7 +46,16 @@ class CandidateFigures(StrictRecord):
         description="Mean time score; None without validation worlds."
     )
     improve_time: float | None = Field(
-        None, description="Mean time score on the worlds for variations, if it drove."
+        None, description="Mean time score in the pool of a race, if it drove there."
+    )
+    asked: str = Field("", description="Kind of the question that it answers.")
+    parents: tuple[tuple[int, int], ...] = Field(
+        (), description="(k, j) of the candidates that the question was about."
+    )
+    pool_worlds: int = Field(0, description="Worlds of the pool that it drove on.")
+    pool_reached: int = 0
+    lost: dict[str, float] = Field(
+        {}, description="Mean shares of the score that it lost there, by cause."
     )
 
 
@@ -51,6 +78,10 @@ class Improvement(StrictRecord):
         None,
         description="p-value of no difference; not below what so few worlds can show.",
     )
+    lost_before: dict[str, float] = Field(
+        {}, description="Mean shares of the score that the first one lost, by cause."
+    )
+    lost_after: dict[str, float] = Field({}, description="Those of the selected one.")
 
 
 class Selection(StrictRecord):
@@ -71,6 +102,7 @@ class Selection(StrictRecord):
     episodes: int = Field(description="Limit of simulated episodes of the loop.")
     feedback_used: int
     validation_used: int
+    search: str = Field("", description="`paper` or `race`.")
     improve: int = Field(0, description="Limit of further episodes.")
     improve_used: int = Field(0, description="By variations and by the comparison.")
     candidates: tuple[CandidateFigures, ...]

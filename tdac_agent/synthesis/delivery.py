@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tdac_agent.metrics.paired import paired_change
 from tdac_agent.runs.improvement_record import (
@@ -13,22 +13,25 @@ from tdac_agent.runs.improvement_record import (
     TaskImprovement,
 )
 from tdac_agent.runs.recorder import Recorder
+from tdac_agent.runs.run_record import Attempt
 from tdac_agent.runs.selection_record import CandidateFigures, Improvement, Selection
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.archive import Member
 from tdac_agent.synthesis.candidates import Candidate
+from tdac_agent.synthesis.pool_feedback import mean_losses
 from tdac_agent.synthesis.terms import Chosen, Terms
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.figures import draw_trajectories
-from tdac_agent.verification.judge.episode_row import scores_of
+from tdac_agent.verification.judge.episode_row import EpisodeRow, scores_of
 from tdac_agent.verification.verify import load_trajectories
 from tdac_envs.core.intake import IMAGE_BYTES, read_file
 
 if TYPE_CHECKING:
     from tdac_envs.ladder.task_sets import TaskSet
 
-Compare = Callable[[Candidate], dict[str, list[float]]]
-"""Drives the episodes of the comparison; returns scores of each, by name."""
+Compare = Callable[[Candidate], Sequence[EpisodeRow]]
+"""Drives the episodes of the comparison."""
+Figure = Callable[[EpisodeRow], float]
 
 
 def place_verified(task: Task, candidate: Candidate, recorder: Recorder) -> None:
@@ -45,24 +48,55 @@ def place_verified(task: Task, candidate: Candidate, recorder: Recorder) -> None
     draw_trajectories(task, trajectories, outcomes, folder / "trajectory.png")
 
 
+class Compared(NamedTuple):
+    """How the selected candidate changed what it improves.
+
+    Attributes:
+        changes: Means and differences by figure; empty if it is the same candidate.
+        lost_before: Mean shares of the score that were lost before, by cause.
+        lost_after: Those that are lost now.
+    """
+
+    changes: dict[str, PairedChange]
+    lost_before: dict[str, float]
+    lost_after: dict[str, float]
+
+
 def compared(
-    compare: Compare, base: Candidate, chosen: Candidate
-) -> dict[str, PairedChange]:
-    """How the selected candidate changed what it improves; empty if it is the same."""
+    compare: Compare,
+    base: Candidate,
+    chosen: Candidate,
+    figures: Mapping[str, Figure],
+) -> Compared:
+    """Drives both candidates in the same episodes.
+
+    Args:
+        compare: Drives a candidate.
+        base: What the search has to improve.
+        chosen: The selected candidate.
+        figures: The figures of an episode, by name.
+    """
     if chosen is base:
-        return {}
+        return Compared({}, {}, {})
     before, after = compare(base), compare(chosen)
-    return {
-        name: PairedChange(**asdict(paired_change(before[name], after[name])))
-        for name in before
+    changes = {
+        name: PairedChange(
+            **asdict(paired_change(list(map(figure, before)), list(map(figure, after))))
+        )
+        for name, figure in figures.items()
     }
+    return Compared(changes, _rounded(before), _rounded(after))
+
+
+def _rounded(rows: Sequence[EpisodeRow]) -> dict[str, float]:
+    return {name: round(each, 6) for name, each in mean_losses(rows).items()}
 
 
 def task_improvement(
     terms: Terms,
     task: Task,
     chosen: Chosen,
-    changes: dict[str, PairedChange],
+    found: Compared,
     **facts: Any,
 ) -> TaskImprovement:
     """The record of a search on a task.
@@ -71,12 +105,12 @@ def task_improvement(
         terms: What the trials share.
         task: The task.
         chosen: The candidate that was selected, and the archive.
-        changes: How it compares with the first verified one, by figure.
+        found: How it compares with the first verified one.
         **facts: `used`, `first_seed` and `first_comparison`.
     """
     archive, selected = chosen.archive, chosen.candidate
     assert archive is not None
-    first = archive.members[0].candidate
+    first, changes = archive.base, found.changes
     return TaskImprovement(
         unit=task.setting.units.place,
         disturbance=task.own_disturbance(),
@@ -90,6 +124,8 @@ def task_improvement(
         controller_sha256=selected.sha256,
         episodes=terms.shares.comparison if changes else 0,
         stopped=chosen.stopped,
+        lost_before=found.lost_before,
+        lost_after=found.lost_after,
         **changes,
         **facts,
     )
@@ -99,7 +135,7 @@ def selection_of(
     terms: Terms,
     tasks: TaskSet,
     chosen: Chosen,
-    changes: dict[str, PairedChange],
+    found: Compared,
     used: Mapping[str, int],
     **facts: Any,
 ) -> Selection:
@@ -109,19 +145,22 @@ def selection_of(
         terms: What the trials share.
         tasks: The task set.
         chosen: The candidate that was selected.
-        changes: How it compares with the best founder of the archive.
+        found: How it compares with the best founder of the archive.
         used: Number of episodes that were driven, by purpose.
         **facts: `first_feedback` and `first_validation`.
     """
     run, selected, archive = terms.recorder.run, chosen.candidate, chosen.archive
+    asked = {(each.k, each.j): each for each in run.attempts}
     assert run.episodes is not None
-    improvement = None
+    improvement, changes = None, found.changes
     if archive is not None:
         improvement = Improvement(
             variations=archive.variations,
             k=archive.base.k,
             j=archive.base.j,
             worlds=terms.shares.comparison if changes else 0,
+            lost_before=found.lost_before,
+            lost_after=found.lost_after,
             **(changes["time"].model_dump() if changes else {}),
         )
     return Selection(
@@ -131,9 +170,10 @@ def selection_of(
         episodes=run.episodes,
         feedback_used=used["feedback"],
         validation_used=used["validation"],
+        search=run.search,
         improve=run.improve,
         improve_used=used["improve"] + used["comparison"],
-        candidates=tuple(map(_candidate, chosen.written)),
+        candidates=tuple(_candidate(each, asked) for each in chosen.written),
         k=selected.k,
         j=selected.j,
         controller_sha256=selected.sha256,
@@ -155,10 +195,14 @@ def _member(member: Member) -> MemberFigures:
     )
 
 
-def _candidate(candidate: Candidate) -> CandidateFigures:
-    explored = candidate.explored
+def _candidate(
+    candidate: Candidate, asked: Mapping[tuple[int, int], Attempt]
+) -> CandidateFigures:
+    explored, pool = candidate.explored, candidate.pool
     drives = [row for report in candidate.feedback for row in report.episodes]
     figures = None if explored is None else explored.figures
+    attempt = asked.get((candidate.k, candidate.j))
+    parents = () if attempt is None else (attempt.parent, attempt.merged)
     return CandidateFigures(
         k=candidate.k,
         j=candidate.j,
@@ -169,4 +213,9 @@ def _candidate(candidate: Candidate) -> CandidateFigures:
         validation_reached=sum(each.success for each in candidate.validation),
         validation_time=candidate.score if candidate.validation else None,
         improve_time=None if figures is None else figures.time,
+        asked="" if attempt is None else attempt.asked,
+        parents=tuple(each for each in parents if each is not None),
+        pool_worlds=len(pool),
+        pool_reached=sum(each.success for each in pool),
+        lost=_rounded(pool) if pool else {},
     )

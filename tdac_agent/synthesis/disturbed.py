@@ -45,14 +45,19 @@ def seeds_for(run: Run, purpose: str, count: int) -> range:
     return range(first, first + count)
 
 
+def reached_of(row: EpisodeRow) -> float:
+    """1 if an episode reached the goal, else 0."""
+    return float(row.success)
+
+
+def time_of(row: EpisodeRow) -> float:
+    """Time score of an episode."""
+    return row.time_score
+
+
 def successes_of(rows: Sequence[EpisodeRow]) -> list[float]:
     """1 for each episode that reached the goal, else 0."""
-    return [float(each.success) for each in rows]
-
-
-def times_of(rows: Sequence[EpisodeRow]) -> list[float]:
-    """Time score of each episode."""
-    return [each.time_score for each in rows]
+    return list(map(reached_of, rows))
 
 
 def told(driven: EpisodeReport) -> str:
@@ -127,7 +132,7 @@ def task_figures(task: Task, report: Report, rows: Sequence[EpisodeRow]) -> Figu
     least = least_steps(task.nominal)
     figures = {
         "robustness": fmean(successes_of(rows)),
-        "time": fmean(times_of(rows)),
+        "time": fmean(map(time_of, rows)),
         "nominal": time_score(nominal.outcome == "reached", nominal.steps, least),
         "clearance": fmean(each.gap_left for each in rows),
     }

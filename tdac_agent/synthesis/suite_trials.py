@@ -30,10 +30,11 @@ from tdac_agent.synthesis.delivery import (
     task_improvement,
 )
 from tdac_agent.synthesis.disturbed import (
+    reached_of,
     seeds_for,
     successes_of,
     task_figures,
-    times_of,
+    time_of,
 )
 from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.pool_feedback import PoolFeedback
@@ -42,6 +43,7 @@ from tdac_agent.synthesis.tested import failed_tests, recorded_report, suite_res
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verdict import confirmed_text, is_verified
@@ -218,11 +220,10 @@ class SuiteTrials:
         del able
         return ""
 
-    def compare(self, candidate: Candidate) -> dict[str, list[float]]:
-        """See `Trials`."""
+    def compare(self, candidate: Candidate) -> Sequence[EpisodeRow]:
+        """Drives the episodes of the comparison."""
         count = self.terms.shares.comparison
-        rows = self._drive(candidate, "comparison", count).episodes
-        return {"robustness": successes_of(rows), "time": times_of(rows)}
+        return self._drive(candidate, "comparison", count).episodes
 
     def secure(self, candidate: Candidate) -> None:
         """See `Trials`."""
@@ -242,7 +243,8 @@ class SuiteTrials:
             return chosen.candidate
         terms, first = self.terms, chosen.archive.base
         chosen = self._confirmed(chosen, first)
-        changes = compared(self.compare, first, chosen.candidate)
+        figures = {"robustness": reached_of, "time": time_of}
+        changes = compared(self.compare, first, chosen.candidate, figures)
         found = task_improvement(
             terms,
             self.task,

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 
-from tdac_agent.runs.improvement_record import PairedChange
 from tdac_agent.runs.run_record import Status
 from tdac_agent.runs.selection_record import SELECTION_FILE
 from tdac_agent.storage.files import write_atomic
@@ -18,7 +17,8 @@ from tdac_agent.synthesis.candidates import (
     Result,
     ToldEpisode,
 )
-from tdac_agent.synthesis.delivery import compared, selection_of
+from tdac_agent.synthesis.delivery import Compared, compared, selection_of
+from tdac_agent.synthesis.disturbed import time_of
 from tdac_agent.synthesis.driving import drive_candidate
 from tdac_agent.synthesis.hidden import hidden_report
 from tdac_agent.synthesis.pool_feedback import PoolFeedback
@@ -39,6 +39,7 @@ from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.diagnosis.report import Report
 from tdac_agent.verification.episode_report import EpisodeReport, cause_of
+from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.set_worlds import shown_units
 from tdac_agent.verification.own_tests import kept_tests, run_own_tests
 from tdac_agent.verification.store import read_report
@@ -239,19 +240,20 @@ class WorldTrials:
             return "no candidate passed the static and contract tests"
         return "no candidate reached a goal on the validation worlds"
 
-    def compare(self, candidate: Candidate) -> dict[str, list[float]]:
-        """See `Trials`."""
-        report = self._driven(candidate, "comparison", self.terms.shares.comparison)
-        return {"time": [each.time_score for each in report.episodes]}
+    def compare(self, candidate: Candidate) -> Sequence[EpisodeRow]:
+        """Drives the worlds of the comparison."""
+        count = self.terms.shares.comparison
+        return self._driven(candidate, "comparison", count).episodes
 
     def secure(self, candidate: Candidate) -> None:
         """See `Trials`: nothing is verified before the selection."""
 
     def deliver(self, chosen: Chosen) -> Candidate:
         """See `Trials`."""
-        terms, changes = self.terms, dict[str, PairedChange]()
+        terms, changes = self.terms, Compared({}, {}, {})
         if chosen.archive is not None:
-            changes = compared(self.compare, chosen.archive.base, chosen.candidate)
+            base = chosen.archive.base
+            changes = compared(self.compare, base, chosen.candidate, {"time": time_of})
         selection = selection_of(
             terms,
             self.tasks,

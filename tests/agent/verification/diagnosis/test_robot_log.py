@@ -66,7 +66,7 @@ def test_wheels(late, units):
         for side in ("left", "right")
     )
     assert [*left, *right] == pytest.approx([0.9, 1.1, 0.9, 1.1], abs=0.02)
-    turn = float(re.search(r"on the spot by ([\d.]+)°", text)[1])
+    turn = float(re.search(r"turns by ([\d.]+)°", text)[1])
     assert turn == pytest.approx(np.degrees(2.0 * 3.0 / 9.0), rel=0.02)
     sense = "left" if units.up else "right"
     assert (
