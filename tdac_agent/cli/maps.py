@@ -12,7 +12,7 @@ from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.map_flags import MapOptions
 from tdac_agent.cli.sentences import print_plain, print_sentences
 from tdac_agent.cli.task_changes import in_pixels
-from tdac_agent.cli.task_choice import check_values, in_own_units
+from tdac_agent.cli.task_choice import IN_METRES, check_values, in_own_units
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.environments.map2d.task_robot import robot_text
 from tdac_envs.core.errors import PicturedError, TaskError
@@ -239,6 +239,8 @@ def _print_files(
         console.print(
             "read start and goal off its rulers, then give --start X Y --goal X Y"
         )
+    if params.resolution is None and params.start is None:
+        print_sentences(console, IN_METRES)
     if params.resolution is not None and units == PIXELS:
         console.print(
             "these places and lengths are in px; with --metres, flags, rulers and "

@@ -28,9 +28,9 @@ from tdac_agent.verification.verdict import COLOURS
 MOST_NAMES, SOME_NAMES = 6, 3
 """Of tests that fail for one reason, all are named up to `MOST_NAMES`, else some."""
 LEGEND = (
-    "grid path left, straight left: the smallest distance to the goal in the episode, "
-    "out of that at the start, along the grid path and in a straight line; ms per "
-    "call: mean time of policy(obs); smallest gap: between body and obstacles"
+    "grid path left, straight left: the smallest distance to the goal in the episode / "
+    "at its start, along the grid path and in a straight line; ms per call: mean time "
+    "of policy(obs); smallest gap: between body and obstacles"
 )
 
 
@@ -160,7 +160,7 @@ def episode_table(report: Report, units: Units) -> Table:
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,
-        padding=(0, 1, 0, 0),
+        padding=0,
     )
     table.add_column("start", no_wrap=True)
     table.add_column("outcome", no_wrap=True)
@@ -198,4 +198,4 @@ def _gap(episode: Episode, units: Units) -> str:
 
 def _fraction(units: Units, left: float, whole: float) -> str:
     shown = (units.amount(units.scale * length, 0) for length in (left, whole))
-    return " of ".join(shown)
+    return "/".join(shown)

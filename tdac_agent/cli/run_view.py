@@ -113,7 +113,7 @@ def _attempts(run: Run, search: TaskImprovement | None) -> Table:
     table.add_column("j", justify="right")
     table.add_column("result")
     varied = any(attempt.parent is not None for attempt in run.attempts)
-    table.add_column("failed tests" + (", or how it drives" if varied else ""))
+    table.add_column("details")
     table.caption = "k: iteration; j: attempt to repair its candidate (0: the first)"
     if varied:
         table.caption += f"; k above {run.iterations}: a variation"

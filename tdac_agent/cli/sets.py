@@ -110,13 +110,17 @@ def _legend(tasks: TaskSet) -> str:
 
 
 def _record(tasks: TaskSet) -> dict[str, Any]:
-    """The set as JSON: all values, with the defaults, and their hash."""
+    """The set as JSON: all values, with the defaults, their unit and their hash.
+
+    The lengths are those of the worlds: px on maps, also if the set is in metres.
+    """
     values = tasks.file.model_dump(mode="json", by_alias=True)
     if tasks.files is None:
         del values["files"]
     else:
         own = {"counts": tasks.files.counts, "skipped": list(tasks.files.skipped)}
         values["files"] |= own
+    values["unit"] = tasks.file.unit
     return {**values, "sha256": tasks.sha256, "dynamics": tasks.dynamics}
 
 

@@ -57,7 +57,8 @@ def sets_command(context: typer.Context, as_json: Json = False) -> None:
 @sets_app.command(
     "show",
     epilog="Examples: `tdac sets show lost`; `tdac sets show unknown --index 3`; "
-    "`tdac sets show my_set.yaml --sheet worlds.png`",
+    "`tdac sets show my_set.yaml --sheet worlds.png`. The lengths of --json are in its "
+    "`unit`: px on maps, also for a set in metres (its `resolution` converts), else m.",
 )
 @typed_options("sets:show")
 def show_command(options: ShowSetOptions) -> None:

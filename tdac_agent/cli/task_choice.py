@@ -45,6 +45,11 @@ NAMING = {
     "set_name": "--set",
 }
 """Fields that name a task or a task set, and their flags."""
+IN_METRES = (
+    "places and lengths are px; for metres, add --resolution METRES (per px) or give a "
+    "ROS map.yaml"
+)
+"""Hint for a map without a resolution."""
 
 
 def with_named_file(flags: TaskFlags) -> TaskFlags:
@@ -231,6 +236,7 @@ def chosen_task(flags: TaskFlags, default: str = "maze") -> Task:
         raise TaskError(
             f"the map {source!r} needs --start X Y and --goal X Y "
             f"({_rulers(Path(source), flags)})"
+            + ("" if has_resolution(source, flags.resolution) else f"; {IN_METRES}")
         )
     if flags.in_metres and not own:
         raise TaskError("--metres needs a --map with a resolution, as in map.yaml")

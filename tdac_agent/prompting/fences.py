@@ -118,7 +118,10 @@ def find_blocks(lines: list[str], fences: list[Fence]) -> list[Block]:
 
 
 def fenced_blocks(text: str, languages: frozenset[str]) -> list[str]:
-    """Returns the blocks in some languages; the first closing fence ends one."""
+    """Returns the blocks in some languages; the first closing fence ends one.
+
+    The text has the line ends of `plain_text`.
+    """
     lines = text.split("\n")
     blocks: list[str] = []
     opening: Fence | None = None

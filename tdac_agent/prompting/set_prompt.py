@@ -18,7 +18,6 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.verification.judge.set_files import level_params
 from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.infrared import PLACES, TABLE
-from tdac_envs.grid.map_units import PIXELS, MapFrame, MapUnits
 from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import SetFile
@@ -98,7 +97,7 @@ def _robot(tasks: TaskSet, file: SetFile) -> dict[str, Any]:
             "turn": 2.0 * file.full_step / robot.axle_length,
             "rays": _rays(robot),
             "side": tasks.largest_side * file.per_unit,
-            "limits": robot_lines(own, _units(file)),
+            "limits": robot_lines(own, file.units),
         }
     floors = [each for each in file.worlds if isinstance(each, Plates)]
     table = TABLE.tolist()
@@ -115,12 +114,6 @@ def _robot(tasks: TaskSet, file: SetFile) -> dict[str, Any]:
         "readings": ", ".join(f"{1e3 * row[0]:g}: {row[1]:g}" for row in table),
         "nothing": f"{table[-1][1]:g}",
     }
-
-
-def _units(file: SetFile) -> MapUnits:
-    if file.resolution is None:
-        return PIXELS
-    return MapUnits(MapFrame(1, file.resolution, (0.0, 0.0, 0.0)))
 
 
 def _rays(robot: RobotParams) -> str:

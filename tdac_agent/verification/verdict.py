@@ -18,6 +18,9 @@ COLOURS = {
 }
 """Colour of each word; green is for `verified` alone."""
 
+OTHER_PHYSICS = "other physics (floor, motors, battery)"
+"""What no disturbance is like."""
+
 
 def word_of(report: EpisodeReport) -> Word:
     """The verdict of a confirmation.
@@ -81,16 +84,18 @@ def not_covered(report: EpisodeReport) -> str:
     if drove_with is not None:
         wheels = drove_with.wheel_gains or drove_with.wheel_radius_error
         delay = drove_with.delay or drove_with.pose_delay or drove_with.scan_delay
-        ranges = drove_with.range_noise or drove_with.range_dropout
         parts = {
-            "noise of ranges": ranges,
+            "noise of ranges": drove_with.range_noise,
             "slip": drove_with.wheel_slip,
             "delays": delay,
             "unequal wheels": wheels,
-            "a wrong pose": drove_with.pose_noise,
+            "a wrong pose": drove_with.pose_noise and drove_with.heading_noise,
+            "missing ranges": drove_with.range_dropout,
+            "lost messages": drove_with.message_drop,
+            "another axle": drove_with.axle_error,
         }
         missing += [name for name, size in parts.items() if not size]
-    return ", ".join([*missing, "other physics"])
+    return ", ".join([*missing, OTHER_PHYSICS])
 
 
 def delivered_text(run: Run) -> str:

@@ -30,7 +30,15 @@ NEUTRAL = (
     "ladder/frozen.py",  # has the hashes
 )
 """Ends of the paths of files that decide nothing in an episode of a controller."""
-SAME: dict[str, str] = {}
+SAME: dict[str, str] = {
+    # Ladder 1.0, on maps and on plates: one place where metres per px become units.
+    "257622d0cece1bda6f810b0acc08d006128c7c0d9868e9b6d50f90509b230035": (
+        "46a5299112cd13c1188f8899f0e1d9ef6aa22ac926b7f3b91c12e6dbe9ef96e7"
+    ),
+    "3a9981cc156b84cb0c5ea801a56bbe4e7d4c7f7f53f6e52e11a86b3e7732a776": (
+        "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
+    ),
+}
 """Hashes of changed code, each with that of earlier code with the same dynamics.
 
 For a change that moves no number of any episode, such as another name. Results on the

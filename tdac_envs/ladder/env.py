@@ -145,7 +145,8 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
 
     In the splits `train` and `dev`, `reset` also returns `world_index`, the number of
     the world; `generator`, its generator or kind of map; and `difficulty`, a dict of
-    figures (`docs/generated-worlds.md`). Judged controllers never see them.
+    figures (`docs/generated-worlds.md`), whose `length` is px on maps, also where m
+    are observed, and m for an e-puck. Judged controllers never see them.
 
     ## Episode End
     As in TDAC-Map2D-v0: a contact ends the episode.

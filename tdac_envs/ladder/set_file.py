@@ -21,6 +21,7 @@ from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.drive.disturbances import Disturbances
 from tdac_envs.epuck.kernels import WHEEL_RADIUS
+from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.ladder.files.spec import FilesSpec
 from tdac_envs.ladder.generators.plates import Plates
 from tdac_envs.ladder.generators.registry import AnyParameters
@@ -29,7 +30,7 @@ from tdac_envs.ladder.plate_worlds import PlatesSpec
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_disturbances import ONLY_ON_MAPS, DisturbanceSpec
 from tdac_envs.ladder.set_limits import AdmissionSpec, CpuSpec, HorizonSpec
-from tdac_envs.ladder.set_robot import with_named_robot
+from tdac_envs.ladder.set_robot import metres_per_px, with_named_robot
 from tdac_envs.ladder.worlds import WorldSpec
 from tdac_envs.mapping.params import Length, RobotParams
 from tdac_envs.robots.bundled import placed_robot
@@ -214,6 +215,11 @@ class SetFile(StrictModel):
     def per_unit(self) -> float:
         """Size of a unit of lengths here in the shown one."""
         return 1.0 if self.resolution is None else self.resolution
+
+    @property
+    def units(self) -> MapUnits:
+        """The shown units, to convert lengths of a set on maps."""
+        return PIXELS if self.resolution is None else metres_per_px(self.resolution)
 
     @property
     def full_step(self) -> float:

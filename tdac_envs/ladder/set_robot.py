@@ -12,10 +12,14 @@ from tdac_envs.ladder.set_disturbances import LENGTHS, DisturbanceSpec
 from tdac_envs.map2d.robot_options import options_of
 from tdac_envs.robots.bundled import load_robot
 
-_ORIGIN = (0.0, 0.0, 0.0)
 _ERRORS = DisturbanceSpec.model_fields.keys() - {"range_min", "max_acceleration"}
 """Disturbances of a set; the others are properties of its robot."""
 _KEYS = {"robot_radius": "radius", "field_of_view": "field_of_view_deg"}
+
+
+def metres_per_px(resolution: float) -> MapUnits:
+    """Metres of worlds that have no place on a map: for lengths and angles."""
+    return MapUnits(MapFrame(1, resolution, (0.0, 0.0, 0.0)))
 
 
 def with_named_robot(values: dict[str, Any]) -> dict[str, Any]:
@@ -32,7 +36,7 @@ def with_named_robot(values: dict[str, Any]) -> dict[str, Any]:
     file, resolution = load_robot(values["robot"]), values.get("resolution")
     metric = None
     if file.units == "metres":
-        metric = MapUnits(MapFrame(1, _resolution(file.name, resolution), _ORIGIN))
+        metric = metres_per_px(_resolution(file.name, resolution))
         values = _in_pixels(values, metric)
     elif resolution is not None:
         raise TaskError(f"{file.name} is in pixels: leave out `resolution`")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_disturbances import LENGTHS
 from tdac_envs.ladder.set_file import SetFile
@@ -16,11 +15,9 @@ def in_shown_units(file: SetFile) -> SetFile:
     """
     if file.resolution is None:
         return file
-    scale = file.resolution
-    units = MapUnits(MapFrame(1, scale, (0.0, 0.0, 0.0)))
-    length = units.written_length
+    length = file.units.written_length
     assert not isinstance(file.robot, EPuckRobotParams)
-    robot = converted_robot(file.robot.written(), units, inwards=False)
+    robot = converted_robot(file.robot.written(), file.units, inwards=False)
     errors = {name: length(getattr(file.disturbances, name)) for name in LENGTHS}
     movers = tuple(
         group.model_copy(

@@ -140,6 +140,16 @@ def test_a_map_is_no_task(refused, plan, monkeypatch, words, message):
     assert message in err
 
 
+def test_a_picture_without_a_scale_says_how_to_use_metres(done, refused, plan):
+    """Where its places are asked for; a map with a resolution needs no such hint."""
+    picture, hint = plan.with_suffix(".png"), "for metres, add --resolution METRES"
+    assert hint in refused("synth", str(picture), "--dry-run")
+    assert hint not in refused("synth", str(plan), "--dry-run")
+    out = ("--out", str(plan.parent / "grid"))
+    assert hint in done("map", str(picture), *out)
+    assert hint not in done("map", str(plan), *out)
+
+
 def test_a_place_is_quoted_as_typed(tdac, plan):
     """Not at the centre of its pixel, as suggestions are."""
     words = ("--goal", "11.05", "6", "--robot-radius", "0.6", "--metres")

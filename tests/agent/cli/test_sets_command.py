@@ -32,6 +32,18 @@ def test_its_json_is_complete(tdac):
     for each in records[: len(set_names())]:
         assert each["sha256"] == load_set(each["name"]).sha256
         assert each["horizon"] == load_set(each["name"]).file.horizon.model_dump()
+    units = {each["name"]: each["unit"] for each in records}
+    assert (units["unknown"], units["epuck"]) == ("px", "m")
+
+
+def test_its_json_names_the_unit_of_its_lengths(tdac):
+    """Px on maps, also for a set in metres, whose text is in metres."""
+    words = ("sets", "show", "floor", "--index", "0")
+    shown, text = json.loads(tdac(*words, "--json")[1]), tdac(*words)[1]
+    length, per_px = shown["world"]["length"], shown["resolution"]
+    assert shown["unit"] == "px"
+    assert shown["robot"]["radius"] * per_px == pytest.approx(0.105)
+    assert f"{length * per_px:.4g} m, " in text
 
 
 def test_it_shows_a_set(tdac):

@@ -6,7 +6,7 @@ import re
 import warnings
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from tdac_agent.prompting.extract import extract_source, read_answer
@@ -382,9 +382,10 @@ def test_an_answer_is_a_file_or_a_problem(reply):
 
 @FEW
 @given(replies | st.text())
+@example("~~~\n```\n```\r\n~~~\n")
 def test_fenced_blocks_stand_in_the_text(reply):
     """Every block is a quotation, and a bare one is found, too."""
     text = plain_text(reply)
-    for block in fenced_blocks(reply, frozenset({"", "python", "json"})):
+    for block in fenced_blocks(text, frozenset({"", "python", "json"})):
         assert block in text
     assert fenced_blocks("a\n```json\n[]\n```\n", frozenset({"json"})) == ["[]"]

@@ -73,7 +73,7 @@ def pages():
     at = quote(f"runs/{NAME}")
     return {
         "runs": ("/runs", NAME),
-        "run": (f"/run?at={at}", "did not begin"),
+        "run": (f"/run?at={at}", "this installation did not begin"),
         "no run": (f"/run?at={quote(SCRIPT)}", "There is no run"),
         "benches": ("/benches", NAME),
         "bench": (f"/bench?at={quote(NAME)}", "was not started here"),

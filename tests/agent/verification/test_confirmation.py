@@ -24,8 +24,10 @@ from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.verdict import (
     confirmed_text,
     delivered_text,
+    not_covered,
     verified_text,
 )
+from tdac_envs.robots.bundled import load_robot
 
 SOMETIMES = """
 
@@ -97,6 +99,13 @@ def test_a_good_controller_is_confirmed(small_task, good_source, warm, tmp_path)
     calm = report.provenance.model_copy(update={"disturbance": Disturbance.none()})
     quiet = verified_text(report.model_copy(update={"provenance": calm}))
     assert "other worlds, noise of ranges, slip, delays" in quiet
+    burger = load_robot("turtlebot3-burger").disturbances()
+    own = Disturbance.none().changed(burger)
+    drove_with = report.provenance.model_copy(update={"disturbance": own})
+    assert not_covered(report.model_copy(update={"provenance": drove_with})) == (
+        "other worlds, missing ranges, lost messages, another axle, other physics "
+        "(floor, motors, battery)"
+    )
     kept = EpisodeReport.model_validate_json((tmp_path / "episodes.json").read_text())
     assert kept == report
 

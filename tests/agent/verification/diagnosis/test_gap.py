@@ -179,6 +179,28 @@ def test_the_report_of_a_suite_names_the_closest_episode():
     assert Report.model_construct(episodes=()).smallest_gap is None
 
 
+def test_the_table_of_a_suite_fits_on_80_columns():
+    """The widest words and large figures are whole, each episode on one line."""
+    lengths = dict.fromkeys(("d0", "d_min", "d0_euclidean", "d_min_euclidean"), 9999.0)
+    widest = episode_in_report(
+        name="held-out 10",
+        outcome="out of time",
+        steps=99999,
+        collisions=10,
+        call_ms_p99=9.0,
+        call_ms_mean=123.45,
+        smallest_gap=gap_in(0.0123),
+        **lengths,
+    )
+    report = Report.model_construct(episodes=(widest,))
+    console = Console(file=StringIO(), width=80)
+    console.print(episode_table(report, PIXELS))
+    text = console.file.getvalue()
+    assert "…" not in text
+    assert text.count("9999/9999") == 2
+    assert text.splitlines()[-2].split()[-1] == "123.45"
+
+
 def provenance(**changes):
     fields = {
         "name": "maze", "sha256": "0", "controller_sha256": "0", "sandbox": "none",
