@@ -172,7 +172,7 @@ def options_of(cell: Cell, out: Path) -> dict[str, Any]:
 
 
 def affordable(cell: Cell, out: Path) -> int:
-    """How many more answers an arm may have until it cost as much as the dearest one."""
+    """How many more answers cost as much as the dearest arm of a group has."""
     arms = [each for each in planned() if each.group == cell.group]
     spent = {
         each.arm: cost_of(out / each.name) for each in arms if each.arm != cell.arm
