@@ -3,9 +3,9 @@
     python -m benchmarks.feedback_tables judge RUNS OUT --salt-file FILE [-n 40]
     python -m benchmarks.feedback_tables tables OUT
 
-`judge` drives each candidate of each run once, on the first N hidden worlds of its level
-(OUT/scores.csv), and the candidate that each run selected until a sequential test says
-whether it is verified (OUT/verdicts.csv). `tables` needs these two files alone.
+`judge` drives each candidate of each run once, on the first N hidden worlds of its
+level (OUT/scores.csv), and the candidate that each run selected until a sequential test
+says whether it is verified (OUT/verdicts.csv). `tables` needs these two files alone.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def judge(runs: Path, out: Path, salt: Path, worlds: int) -> None:
                 )
                 score = success = 0.0
                 if attempt.valid and file.is_file():
-                    found = _driven(file, cell.level, worlds, salt, out, warm)
+                    found = _driven(file, cell.level, worlds, salt, warm)
                     score, success = found
                 rows.append(
                     {
@@ -100,7 +100,7 @@ def judge(runs: Path, out: Path, salt: Path, worlds: int) -> None:
 
 
 def _driven(
-    file: Path, level: str, worlds: int, salt: Path, out: Path, warm: WarmJudge
+    file: Path, level: str, worlds: int, salt: Path, warm: WarmJudge
 ) -> tuple[float, float]:
     report = verify_episodes(
         file, load_set(level), worlds, split="hidden", salt_file=salt, judge=warm
