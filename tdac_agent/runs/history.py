@@ -203,7 +203,7 @@ def _candidates(run: Run, problems: list[str]) -> Iterator[CandidateHistory]:
             read_text(run.folder, f"{at}/controller.diff") or "",
             learnt.get((k, j), RuleChanges()),
             run.on_set,
-            _varies(run, k, attempt),
+            _varies(run, k),
             _author(run, k, j, attempt),
         )
 
@@ -214,19 +214,19 @@ def _numbers(folder: Path) -> tuple[int, int]:
     return (int(k), int(j)) if k.isdecimal() and j.isdecimal() else (0, 0)
 
 
-def _varies(run: Run, k: int, attempt: Attempt | None) -> bool:
-    if attempt is None:
-        return run.improve > 0 and k > run.iterations
-    return attempt.parent is not None
+def _varies(run: Run, k: int) -> bool:
+    return run.improve > 0 and k > run.iterations
 
 
 def _author(run: Run, k: int, j: int, attempt: Attempt | None) -> str:
-    if _varies(run, k, attempt):
+    if _varies(run, k):
         return "a variation by the Optimizer"
     if run.learner == AGENT:
         return "submitted by the agent"
     if run.given_sha256 is not None and (k, j) == (1, 0):
         return "given at the start"
+    if attempt is not None and attempt.parents:
+        return "written by the Optimizer"
     return "edited by the Optimizer" if j else "written by the Learner"
 
 
