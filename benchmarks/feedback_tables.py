@@ -14,6 +14,7 @@ import argparse
 import itertools
 import json
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from benchmarks.feedback_trial import (
     characters,
     planned,
 )
+from tdac_agent.prompting.extract import extract_source
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.runs.selection_record import read_selection
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -48,6 +50,7 @@ def judge(runs: Path, out: Path, salt: Path, worlds: int) -> None:
     """Drives all candidates on hidden worlds; writes a row for each."""
     out.mkdir(parents=True, exist_ok=True)
     rows, verdicts = [], []
+    known = {level: known_controllers(level) for level in ("unknown", "lost", "floor")}
     with WarmJudge() as warm:
         for cell in planned():
             folder = runs / cell.name
@@ -79,6 +82,9 @@ def judge(runs: Path, out: Path, salt: Path, worlds: int) -> None:
                         **about,
                         "k": attempt.k,
                         "kind": attempt.asked,
+                        "session": "fresh",
+                        "answered_on": _date(file),
+                        **similarities(file, known[cell.level]),
                         "pool": pools.get((attempt.k, attempt.j)) or 0.0,
                         "time_score": score,
                         "success": success,
@@ -97,6 +103,46 @@ def judge(runs: Path, out: Path, salt: Path, worlds: int) -> None:
             verdicts.append({**about, "verified": bool(verified)})
             pd.DataFrame(rows).to_csv(out / "scores.csv", index=False)
             pd.DataFrame(verdicts).to_csv(out / "verdicts.csv", index=False)
+
+
+def known_controllers(level: str) -> dict[str, list[str]]:
+    """The built-in controller and the recorded first answers of a level."""
+    builtin = Path("tdac_agent/builtin/levels") / f"{level}.py"
+    recorded = Path("results/ladder/genuine", level).glob("*/reply.md")
+    answers = (extract_source(file.read_text("utf-8")) for file in recorded)
+    return {
+        "like_builtin": [builtin.read_text("utf-8")],
+        "like_recorded": [answer for answer in answers if answer is not None],
+    }
+
+
+def similarities(file: Path, known: dict[str, list[str]]) -> dict[str, float | None]:
+    """The largest share of lines that a controller has in common with known ones."""
+    if not file.is_file():
+        return dict.fromkeys(known)
+    own = _lines(file.read_text("utf-8"))
+    return {
+        name: max((_shared(own, _lines(each)) for each in sources), default=None)
+        for name, sources in known.items()
+    }
+
+
+def _lines(source: str) -> set[str]:
+    """The different lines of code of a file, without spaces and comments."""
+    lines = ("".join(line.partition("#")[0].split()) for line in source.splitlines())
+    return {line for line in lines if len(line) > 8}
+
+
+def _shared(own: set[str], other: set[str]) -> float:
+    return round(len(own & other) / max(1, len(own | other)), 4)
+
+
+def _date(file: Path) -> str:
+    """When the file with an answer was written (UTC)."""
+    if not file.is_file():
+        return ""
+    when = datetime.fromtimestamp(file.stat().st_mtime, UTC)
+    return when.isoformat(timespec="minutes")
 
 
 def _driven(
