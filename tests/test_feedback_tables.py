@@ -24,22 +24,21 @@ from benchmarks.feedback_trial import ARMS, FACTS, planned
 def made_up(seed=3):
     """Scores of all cells of the plan, drawn at random."""
     random = np.random.default_rng(seed)
-    rows = []
-    for cell in planned():
-        for k in range(1, {"A+": 9, "C": 3, "best+": 10}.get(cell.arm, 7)):
-            rows.append(
-                {
-                    "cell": cell.name,
-                    "group": cell.group,
-                    "level": cell.level,
-                    "arm": cell.arm,
-                    "omitted": len(cell.omit.split(",")) if cell.omit else 0,
-                    "k": k,
-                    "pool": round(float(random.random()), 3),
-                    "time_score": float(random.random()),
-                    "success": float(random.random()),
-                }
-            )
+    rows = [
+        {
+            "cell": cell.name,
+            "group": cell.group,
+            "level": cell.level,
+            "arm": cell.arm,
+            "omitted": len(cell.omit.split(",")) if cell.omit else 0,
+            "k": k,
+            "pool": round(float(random.random()), 3),
+            "time_score": float(random.random()),
+            "success": float(random.random()),
+        }
+        for cell in planned()
+        for k in range(1, {"A+": 9, "C": 3, "best+": 10}.get(cell.arm, 7))
+    ]
     return pd.DataFrame(rows)
 
 
