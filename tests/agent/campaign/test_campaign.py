@@ -21,13 +21,15 @@ def once(tmp_path_factory):
     return small, small.run("--workers", 2, name="broken"), small.run("--json")
 
 
-def test_a_campaign_leaves_its_tables(small, done):
+def test_a_campaign_leaves_its_tables_and_figures(small, done):
     small.write(learners=["builtin"], runs=1)
     out = small.folder / "out"
     said = done("campaign", small.folder / "few.yaml", "--out", out)
     assert "1 of 1 runs have ended" in said
     [run] = pd.read_csv(out / "runs.csv").to_dict("records")
     assert (run["learner"], run["tau"]) == ("builtin", 1)
+    assert (out / "success_rate.png").is_file()
+    assert (out / "cumulative_success-small.png").is_file()
 
 
 @pytest.mark.slow
