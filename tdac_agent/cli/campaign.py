@@ -84,13 +84,15 @@ def run(options: CampaignOptions) -> int:
         finally:
             # Imported late: pandas and scipy take seconds to load.
             from tdac_agent.campaign.collect import collect, write_tables
+            from tdac_agent.campaign.figures import write_figures
             from tdac_agent.cli.campaign_summary import show_set_summary, show_summary
 
             tables = collect(plan, terms.runs)
             written = write_tables(tables, plan, folder)
             show_summary(tables.summary, console)
             show_set_summary(tables.set_summary, console)
-            _print_ending(console, progress, folder, options, written)
+            figures = write_figures(tables, folder)
+            _print_ending(console, progress, folder, options, written, figures)
     if options.as_json:
         print_json(_as_json(progress, folder))
     return _exit_code(progress)
@@ -169,13 +171,17 @@ def _print_ending(
     folder: Path,
     options: CampaignOptions,
     tables: list[Path],
+    figures: list[Path],
 ) -> None:
     for problem, count in progress.problems.most_common():
         print_sentences(console, f"{count} × {problem}", "yellow")
     console.print(progress_line(progress), soft_wrap=True)
-    names = ", ".join(path.name for path in tables)
+    for word, paths in (("tables", tables), ("figures", figures)):
+        if paths:
+            names = ", ".join(path.name for path in paths)
+            print_plain(console, f"  {word} in {folder}: {names}")
     report = shlex.join(["tdac", "report", str(folder)])
-    print_plain(console, f"  tables in {folder}: {names}\n  HTML report: {report}")
+    print_plain(console, f"  HTML report: {report}")
     if progress.finished < progress.planned:
         more = " with a higher --max-cost" if progress.exhausted else ""
         print_plain(console, f"  to continue{more}: {command_of(options)}")

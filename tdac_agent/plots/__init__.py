@@ -6,6 +6,7 @@ from tdac_agent.plots.baselines import (
     plot_learning_curves,
     plot_success_by_policy,
 )
+from tdac_agent.plots.campaign import plot_rates
 from tdac_agent.plots.metrics import (
     plot_cumulative_panels,
     plot_cumulative_success,
@@ -27,6 +28,7 @@ __all__ = [
     "plot_generalisation",
     "plot_learning_curves",
     "plot_preprocessing",
+    "plot_rates",
     "plot_scores",
     "plot_success_by_policy",
     "plot_success_rates",

@@ -168,13 +168,16 @@ def plot_cumulative_panels(
 
 
 def _curves(frames: RunFrames, by: str, most: int | None) -> dict[str, pd.DataFrame]:
-    """CS(k) of each kind, starting with CS(0) = 0."""
+    """CS(k) of each kind up to its own K, starting with CS(0) = 0."""
     # One more than the longest run reached.
     reached = min(int(frames.runs["K"].max()), int(frames.runs["done"].max()) + 1)
     last = reached if most is None else most
     begin = pd.DataFrame({"k": [0], "cs": [0.0], "low": [0.0], "high": [0.0]})
     return {
-        name: pd.concat([begin, cumulative_success(runs, last)], ignore_index=True)
+        name: pd.concat(
+            [begin, cumulative_success(runs, min(last, int(runs["K"].max())))],
+            ignore_index=True,
+        )
         for name, runs in frames.runs.groupby(by, sort=False)
     }
 
@@ -203,6 +206,8 @@ def _step(
 
 def _band(axes: Axes, curve: pd.DataFrame, colour: str) -> None:
     rest = curve[curve["k"] > 0]
+    if len(rest) == 1:  # has no width of its own
+        rest = pd.concat([rest, rest.assign(k=rest["k"] + 0.4)])
     axes.fill_between(
         rest["k"],
         rest["low"],

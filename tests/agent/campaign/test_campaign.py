@@ -9,7 +9,10 @@ import pandas as pd
 import pytest
 from few_runs import Small
 
+from tdac_agent.campaign.config import find_config, read_config
 from tdac_agent.metrics import CANDIDATE_COLUMNS, RUN_COLUMNS, find_runs
+from tdac_agent.models.lifecycle import retired
+from tdac_agent.storage.shipped import shipped_names
 
 
 @pytest.fixture(scope="module")
@@ -21,13 +24,15 @@ def once(tmp_path_factory):
     return small, small.run("--workers", 2, name="broken"), small.run("--json")
 
 
-def test_a_campaign_leaves_its_tables(small, done):
+def test_a_campaign_leaves_its_tables_and_figures(small, done):
     small.write(learners=["builtin"], runs=1)
     out = small.folder / "out"
     said = done("campaign", small.folder / "few.yaml", "--out", out)
     assert "1 of 1 runs have ended" in said
     [run] = pd.read_csv(out / "runs.csv").to_dict("records")
     assert (run["learner"], run["tau"]) == ("builtin", 1)
+    assert (out / "success_rate.png").is_file()
+    assert (out / "cumulative_success-small.png").is_file()
 
 
 @pytest.mark.slow
@@ -119,12 +124,35 @@ def test_a_dry_run_writes_nothing_and_needs_no_key(done, monkeypatch):
     words = " ".join(said.split())
     assert "if no controller ever passes: 1000 candidates are tested" in words
     assert "1500 questions are asked; without a limit they cost 410.81 USD" in words
-    assert "so this campaign costs at most 50.00 USD" in words
+    assert "so this campaign costs at most 450.00 USD" in words
     said = done("campaign", "paper_2d", "--dry-run", "--max-cost", 1e6)
     assert "never reached, since all runs cost at most 1782." in " ".join(said.split())
     said = done("campaign", "offline", "--dry-run")
     assert re.search(r"at most \d+ candidates are tested: K x \(1 \+ J\)", said)
     assert not list(Path().iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped_names("paper_*.yaml"))
+def test_the_limit_of_the_papers_campaigns_cuts_no_weak_learner_short(name, done):
+    """It is above the cost if no controller ever passes: runs are not censored."""
+    said = " ".join(done("campaign", Path(name).stem, "--dry-run").split())
+    (cost,) = re.findall(r"without a limit they cost ([\d.]+) USD", said)
+    assert float(cost) < read_config(find_config(Path(name).stem)).max_cost
+
+
+def test_the_papers_campaigns_also_have_models_that_are_served():
+    """As known on the day of the list: none of them will be retired."""
+    names = shipped_names("paper_*_now.yaml")
+    assert len(names) == 2
+    for name in names:
+        known = read_config(find_config(Path(name).stem))
+        old = read_config(find_config(Path(name).stem.removesuffix("_now")))
+        assert not retired(known.models, within_days=10_000)
+        assert retired(old.models, within_days=10_000)
+        same = ("tasks", "runs", "iterations", "patience", "settings", "prompts")
+        assert all(getattr(known, one) == getattr(old, one) for one in same)
+        assert len(known.learners) == len(old.learners)
 
 
 @pytest.mark.parametrize(

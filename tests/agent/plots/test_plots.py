@@ -115,6 +115,21 @@ def test_curves_are_cumulative_success(frames):
     assert labels == ["one (R = 3)", "two (R = 2)"]
 
 
+def test_a_curve_ends_with_its_own_k():
+    """Runs of one iteration say nothing of the second, and need no Kaplan-Meier."""
+    both = join_frames(
+        frames_from_tau([1, None], 1, learner="one shot"),
+        frames_from_tau([1, 2], 3, learner="loop"),
+    )
+    axes = plot_cumulative_success(both).axes[0]
+    assert [line.get_xdata().max() for line in axes.lines] == [1, 3]
+    band = axes.collections[0].get_paths()[0].vertices
+    exact = cumulative_success(both.only(learner="one shot").runs).iloc[0]
+    assert exact["method"] == "Clopper-Pearson"
+    assert band[:, 1].min() == pytest.approx(exact["low"])
+    assert np.ptp(band[:, 0]) > 0  # it can be seen
+
+
 def test_each_panel_has_its_curve_and_band(frames):
     """CS(k) over the curves of the others, and the interval behind it."""
     panels = plot_cumulative_panels(frames, most=4).axes
