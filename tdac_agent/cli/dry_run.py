@@ -34,6 +34,7 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
     server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]
     episodes = options.episodes if problem.has_hidden else None
+    race = options.search == RACE
     forecast = cost_of(
         problem.name,
         problem.question(book.in_force, template),
@@ -42,9 +43,9 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
         iterations=options.iterations or 0,
         patience=options.patience,
         candidates=options.candidates or 1,
-        ask=options.ask if options.search == RACE else "",
+        ask=options.ask if race else "",
         refine=options.refine,
-        variations=shares(episodes, options.improve).asked,
+        variations=0 if race else shares(episodes, options.improve).asked,
         base_url=options.base_url,
         max_output=options.max_output,
         max_cost=options.max_cost,

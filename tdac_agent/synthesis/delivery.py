@@ -71,12 +71,11 @@ def task_improvement(
         terms: What the trials share.
         task: The task.
         chosen: The candidate that was selected, and the archive.
-        changes: How it compares with the first verified one, by figure.
-        **facts: `used`, `first_seed` and `first_comparison`.
+        changes: How it compares with what the search began with, by figure.
+        **facts: `first`, `used`, `first_seed` and `first_comparison`.
     """
     archive, selected = chosen.archive, chosen.candidate
     assert archive is not None
-    first = archive.members[0].candidate
     return TaskImprovement(
         unit=task.setting.units.place,
         disturbance=task.own_disturbance(),
@@ -84,7 +83,6 @@ def task_improvement(
         improve=terms.recorder.run.improve,
         asked=chosen.asked,
         members=tuple(map(_member, archive.members)),
-        first=(first.k, first.j),
         k=selected.k,
         j=selected.j,
         controller_sha256=selected.sha256,

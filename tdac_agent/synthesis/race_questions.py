@@ -54,11 +54,8 @@ class RaceQuestions:
     def known(self) -> str:
         """What all drives so far show, without any code."""
         archive, told = self._archive, self._trials.pool_feedback
-        ranked = sorted(
-            [*archive.members, *archive.dropped],
-            key=lambda each: each.figures.rank,
-            reverse=True,
-        )
+        # Of those that were dropped, the figures are of fewer episodes.
+        ranked = [*_ranked(archive.members), *_ranked(archive.dropped)]
         parts = []
         if ranked:
             parts += ["### How they drove", *map(self._line, ranked[:MOST_KNOWN])]
@@ -157,6 +154,10 @@ class RaceQuestions:
             Tried(difference(source, candidate.source), rank, said)
             for candidate, rank, said in tried
         ]
+
+
+def _ranked(members: list[Member]) -> list[Member]:
+    return sorted(members, key=lambda each: each.figures.rank, reverse=True)
 
 
 def _joint(one: Candidate, other: Candidate) -> float:

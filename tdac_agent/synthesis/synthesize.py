@@ -330,7 +330,8 @@ def _race(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
     first = min(run.candidates, run.iterations)
     kinds, most = kinds_of(run.ask), run.iterations - first
     race = Race(dialogue, trials, written, most=most, kinds=kinds)
-    race.ask_first(given, first)
+    parts = trials.terms.shares
+    race.ask_first(given, min(first, parts.explore // parts.block))
     stopped = race.run()
     able = trials.finalists(race.archive) if race.archive.members else []
     return _Found(written, able, stopped, race)

@@ -58,7 +58,7 @@ def test_the_questions_that_are_left(iterations, patience, refine):
     for number, place in enumerate(questions):
         left = questions[number:]
         learner = sum(kind == "generate" for kind, _, _ in left)
-        expected = (learner, len(left) - learner)
+        expected = (learner, len(left) - learner, 0)
         left_now = from_here(request(*place), iterations, patience, refine=refine)
         assert left_now == expected
 
