@@ -18,8 +18,8 @@ def test_the_built_in_controller(tdac, done, refused, tmp_path):
     """It is selected without a model; the report and the list show the run."""
     few = write_set(tmp_path / "few.yaml")
     words = ("synth", "--set", few, "--episodes", "4", "--feedback-episodes", "2")
-    words += ("--seed", "1", "--search", "paper")
-    code, out, err = tdac(*words, "--out", "run")
+    words += ("--search", "paper")
+    code, out, err = tdac(*words, "--seed", "1", "--out", "run")
     assert (code, err) == (0, "")
     assert "the built-in controller of the level known" in out
     assert "selected, optimistic: 100.0 % reached" in out
@@ -40,8 +40,7 @@ def test_the_built_in_controller(tdac, done, refused, tmp_path):
     assert "The selected controller" in page
     assert "the goal reached in 2 of 2 worlds" in page
     assert "Not readable" not in page
-    out = done("synth", "--set", few, "--episodes", "4", "--feedback-episodes",
-                        "2", "--search", "paper", "--learner", "replay:run", "--json")  # fmt: skip
+    out = done(*words, "--learner", "replay:run", "--json")
     assert json.loads(out)["status"] == "selected"
 
 

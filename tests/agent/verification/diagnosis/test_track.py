@@ -128,7 +128,7 @@ def test_pieces_in_words(hall):
 @pytest.mark.parametrize("heading", [0.0, 2.0, -1.2])
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_where_another_track_parts(hall, crates, units, heading, side):
-    """Right is clockwise where y points down, and counter-clockwise headings to the left."""
+    """Right of its own heading, whether y points down or up in the frame."""
     task = hall if units is PIXELS else crates.nominal
     step, bend = task.full_step, 0.3 if side == "right" else -0.3
     bend = -bend if units.up else bend
