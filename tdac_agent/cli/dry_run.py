@@ -58,12 +58,13 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
     sys.stdout.flush()
     console = Console(stderr=True, highlight=False)
     unbounded = _unbounded(forecast) if options.base_url is None else []
-    for line in [*_estimates(forecast), *_still_needed([*missing, *unbounded])]:
+    estimates = _estimates(forecast, race=race)
+    for line in [*estimates, *_still_needed([*missing, *unbounded])]:
         print_sentences(console, line)
     return 0
 
 
-def _estimates(forecast: CostForecast) -> list[str]:
+def _estimates(forecast: CostForecast, *, race: bool) -> list[str]:
     k, j = forecast.iterations, forecast.patience
     lines = [
         f"prompt: about {forecast.prompt_tokens} tokens (an estimate: a third of its "
@@ -76,9 +77,11 @@ def _estimates(forecast: CostForecast) -> list[str]:
         reserved = format_usd(forecast.first_cost)
         lines.append(f"first question: at most {reserved}, reserved before it is asked")
     whole = f"whole run: {forecast.questions} questions (K={k}, J={j}"
+    if race:
+        whole = f"whole run: at most {forecast.questions} questions (K={k}"
     if forecast.variations:
         whole += f", and {forecast.variations} to improve what works"
-    whole += ") if no controller passes"
+    whole += ")" if race else ") if no controller passes"
     if forecast.variations:
         whole += " before the last one"
     if forecast.cost_once is not None and forecast.cost_most is not None:

@@ -63,7 +63,7 @@ def write_set(path, **values):
 
 
 def write_wide_set(path, **values):
-    """Writes a set as `write_set` does, with rooms in which `quick` reaches all goals."""
+    """Writes a set like `write_set`, with rooms in which `quick` reaches all goals."""
     rooms = {"name": "rooms", "width": 150, "height": 130, "sides": [3.0, 6.0]}
     rooms |= {"doors": [2.0, 2.4], "furniture": 0.0}
     return write_set(path, worlds=[rooms], **values)

@@ -12,8 +12,8 @@ from tdac_agent.models.provider import Reply
 from tdac_agent.runs.resume import check_same, settings_of
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.runs.selection_record import read_selection
-from tdac_agent.synthesis.question_kinds import ASKED, KINDS
 from tdac_agent.synthesis.options import SynthOptions
+from tdac_agent.synthesis.question_kinds import ASKED, KINDS
 from tdac_agent.synthesis.settled import settled
 from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
@@ -60,7 +60,7 @@ def test_repairs(race, out):
         (3, "repair", (1, 0), None),
         (4, "repair", (3, 0), None),
     ]
-    first, second, third, last = prompts(model)
+    _first, second, third, last = prompts(model)
     assert "GAIN = 0.6" in second
     assert TABLE in second
     assert "What was tried" not in second
@@ -220,7 +220,7 @@ def test_the_same_code_again_and_again_ends_the_race(race):
 def test_an_answer_without_code(write, wide):
     """It is recorded with its kind, and the race goes on."""
     nothing = [Reply("I cannot.")] * 3
-    model, run = write(
+    _model, run = write(
         wide, code(SLOW), *nothing, code(FAST), ask="repair", iterations=3
     )
     assert [each.valid for each in run.attempts] == [True, False, True]
@@ -356,6 +356,19 @@ def test_what_a_race_cannot_have(write, wide, out, values, message):
     with pytest.raises(TaskError, match=message):
         write(wide, model=Script(), **values)
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "questions"), [((), 8), (("--ask", "rules", "-K", "6"), 6 + 2)]
+)
+def test_a_dry_run_says_how_many_questions_there_are(tdac, words, questions):
+    """Of a question for rules, two are asked: the rules, and the controller."""
+    dry = ("synth", "--set", "known", "--dry-run", "--learner", "anthropic:claude-x")
+    code, out, _ = tdac(*dry, *words, "--json")
+    assert code == 0
+    assert json.loads(out)["questions"] == questions
+    said = f"whole run: at most {questions} questions (K={words[-1] if words else 8})"
+    assert said in tdac(*dry, *words)[2]
 
 
 def test_a_race_on_a_task_needs_episodes(write, on_task, out):
