@@ -83,6 +83,7 @@ def task_improvement(
         improve=terms.recorder.run.improve,
         asked=chosen.asked,
         members=tuple(map(_member, archive.members)),
+        founders=len(archive.founders),
         k=selected.k,
         j=selected.j,
         controller_sha256=selected.sha256,

@@ -12,3 +12,5 @@ FRESH, INFORMED, REPAIR, MERGE, FASTER, RULES = KINDS = (
 controller; to merge two; to make one faster; with rules that were learned."""
 ASKED = INFORMED, REPAIR, MERGE, FASTER
 """The kinds that a race asks by default."""
+NEW = "", "given", FRESH
+"""What is noted of controllers that build on no other one; empty outside of races."""

@@ -144,10 +144,10 @@ class Race:
 
     def _question(self, kind: str) -> bool:
         """Asks a question of a kind; returns whether a new controller drove."""
-        self.asked += 1
-        k = len(self._first) + self.asked
+        k = len(self._first) + self.asked + 1
         parents = self._parents(kind)
         answer = self._answer(kind, k, parents)
+        self.asked += 1
         return self._entered(k, answer, kind, parents)
 
     @property

@@ -65,7 +65,7 @@ def test_a_better_variation_is_asked_for_and_selected(
     quick = slow.replace("0.6", "0.95")
     refused = f"import subprocess\n{slow}"
     model = Script(*map(code, (slow, STILL, slow, refused, quick, slow, slow, slow)))
-    run = improve(on_set, model)
+    run = improve(on_set, model, ask="repair")
     asked = [kind for kind, *_ in model.asked()]
     assert asked == ["generate", *["improve"] * (len(asked) - 1)]
     first, second = (request.prompt for request in model.requests[1:3])

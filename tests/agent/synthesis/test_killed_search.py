@@ -14,7 +14,7 @@ CLOCKS |= {"call_ms_mean", "call_ms_p99"}
 ON_TASK = ("--task", "task", "--improve", "32")
 ON_SET = ("--set", "few.yaml", "--episodes", "4", "--feedback-episodes", "2")
 ON_SET += ("--search", "paper", "--improve", "32")
-RACE = ("--set", "wide.yaml", "--episodes", "64", "--iterations", "7")
+RACE = ("--set", "wide.yaml", "--episodes", "64", "-K", "7", "-N", "1")
 RACE += ("--learner", f"command:{sys.executable} model.py")
 MODEL = """
 import hashlib, pathlib, sys
