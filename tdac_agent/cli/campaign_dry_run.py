@@ -29,7 +29,8 @@ from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.prices import PriceList, load_prices, price_file
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
-from tdac_agent.synthesis.options import RACE, SynthOptions
+from tdac_agent.synthesis.options import PAPER, RACE, SynthOptions
+from tdac_agent.synthesis.settled import settled
 from tdac_agent.synthesis.workload import shares
 
 FOLDER = Path("campaigns")
@@ -114,7 +115,9 @@ def dry_run(options: CampaignOptions) -> int:
 
 
 def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
-    further = SynthOptions().restored(dict(cell.options))
+    race = cell.setting == RACE
+    further = SynthOptions(search=RACE if race else PAPER).restored(dict(cell.options))
+    further = settled(further, on_set=cell.on_set)
     forecast: CostForecast = cost_of(
         cell.task_name,
         question_of(plan.problem(cell), load_template(cell.prompt)),
@@ -124,9 +127,9 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
         iterations=cell.iterations,
         patience=cell.patience,
         candidates=further.candidates or 1,
-        ask=further.ask if cell.setting == RACE else "",
+        ask=further.ask if race else "",
         refine=cell.refine,
-        variations=shares(cell.episodes, further.improve).asked,
+        variations=0 if race else shares(cell.episodes, further.improve).asked,
         base_url=cell.base_url,
         max_output=cell.max_output,
     )

@@ -34,6 +34,7 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
     server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]
     episodes = options.episodes if problem.has_hidden else None
+    race = options.search == RACE
     forecast = cost_of(
         problem.name,
         problem.question(book.in_force, template),
@@ -42,9 +43,9 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
         iterations=options.iterations or 0,
         patience=options.patience,
         candidates=options.candidates or 1,
-        ask=options.ask if options.search == RACE else "",
+        ask=options.ask if race else "",
         refine=options.refine,
-        variations=shares(episodes, options.improve).asked,
+        variations=0 if race else shares(episodes, options.improve).asked,
         base_url=options.base_url,
         max_output=options.max_output,
         max_cost=options.max_cost,
@@ -57,12 +58,13 @@ def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int
     sys.stdout.flush()
     console = Console(stderr=True, highlight=False)
     unbounded = _unbounded(forecast) if options.base_url is None else []
-    for line in [*_estimates(forecast), *_still_needed([*missing, *unbounded])]:
+    estimates = _estimates(forecast, race=race)
+    for line in [*estimates, *_still_needed([*missing, *unbounded])]:
         print_sentences(console, line)
     return 0
 
 
-def _estimates(forecast: CostForecast) -> list[str]:
+def _estimates(forecast: CostForecast, *, race: bool) -> list[str]:
     k, j = forecast.iterations, forecast.patience
     lines = [
         f"prompt: about {forecast.prompt_tokens} tokens (an estimate: a third of its "
@@ -75,9 +77,11 @@ def _estimates(forecast: CostForecast) -> list[str]:
         reserved = format_usd(forecast.first_cost)
         lines.append(f"first question: at most {reserved}, reserved before it is asked")
     whole = f"whole run: {forecast.questions} questions (K={k}, J={j}"
+    if race:
+        whole = f"whole run: at most {forecast.questions} questions (K={k}"
     if forecast.variations:
         whole += f", and {forecast.variations} to improve what works"
-    whole += ") if no controller passes"
+    whole += ")" if race else ") if no controller passes"
     if forecast.variations:
         whole += " before the last one"
     if forecast.cost_once is not None and forecast.cost_most is not None:

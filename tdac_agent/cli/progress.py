@@ -12,6 +12,7 @@ from rich.table import Table
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.run_view import list_tests
 from tdac_agent.models.budget import format_usd
+from tdac_agent.synthesis.question_kinds import NEW
 from tdac_agent.verification.verdict import COLOURS
 
 _ANSWERS = (
@@ -169,7 +170,7 @@ class SynthProgress:
 
     def _print_attempt(self, at: str, record: dict[str, Any]) -> None:
         note = escape("; ".join(record["notes"][-1:]))
-        if record.get("parent") is not None:
+        if record.get("asked", "") not in NEW:
             self.say(f"~ {at}", note, "" if record["valid"] else "yellow")
         elif not record["valid"]:
             self.say(f"– {at}", note, "yellow")

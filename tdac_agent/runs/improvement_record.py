@@ -103,6 +103,11 @@ class TaskImprovement(StrictRecord):
     used: int
     asked: int = Field(description="Number of variations that were answered.")
     members: tuple[MemberFigures, ...] = Field(description="Oldest first.")
+    founders: int = Field(
+        0,
+        description="Members that the search began with; 0 in records of earlier "
+        "versions, where only the others have a parent.",
+    )
     first: tuple[int, int] = Field(description="(k, j) of the first that passed.")
     k: int = Field(description="Iteration of the selected candidate.")
     j: int = Field(description="Its edit.")
@@ -127,16 +132,23 @@ class TaskImprovement(StrictRecord):
 
     def text_of(self, k: int, j: int) -> str:
         """How a candidate drove that the search began with; empty for any other."""
-        for each in self.members:
-            if (each.k, each.j, each.parent) == (k, j, None):
+        for each in self._begun:
+            if (each.k, each.j) == (k, j):
                 reached = round(each.robustness * self.block)
                 return drive_text(each.time, reached, self.block)
         return ""
 
     @property
+    def _begun(self) -> tuple[MemberFigures, ...]:
+        """The members that the search began with."""
+        if self.founders:
+            return self.members[: self.founders]
+        return tuple(each for each in self.members if each.parent is None)
+
+    @property
     def told(self) -> str:
         """What the search brought, in one line."""
-        varied = sum(each.parent is not None for each in self.members)
+        varied = len(self.members) - len(self._begun)
         about = f"{self.asked} variation{'' if self.asked == 1 else 's'}"
         about = f"improving: {about}, {varied} of them passed"
         first, selected = (

@@ -96,6 +96,7 @@ def check_same(before: Run, now: Run, further: Mapping[str, Any] | None = None) 
     Raises:
         RunError: They differ; names all differences.
     """
+    before = _completed(before, now)
     others = [
         name for name in CONFIGURATION if getattr(before, name) != getattr(now, name)
     ]
@@ -118,6 +119,12 @@ def check_same(before: Run, now: Run, further: Mapping[str, Any] | None = None) 
             f"{before.folder} contains another run ({'; '.join(differences)}): "
             f"{way_out}"
         )
+
+
+def _completed(before: Run, now: Run) -> Run:
+    """A run with what records of earlier versions do not say."""
+    known = {"search": before.search or "paper", "ask": before.ask or now.ask}
+    return before.model_copy(update=known)
 
 
 def resume_words(run: Run, folder: Path | str) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from tdac_agent.models.tariff import MAX_COST, UNKNOWN_COST, UNPRICED_TOKENS, Ta
 from tdac_agent.models.tokens import estimate_tokens, most_tokens
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.synthesis.dialogue import MAX_ASKS
-from tdac_agent.synthesis.workload import Workload, of_race, tokens_asked, whole
+from tdac_agent.synthesis.workload import of_race, tokens_asked, whole
 
 
 class CostForecast(PrintableRecord):
@@ -98,7 +98,7 @@ def cost_of(
         work = of_race(iterations, candidates, ask)
     sizes = tokens_asked(tokens, max_output)
     if ask:  # new controllers are asked for with what is known
-        sizes = Workload(sizes.optimizer, sizes.optimizer)
+        sizes = sizes._replace(learner=sizes.optimizer)
     prices_of = [prices.price_of(m, base_url) for m in (learner, optimizer)]
     first, second = prices_of
     once = most = first_cost = None
@@ -109,6 +109,8 @@ def cost_of(
         once, most = (
             work.learner * first.most(times * sizes.learner, out)
             + work.optimizer * second.most(times * sizes.optimizer, out)
+            + work.either
+            * max(price.most(times * sizes.optimizer, out) for price in (first, second))
             for times, out in ((1, max_output), (MAX_ASKS, answers))
         )
     without = [

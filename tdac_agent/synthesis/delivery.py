@@ -105,12 +105,20 @@ def task_improvement(
         terms: What the trials share.
         task: The task.
         chosen: The candidate that was selected, and the archive.
+<<<<<<< HEAD
         found: How it compares with the first verified one.
         **facts: `used`, `first_seed` and `first_comparison`.
     """
     archive, selected = chosen.archive, chosen.candidate
     assert archive is not None
     first, changes = archive.base, found.changes
+=======
+        changes: How it compares with what the search began with, by figure.
+        **facts: `first`, `used`, `first_seed` and `first_comparison`.
+    """
+    archive, selected = chosen.archive, chosen.candidate
+    assert archive is not None
+>>>>>>> a7fdf59c273ef8e6d72de233b5f3e976147782d1
     return TaskImprovement(
         unit=task.setting.units.place,
         disturbance=task.own_disturbance(),
@@ -118,7 +126,7 @@ def task_improvement(
         improve=terms.recorder.run.improve,
         asked=chosen.asked,
         members=tuple(map(_member, archive.members)),
-        first=(first.k, first.j),
+        founders=len(archive.founders),
         k=selected.k,
         j=selected.j,
         controller_sha256=selected.sha256,

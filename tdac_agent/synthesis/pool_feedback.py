@@ -110,9 +110,10 @@ class PoolFeedback:
     def _track(
         self, candidate: Candidate, row: EpisodeRow, others: Sequence[Candidate]
     ) -> str:
-        trajectory, scene = trajectory_of(candidate, row), self.scene(row.number)
+        trajectory = trajectory_of(candidate, row)
         if trajectory is None:
             return ""
+        scene = self.scene(row.number)
         seconds, least = _seconds(row)[::-1]
         lines = [
             f"{self.word} {self._name(row)}: score {row.time_score:.2f}, {seconds} s, "

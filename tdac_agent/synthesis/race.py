@@ -26,6 +26,7 @@ from tdac_agent.synthesis.question_kinds import (
     FASTER,
     FRESH,
     INFORMED,
+    MEASURED,
     MERGE,
     REPAIR,
     RULES,
@@ -37,8 +38,6 @@ FOUNDERS = 3
 """Most candidates of a loop that a race for improvements begins with."""
 REPAIRED = 2
 """The best of so many controllers are repaired."""
-MOST_STALE = 3
-"""Questions in a row without a new controller that drives, after which it ends."""
 POOL = "pool"
 """What rules are made for, if nothing failed."""
 BLOCK = 8
@@ -115,14 +114,12 @@ class Race:
         Raises:
             Fault: A model does not answer.
         """
-        stale = 0
         try:
-            while self.asked < self._most and stale < MOST_STALE:
-                possible = self._possible()
-                if not possible or not self._trials.can_explore(self.asked):
+            while self.asked < self._most and self._trials.can_explore(self.asked):
+                kind = self._next_kind()
+                if not kind:
                     break
-                kind = self._bandit.choose(possible)
-                stale = 0 if self._question(kind) else stale + 1
+                self._question(kind)
         except OutOfBudget as error:
             return str(error)
         return ""
@@ -132,23 +129,27 @@ class Race:
         """The archive, and the number of questions that were answered."""
         return self.archive, self.asked
 
-    def _possible(self) -> set[str]:
-        """Kinds of questions for which there is something to ask about."""
+    def _next_kind(self) -> str:
+        """The kind of the next question; empty if there is nothing to ask."""
         fixed, live = is_fixed(self._dialogue.learner), self.archive.live
-        possible = set[str]() if fixed else {FRESH, INFORMED, RULES}
+        possible = set[str]() if fixed else {FRESH, MEASURED, INFORMED, RULES}
         if live:
             possible |= {REPAIR, FASTER}
         if len(self._texts.partners()) == 2:
             possible.add(MERGE)
-        return possible & self._bandit.odds.keys()
+        possible &= self._bandit.odds.keys()
+        if possible:
+            return self._bandit.choose(possible)
+        # There is no controller to ask about.
+        return "" if fixed else FRESH
 
-    def _question(self, kind: str) -> bool:
-        """Asks a question of a kind; returns whether a new controller drove."""
-        self.asked += 1
-        k = len(self._first) + self.asked
+    def _question(self, kind: str) -> None:
+        """Asks a question of a kind."""
+        k = len(self._first) + self.asked + 1
         parents = self._parents(kind)
         answer = self._answer(kind, k, parents)
-        return self._entered(k, answer, kind, parents)
+        self.asked += 1
+        self._entered(k, answer, kind, parents)
 
     @property
     def _first(self) -> range:
@@ -171,8 +172,8 @@ class Race:
     def _answer(self, kind: str, k: int, parents: tuple[Member, ...]) -> ModelAnswer:
         if kind == FRESH:
             return self._dialogue.generate_all([k])[0]
-        if kind in (INFORMED, RULES):
-            known = self._texts.known()
+        if kind in (MEASURED, INFORMED, RULES):
+            known = self._texts.known(robot_only=kind == MEASURED)
             if kind == RULES:
                 self._learn_rules(k, known)
                 return self._dialogue.generate_all([k])[0]
@@ -183,13 +184,13 @@ class Race:
 
     def _entered(
         self, k: int, answer: ModelAnswer, kind: str, parents: tuple[Member, ...]
-    ) -> bool:
-        """Lets a controller drive and records it; returns whether a new one drove."""
+    ) -> None:
+        """Lets a controller drive, and records it."""
         source, notes = answer
         if source is None:
             self._record(k, kind, parents, notes, valid=False)
             self._learn(kind, paid=False)
-            return False
+            return
         before = parents[0].candidate.source if parents else None
         folder = self._recorder.candidate(k, 0, source, before=before)
         same = [each for each in self._written if same_code(source, each.source)]
@@ -198,7 +199,7 @@ class Race:
             old = same[0].explored
             self._record(k, kind, parents, (*notes, said), old, unchanged=True)
             self._learn(kind, paid=False)
-            return False
+            return
         candidate = Candidate(k, 0, source, folder)
         self._written.append(candidate)
         against = parents[0] if parents else self.archive.top
@@ -206,7 +207,6 @@ class Race:
         said, paid = self._join(candidate, explored, parents, kind)
         self._record(k, kind, parents, (*notes, said), explored)
         self._learn(kind, paid=paid)
-        return explored.drove
 
     def _explored(self, candidate: Candidate, against: Member | None) -> Explored:
         """Lets a candidate drive; it stops early if it is clearly worse."""

@@ -51,14 +51,18 @@ class RaceQuestions:
         gain, *pair = max(pairs, key=lambda each: each[0], default=(0.0,))
         return tuple(pair) if gain >= LEAST_GAIN else ()
 
-    def known(self) -> str:
-        """What all drives so far show, without any code."""
+    def known(self, *, robot_only: bool = False) -> str:
+        """What all drives so far show, without any code.
+
+        Args:
+            robot_only: Whether only what they show of the robot is told.
+        """
+        if robot_only:
+            lines = self._trials.pool_feedback.robot()
+            return f"### What all drives show of the robot\n{lines or '(nothing yet)'}"
         archive, told = self._archive, self._trials.pool_feedback
-        ranked = sorted(
-            [*archive.members, *archive.dropped],
-            key=lambda each: each.figures.rank,
-            reverse=True,
-        )
+        # Of those that were dropped, the figures are of fewer episodes.
+        ranked = [*_ranked(archive.members), *_ranked(archive.dropped)]
         parts = []
         if ranked:
             parts += ["### How they drove", *map(self._line, ranked[:MOST_KNOWN])]
@@ -157,6 +161,10 @@ class RaceQuestions:
             Tried(difference(source, candidate.source), rank, said)
             for candidate, rank, said in tried
         ]
+
+
+def _ranked(members: list[Member]) -> list[Member]:
+    return sorted(members, key=lambda each: each.figures.rank, reverse=True)
 
 
 def _joint(one: Candidate, other: Candidate) -> float:

@@ -22,13 +22,14 @@ def settled(options: SynthOptions, *, on_set: bool) -> SynthOptions:
     """
     search = options.search or (RACE if on_set else PAPER)
     one_of("search", search, SEARCHES)
-    for kind in kinds_of(options.ask):
+    kinds = kinds_of(options.ask)
+    for kind in kinds:
         one_of("ask", kind, KINDS)
     usual = USUAL[search]
     missing: dict[str, Any] = {
         name: usual[name] for name in usual if getattr(options, name) is None
     }
-    return replace(options, search=search, **missing)
+    return replace(options, search=search, ask=",".join(kinds), **missing)
 
 
 def kinds_of(ask: str) -> tuple[str, ...]:

@@ -241,7 +241,7 @@ class SuiteTrials:
         if chosen.archive is None:
             self.secure(chosen.candidate)
             return chosen.candidate
-        terms, first = self.terms, chosen.archive.base
+        terms, first = self.terms, self._secured or chosen.archive.base
         chosen = self._confirmed(chosen, first)
         figures = {"robustness": reached_of, "time": time_of}
         changes = compared(self.compare, first, chosen.candidate, figures)
@@ -250,6 +250,7 @@ class SuiteTrials:
             self.task,
             chosen,
             changes,
+            first=(first.k, first.j),
             used=self.used,
             first_seed=seeds_for(terms.recorder.run, POOL, 0).start,
             first_comparison=seeds_for(terms.recorder.run, "comparison", 0).start,
@@ -258,7 +259,7 @@ class SuiteTrials:
         write_atomic(terms.folder / IMPROVEMENT_FILE, text)
         facts = found.model_dump(mode="json", exclude={"members", "stopped"})
         terms.recorder.event("select.end", **facts)
-        if chosen.candidate is not first:
+        if chosen.candidate is not self._secured:
             self.secure(chosen.candidate)
         return chosen.candidate
 

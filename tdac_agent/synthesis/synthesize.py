@@ -171,6 +171,9 @@ def _check(wanted: SynthOptions, problem: Problem) -> None:
         raise TaskError(f"then_verify: {problem.called} has no hidden worlds")
     if wanted.improve:
         whole_number("improve", wanted.improve, LEAST_IMPROVE, MOST_EPISODES)
+    more = wanted.search == RACE and (wanted.iterations or 0) > (wanted.candidates or 0)
+    if (wanted.improve or more) and not kinds_of(wanted.ask):
+        raise TaskError("ask: expected a kind of question, such as repair")
     if wanted.search == RACE:
         _check_race(wanted, problem)
     problem.check(wanted.improve)
@@ -182,8 +185,6 @@ def _check_race(wanted: SynthOptions, problem: Problem) -> None:
     Raises:
         TaskError: One of them cannot be used.
     """
-    if (wanted.iterations or 0) > (wanted.candidates or 0) and not kinds_of(wanted.ask):
-        raise TaskError("ask: expected a kind of question; give -K as many as -N")
     if problem.has_hidden and wanted.improve:
         raise TaskError(
             "improve: a race goes on after a success anyway; give more answers (-K) or "
@@ -318,7 +319,9 @@ def _loop(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
     if not trials.terms.recorder.run.improve or not works:
         return _Found(written, able, stopped)
     trials.secure(max(able, key=lambda each: trials.result(each).rank))
-    race = Race(dialogue, trials, written, most=trials.terms.shares.asked)
+    kinds = kinds_of(trials.terms.recorder.run.ask)
+    most = trials.terms.shares.asked
+    race = Race(dialogue, trials, written, most=most, kinds=kinds)
     race.begin_with(able)
     stopped = race.run() or stopped
     return _Found(written, trials.finalists(race.archive), stopped, race)
@@ -330,7 +333,8 @@ def _race(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
     first = min(run.candidates, run.iterations)
     kinds, most = kinds_of(run.ask), run.iterations - first
     race = Race(dialogue, trials, written, most=most, kinds=kinds)
-    race.ask_first(given, first)
+    parts = trials.terms.shares
+    race.ask_first(given, min(first, parts.explore // parts.block))
     stopped = race.run()
     able = trials.finalists(race.archive) if race.archive.members else []
     return _Found(written, able, stopped, race)

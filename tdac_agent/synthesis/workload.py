@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import reduce
 from typing import NamedTuple
 
 from tdac_agent.models.budget import NOTHING, Amount
@@ -14,8 +15,6 @@ from tdac_agent.prompting.rules import MAX_RULE_TOKENS
 from tdac_agent.runs.run_record import Run
 from tdac_agent.synthesis.question_kinds import (
     FASTER,
-    FRESH,
-    INFORMED,
     MERGE,
     REPAIR,
     RULES,
@@ -97,15 +96,24 @@ def _block(explore: int) -> int:
 
 
 class Workload(NamedTuple):
-    """Number of questions to the Learner and to the Optimizer."""
+    """Number of questions to the Learner, to the Optimizer, and to one of the two."""
 
     learner: int
     optimizer: int
+    either: int = 0
 
     @property
     def questions(self) -> int:
         """Number of all questions."""
-        return self.learner + self.optimizer
+        return self.learner + self.optimizer + self.either
+
+    def less(self, request: Request) -> Workload:
+        """The questions that follow one of them."""
+        if request.role == "learner" and self.learner:
+            return self._replace(learner=self.learner - 1)
+        if request.role != "learner" and self.optimizer:
+            return self._replace(optimizer=self.optimizer - 1)
+        return self._replace(either=max(0, self.either - 1))
 
 
 class Rest(NamedTuple):
@@ -124,9 +132,13 @@ def of_race(answers: int, first: int, ask: str) -> Workload:
         ask: Kinds of the other questions, separated by commas.
     """
     kinds, others = set(ask.split(",")), max(0, answers - first)
-    learner = others if kinds & {FRESH, INFORMED, RULES} else 0
-    optimizer = others if kinds & {REPAIR, FASTER, MERGE, RULES} else 0
-    return Workload(min(first, answers) + learner, optimizer)
+    first = min(first, answers)
+    if RULES in kinds:  # rules first, then a controller
+        return Workload(first + others, others)
+    if not kinds & {REPAIR, FASTER, MERGE}:
+        return Workload(first + others, 0)
+    # Without a controller to ask about, a new one is asked for.
+    return Workload(first, 0, others)
 
 
 def whole(
@@ -147,7 +159,7 @@ def whole(
         variations: Most variations of what works (`Shares.asked`).
     """
     repaired = math.ceil(iterations / candidates)
-    return Workload(iterations, repaired * (patience + refine) + variations)
+    return Workload(iterations, repaired * (patience + refine), variations)
 
 
 def from_here(
@@ -161,8 +173,8 @@ def from_here(
 ) -> Workload:
     """A question and all that follow it if no candidate passes before the last one."""
     _, k, j = request.sample
-    if request.kind == "improve":
-        return Workload(0, max(1, variations + 1 - k + iterations))
+    if k > iterations:
+        return Workload(0, 0, max(1, variations + 1 - k + iterations))
     # Those that were asked side by side have the last k of their group.
     last = min(iterations, k + (-k) % candidates)
     terms = {"candidates": candidates, "variations": variations}
@@ -172,6 +184,7 @@ def from_here(
     return Workload(
         later.learner + mine,
         later.optimizer + left[request.kind] + refine,
+        variations,
     )
 
 
@@ -179,9 +192,7 @@ def race_from_here(request: Request, run: Run) -> Workload:
     """A question of a race and all that may follow it."""
     _, k, _ = request.sample
     first = max(0, run.candidates - k + 1)
-    left = of_race(max(run.iterations - k + 1, 1), first, run.ask)
-    role = Workload(1, 0) if request.role == "learner" else Workload(0, 1)
-    return Workload(*map(max, left, role))
+    return of_race(max(run.iterations - k + 1, 1), first, run.ask)
 
 
 def tokens_asked(question: int, max_output: int) -> Workload:
@@ -223,14 +234,20 @@ def rest_of(
             candidates=run.candidates,
             variations=shares(run.episodes, run.improve).asked,
         )
-    tokens = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
+    size = tokens_asked(estimate_tokens(request.prompt[: request.stable]), max_output)
     if run.search == "race":  # new controllers are asked for with what is known
-        tokens = Workload(tokens.optimizer, tokens.optimizer)
-    this = Workload(1, 0) if request.role == "learner" else Workload(0, 1)
-    most = worst
-    models = (run.learner, run.optimizer)
-    for name, count, mine, size in zip(models, left, this, tokens, strict=True):
+        size = size._replace(learner=size.optimizer)
+
+    def one(name: str, tokens: int) -> Amount:
         tariff = tariffs[name]
-        one = NOTHING if tariff.free else tariff.most(size, max_output)
-        most = most.plus(one.times(count - mine))
-    return Rest(left.questions, most)
+        return NOTHING if tariff.free else tariff.most(tokens, max_output)
+
+    later = left.less(request)
+    both = one(run.learner, size.optimizer), one(run.optimizer, size.optimizer)
+    either = Amount(max(m.tokens for m in both), max(m.usd for m in both))
+    parts = (
+        one(run.learner, size.learner).times(later.learner),
+        both[1].times(later.optimizer),
+        either.times(later.either),
+    )
+    return Rest(left.questions, reduce(Amount.plus, parts, worst))

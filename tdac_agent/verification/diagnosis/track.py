@@ -82,7 +82,7 @@ def _detours(trajectory: Trajectory, full_step: float) -> list[Piece]:
     behind = left > least + 2.0 * full_step
     found = []
     for first, last in _runs(behind, apart=0):
-        begin = int(np.flatnonzero(left[: first + 1] <= least[first])[0])
+        begin = int(np.flatnonzero(left[: first + 1] <= least[first])[-1])
         after = np.flatnonzero(left[last:] <= least[first])
         end = last + int(after[0]) if len(after) else len(left) - 1
         found.append(Piece("detour", begin, end, float(end - begin)))

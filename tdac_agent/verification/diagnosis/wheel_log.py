@@ -122,16 +122,13 @@ class WheelLog:
         return lines
 
     def _sizes(self, gain: float, units: Units) -> list[str]:
-        """Length and turn of a step at full speed, with its sign."""
+        """Length and turn of a step at full speed; a turn as it is observed."""
+        # As an observed heading changes when the robot turns to the right.
         change = math.remainder(units.heading_of(0.1) - units.heading_of(0.0), math.tau)
-        side = "right" if change > 0.0 else "left"
-        angle = math.degrees(self.turn * gain)
-        far = units.figure(self.step * gain)
+        angle = math.copysign(math.degrees(self.turn * gain), change * gain)
         return [
-            f"command (1, 1) drives {far} ahead in a step",
-            f"command (1, -1) turns by {angle:.1f}° in a step on the spot, to the "
-            "robot's right",
-            f"headings and turns to the {side} are positive; y is to the {side} of x",
+            f"command (1, 1) drives {units.figure(self.step * gain)} ahead in a step",
+            f"command (1, -1) changes the heading by {angle:+.1f}° in a step on the spot",
         ]
 
 

@@ -8,7 +8,7 @@ from unconfirmed import synthesize
 
 from tdac_agent.models.retry import RetryPolicy
 
-ON_SET = {"episodes": 12, "feedback_episodes": 2, "seed": 3}
+ON_SET = {"search": "paper", "episodes": 12, "feedback_episodes": 2, "seed": 3}
 
 
 @dataclass

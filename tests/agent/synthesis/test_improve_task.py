@@ -82,7 +82,7 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
     """The model sees the parent, its figures, and what was tried with it."""
     answers = (fragile, STILL, fragile, good_source, STILL, STILL, STILL)
     model = Script(*map(code, answers))
-    run = improve(on_task, model)
+    run = improve(on_task, model, ask="repair")
     out = tmp_path / "run"
     assert model.asked() == [
         ("generate", 1, 0),
@@ -140,11 +140,11 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
             )["episodes"]
         ]
         for k in ("k01/j0", "k09/j0")
-        for name in (f"{k}/improve", f"{k}/comparison")
+        for name in (f"{k}/improve-1", f"{k}/comparison-1")
     }
-    assert seeds["k01/j0/improve"] == seeds["k09/j0/improve"]
-    assert seeds["k01/j0/comparison"] == seeds["k09/j0/comparison"]
-    assert not {*seeds["k01/j0/improve"]} & {*seeds["k01/j0/comparison"]}
+    assert seeds["k01/j0/improve-1"] == seeds["k09/j0/improve-1"]
+    assert seeds["k01/j0/comparison-1"] == seeds["k09/j0/comparison-1"]
+    assert not {*seeds["k01/j0/improve-1"]} & {*seeds["k01/j0/comparison-1"]}
     assert min(map(min, seeds.values())) > 2**32  # the seeds of `verify --robust`
 
     frames = frames_of([run])
@@ -170,7 +170,7 @@ def test_without_a_better_one_the_first_stays(
         if record["event"] == "drive.start":
             seen.append((tmp_path / "run" / "controller.py").read_text())
 
-    run = improve(on_task, model, on_event=watch)
+    run = improve(on_task, model, ask="repair", on_event=watch)
     assert set(seen) == {good_source}
     assert (run.folder / "controller.py").read_text() == good_source
     found = read_improvement(run.folder)
@@ -180,7 +180,7 @@ def test_without_a_better_one_the_first_stays(
     robust = verify_episodes(
         run.controller, task, 4, first=found.first_seed, judge=warm
     )
-    own = run.folder / "iterations/k01/j0/improve/episodes.json"
+    own = run.folder / "iterations/k01/j0/improve-1/episodes.json"
     driven = EpisodeReport.model_validate_json(own.read_text()).episodes
     for episode in robust.worst:
         (same,) = (each for each in driven if each.seed == episode.seed)

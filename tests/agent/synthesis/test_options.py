@@ -188,7 +188,7 @@ def test_a_further_option_of_a_campaign(campaign, tmp_path, monkeypatch, about):
     [
         (
             {"loud": 1},
-            "there is no option 'loud'; expected one of base_url, candidates",
+            "there is no option 'loud'; expected one of ask, base_url, candidates",
         ),
         ({"candidates": "two"}, "candidates: expected int, got 'two'"),
         ({"improve": 31}, "improve: expected at least 32, got 31"),

@@ -68,7 +68,13 @@ def test_a_replay_asks_no_more_than_the_recorded_run(tmp_path, out, warm):
     """Of a controller that fails, too, when nobody was there to repair it."""
     horizon = {"factor": 1, "least": 20, "most": 20}
     short = load_set(write_set(tmp_path / "short.yaml", horizon=horizon))
-    given = {"episodes": 8, "feedback_episodes": 2, "seed": 3, "judge": warm}
+    given = {
+        "search": "paper",
+        "episodes": 8,
+        "feedback_episodes": 2,
+        "seed": 3,
+        "judge": warm,
+    }
     run = synthesize(short, "builtin", out=out, **given)
     assert (run.status, len(run.attempts)) == ("not verified", 1)
     again = synthesize(short, f"replay:{out}", out=tmp_path / "again", **given)

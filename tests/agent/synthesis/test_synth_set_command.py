@@ -18,8 +18,8 @@ def test_the_built_in_controller(tdac, done, refused, tmp_path):
     """It is selected without a model; the report and the list show the run."""
     few = write_set(tmp_path / "few.yaml")
     words = ("synth", "--set", few, "--episodes", "4", "--feedback-episodes", "2")
-    words += ("--seed", "1")
-    code, out, err = tdac(*words, "--out", "run")
+    words += ("--search", "paper")
+    code, out, err = tdac(*words, "--seed", "1", "--out", "run")
     assert (code, err) == (0, "")
     assert "the built-in controller of the level known" in out
     assert "selected, optimistic: 100.0 % reached" in out
@@ -40,8 +40,7 @@ def test_the_built_in_controller(tdac, done, refused, tmp_path):
     assert "The selected controller" in page
     assert "the goal reached in 2 of 2 worlds" in page
     assert "Not readable" not in page
-    out = done("synth", "--set", few, "--episodes", "4", "--feedback-episodes",
-                        "2", "--learner", "replay:run", "--json")  # fmt: skip
+    out = done(*words, "--learner", "replay:run", "--json")
     assert json.loads(out)["status"] == "selected"
 
 
@@ -56,7 +55,7 @@ def test_a_program_as_a_model(tdac, rejected, tmp_path):
     code, printed, err = tdac(*words, "--dry-run")
     assert code == 0
     assert "cost of command" in err
-    out = rejected(*words, "--episodes", "4", "--feedback-episodes", "2")
+    out = rejected(*words, "--episodes", "4", "--search", "paper")
     assert "no controller was selected" in out
     assert (folder / "prompt-1.md").read_text() == printed
 

@@ -103,7 +103,7 @@ def test_a_given_controller_is_tried_first(write, ground, tmp_path):
 
 def test_an_unknown_keyword_is_named(write, ground, out):
     """Before anything is written; options and keywords are the same."""
-    with pytest.raises(TypeError, match="no option 'iteration'; the options are base"):
+    with pytest.raises(TypeError, match="no option 'iteration'; the options are ask"):
         write(ground, iteration=3)
     with pytest.raises(TaskError, match="improve"):
         write(ground, options=SynthOptions(improve=31))

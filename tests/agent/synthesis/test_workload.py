@@ -12,7 +12,17 @@ from tdac_agent.models.provider import Request
 from tdac_agent.models.tariff import Tariff
 from tdac_agent.runs.run_record import Run
 from tdac_agent.synthesis.calls import OutOfBudget
-from tdac_agent.synthesis.workload import Rest, from_here, rest_of, whole
+from tdac_agent.synthesis.question_kinds import KINDS
+from tdac_agent.synthesis.workload import (
+    LEAST_IMPROVE,
+    Rest,
+    from_here,
+    of_race,
+    race_from_here,
+    rest_of,
+    shares,
+    whole,
+)
 
 TARIFFS = {
     "dear": Tariff(price=Price(input=10, output=50)),
@@ -58,7 +68,7 @@ def test_the_questions_that_are_left(iterations, patience, refine):
     for number, place in enumerate(questions):
         left = questions[number:]
         learner = sum(kind == "generate" for kind, _, _ in left)
-        expected = (learner, len(left) - learner)
+        expected = (learner, len(left) - learner, 0)
         left_now = from_here(request(*place), iterations, patience, refine=refine)
         assert left_now == expected
 
@@ -141,3 +151,100 @@ def test_what_is_said_to_be_enough_is(limit, spent, worst, more):
         budget = Budget(max_cost=enough)
         budget.restore({"before": taken})
         budget.reserve("next", next_one)
+
+
+KINDS_OF_OPTIMIZER = {"repair", "faster", "merge"}
+
+
+@st.composite
+def races(draw):
+    """Answers, first answers, kinds, and the kinds of the questions that came."""
+    answers, first = draw(st.integers(1, 9)), draw(st.integers(1, 10))
+    asked = draw(st.lists(st.sampled_from(KINDS), min_size=1, unique=True))
+    later = max(0, answers - first)
+    came = draw(st.lists(st.sampled_from(asked), min_size=later, max_size=later))
+    return answers, first, ",".join(asked), came
+
+
+def race_questions(answers, first, came):
+    """The questions of a race in which each answer can be used."""
+    first = min(answers, first)
+    for k in range(1, first + 1):
+        yield request("generate", k, 0)
+    for k, kind in enumerate(came, first + 1):
+        if kind == "rules":
+            yield request("summarise", k, 0)
+        yield request("improve" if kind in KINDS_OF_OPTIMIZER else "generate", k, 0)
+
+
+def is_bound(work, questions):
+    """Whether a workload has at least these questions, for each of the models."""
+    learner = sum(each.role == "learner" for each in questions)
+    optimizer = len(questions) - learner
+    spare = max(0, learner - work.learner) + max(0, optimizer - work.optimizer)
+    return spare <= work.either and work.questions >= len(questions)
+
+
+@settings(deadline=None)
+@given(races(), names, names)
+def test_a_race_asks_no_more_than_is_said(race, learner, optimizer):
+    """For each model, from the first question and from each of the others."""
+    answers, first, ask, came = race
+    questions = list(race_questions(answers, first, came))
+    assert is_bound(of_race(answers, first, ask), questions)
+    facts = {"search": "race", "candidates": first, "ask": ask}
+    run = run_of(learner, optimizer, answers, 0).model_copy(update=facts)
+    for number, asked in enumerate(questions):
+        assert is_bound(race_from_here(asked, run), questions[number:])
+        model = learner if asked.role == "learner" else optimizer
+        worst = TARIFFS[model].worst(asked)
+        rest = rest_of(run, TARIFFS, asked, worst, 1000)
+        assert rest.questions >= len(questions) - number
+        parts = [TARIFFS[optimizer if q.role != "learner" else learner].worst(q)
+                 for q in questions[number:]]  # fmt: skip
+        assert rest.most.usd >= sum(part.usd for part in parts) - 1e-9
+        assert rest.most.tokens >= sum(part.tokens for part in parts)
+
+
+@settings(deadline=None)
+@given(st.integers(1, 6), st.integers(1, 9), st.data(), names, names)
+def test_variations_ask_either_model(iterations, variations, data, learner, optimizer):
+    """A variation may be asked of the learner; the cost is bounded by the dearer one."""
+    run = run_of(learner, optimizer, iterations, 1).model_copy(
+        update={"improve": 64, "episodes": None}
+    )
+    kinds = st.sampled_from(["improve", "generate"])
+    came = data.draw(st.lists(kinds, min_size=variations, max_size=variations))
+    questions = [request(kind, iterations + n, 0) for n, kind in enumerate(came, 1)]
+    terms = {"variations": variations}
+    work = whole(iterations, 1, **terms)
+    loop = [request(*place) for place in all_questions(iterations, 1)]
+    assert is_bound(work, [*loop, *questions])
+    assert work.questions == len(loop) + variations
+    for number, asked in enumerate(questions):
+        left = from_here(asked, iterations, 1, **terms)
+        assert left.questions == variations - number
+        assert is_bound(left, questions[number:])
+        model = learner if asked.role == "learner" else optimizer
+        worst = TARIFFS[model].worst(asked)
+        rest = rest_of(run, TARIFFS, asked, worst, 1000)
+        assert rest.most.usd >= worst.usd
+
+
+@given(
+    st.none() | st.integers(2, 10_000),
+    st.integers(LEAST_IMPROVE, 10_000),
+    st.integers(1, 60),
+)
+def test_shares_of_a_race(episodes, improve, answers):
+    """They are at most all episodes; the pool has one, and all answers fit if they can."""
+    parts = shares(episodes, improve, answers)
+    known = improve if episodes is None else episodes
+    used = parts.feedback + parts.validation + parts.explore + 2 * parts.comparison
+    assert used == known
+    assert parts.feedback == 0
+    assert (parts.validation == 0) == (episodes is None or episodes < 8)
+    assert parts.block >= 1
+    assert parts.block * min(answers, parts.explore) <= parts.explore
+    if parts.validation:
+        assert parts.validation == 3 * parts.comparison

@@ -66,8 +66,9 @@ def test_wheels(late, units):
         for side in ("left", "right")
     )
     assert [*left, *right] == pytest.approx([0.9, 1.1, 0.9, 1.1], abs=0.02)
-    turn = float(re.search(r"turns by ([\d.]+)°", text)[1])
-    assert turn == pytest.approx(np.degrees(2.0 * 3.0 / 9.0), rel=0.02)
+    turn = float(re.search(r"heading by ([-+\d.]+)°", text)[1])
+    right = np.degrees(2.0 * 3.0 / 9.0)
+    assert turn == pytest.approx(-right if units.up else right, rel=0.02)
     sense = "left" if units.up else "right"
     assert (
         f"headings and turns to the {sense} are positive; y is to the {sense}" in text
