@@ -105,20 +105,11 @@ def task_improvement(
         terms: What the trials share.
         task: The task.
         chosen: The candidate that was selected, and the archive.
-<<<<<<< HEAD
-        found: How it compares with the first verified one.
-        **facts: `used`, `first_seed` and `first_comparison`.
-    """
-    archive, selected = chosen.archive, chosen.candidate
-    assert archive is not None
-    first, changes = archive.base, found.changes
-=======
-        changes: How it compares with what the search began with, by figure.
+        found: How it compares with what the search began with.
         **facts: `first`, `used`, `first_seed` and `first_comparison`.
     """
-    archive, selected = chosen.archive, chosen.candidate
+    archive, selected, changes = chosen.archive, chosen.candidate, found.changes
     assert archive is not None
->>>>>>> a7fdf59c273ef8e6d72de233b5f3e976147782d1
     return TaskImprovement(
         unit=task.setting.units.place,
         disturbance=task.own_disturbance(),

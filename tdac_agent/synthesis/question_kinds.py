@@ -10,8 +10,8 @@ FRESH, MEASURED, INFORMED, REPAIR, MERGE, FASTER, RULES = KINDS = (
     "rules",
 )
 """Kinds of questions: the first one again; with what drives show of the robot; with all
-that is known and no code; to repair a controller; to merge two; to make one faster; with
-rules that were learned."""
+that is known and no code; to repair a controller; to merge two; to make one faster;
+with rules that were learned."""
 ASKED = INFORMED, REPAIR, MERGE, FASTER
 """The kinds that a race asks by default."""
 NEW = "", "given", FRESH

@@ -252,16 +252,10 @@ class WorldTrials:
 
     def deliver(self, chosen: Chosen) -> Candidate:
         """See `Trials`."""
-<<<<<<< HEAD
         terms, changes = self.terms, Compared({}, {}, {})
-        if chosen.archive is not None:
+        if chosen.archive is not None and terms.shares.comparison:
             base = chosen.archive.base
             changes = compared(self.compare, base, chosen.candidate, {"time": time_of})
-=======
-        terms, changes = self.terms, dict[str, PairedChange]()
-        if chosen.archive is not None and terms.shares.comparison:
-            changes = compared(self.compare, chosen.archive.base, chosen.candidate)
->>>>>>> a7fdf59c273ef8e6d72de233b5f3e976147782d1
         selection = selection_of(
             terms,
             self.tasks,

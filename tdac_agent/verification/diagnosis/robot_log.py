@@ -1,7 +1,8 @@
 """What drives show of a robot: how it obeys commands, and what its readings mean.
 
-All figures are measured in drives, from commands, true motion and readings; none is read
-from the robot's file. The text is in the frame and the units that a controller observes.
+All figures are measured in drives, from commands, true motion and readings; none is
+read from the robot's file. The text is in the frame and the units that a controller
+observes.
 """
 
 from __future__ import annotations

@@ -128,7 +128,8 @@ class WheelLog:
         angle = math.copysign(math.degrees(self.turn * gain), change * gain)
         return [
             f"command (1, 1) drives {units.figure(self.step * gain)} ahead in a step",
-            f"command (1, -1) changes the heading by {angle:+.1f}° in a step on the spot",
+            f"command (1, -1) changes the heading by {angle:+.1f}° in a step, on the "
+            "spot",
         ]
 
 
