@@ -36,6 +36,8 @@ from tdac_agent.synthesis.trials import Trials
 
 FOUNDERS = 3
 """Most candidates of a loop that a race for improvements begins with."""
+MOST_STALE = 3
+"""The limit of a race for improvements; see `Race.run`."""
 REPAIRED = 2
 """The best of so many controllers are repaired."""
 POOL = "pool"
@@ -105,8 +107,12 @@ class Race:
         for _, candidate in working[:most]:
             self._join(candidate, self._explored(candidate, None), (), "")
 
-    def run(self) -> str:
+    def run(self, most_stale: int | None = None) -> str:
         """Asks one question after the other.
+
+        Args:
+            most_stale: Questions in a row without a new controller that drives, after
+                which it ends; None for no limit.
 
         Returns:
             What ended the race early, or nothing.
@@ -114,12 +120,15 @@ class Race:
         Raises:
             Fault: A model does not answer.
         """
+        stale = 0
         try:
-            while self.asked < self._most and self._trials.can_explore(self.asked):
+            while self.asked < self._most and stale != most_stale:
                 kind = self._next_kind()
-                if not kind:
+                if not kind or not self._trials.can_explore(self.asked):
                     break
+                driven = self._driven
                 self._question(kind)
+                stale = 0 if self._driven > driven else stale + 1
         except OutOfBudget as error:
             return str(error)
         return ""
@@ -150,6 +159,11 @@ class Race:
         answer = self._answer(kind, k, parents)
         self.asked += 1
         self._entered(k, answer, kind, parents)
+
+    @property
+    def _driven(self) -> int:
+        """Number of candidates that drove."""
+        return len(self.archive.members) + len(self.archive.dropped)
 
     @property
     def _first(self) -> range:

@@ -25,7 +25,7 @@ from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.iterations import Iterations
 from tdac_agent.synthesis.options import RACE, SynthOptions
-from tdac_agent.synthesis.race import Race
+from tdac_agent.synthesis.race import MOST_STALE, Race
 from tdac_agent.synthesis.selection import select
 from tdac_agent.synthesis.settled import kinds_of, settled
 from tdac_agent.synthesis.setup import (
@@ -323,7 +323,7 @@ def _loop(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
     most = trials.terms.shares.asked
     race = Race(dialogue, trials, written, most=most, kinds=kinds)
     race.begin_with(able)
-    stopped = race.run() or stopped
+    stopped = race.run(MOST_STALE) or stopped
     return _Found(written, trials.finalists(race.archive), stopped, race)
 
 
