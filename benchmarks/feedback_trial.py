@@ -1,10 +1,12 @@
 """What feedback is worth: the runs of results/feedback, as its PLAN.md describes them.
 
     python -m benchmarks.feedback_trial plan
-    python -m benchmarks.feedback_trial run OUT --questions DIR [NAME …] [--jobs 2]
+    python -m benchmarks.feedback_trial questions
+    python -m benchmarks.feedback_trial run OUT --questions DIR [GROUP …] [--jobs 2]
 
-`plan` prints the cells: a run each, with its level, seed, arm and omitted facts. `run`
-performs cells in their order, with `tdac synth --learner manual:DIR/GROUP`: a question
+`plan` prints the cells: a run each, with its level, seed, arm and omitted facts;
+`questions` the hash of the first question of each. `run` performs groups of cells in
+their order, with `tdac synth --learner manual:DIR/GROUP`: a question
 is written to a file, and the run waits for the file with the answer. Cells of a group
 share its folder, so that equal questions have the same answer: all arms of a group have
 the same first answers. After an interruption, the same command continues.
@@ -14,7 +16,9 @@ from __future__ import annotations
 
 import argparse
 import csv
+import functools
 import json
+import math
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields
@@ -23,29 +27,39 @@ from subprocess import run as run_process
 from typing import Any
 
 import numpy as np
+from tdac_agent.prompting.facts import FACTS, WORDINGS, FactsPrompt
 
 from tdac_agent import synthesize
+from tdac_agent.problems.choice import problem_of
 from tdac_agent.prompting.given_rules import given_book, read_given
+from tdac_agent.prompting.prompt import load_template
 from tdac_agent.runs.run_record import load_rules, load_run
+from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.synthesis.question_kinds import ASKED
 from tdac_envs.ladder.task_sets import load_set
 
 SEED = 20261129
 """Seed of all draws of the plan."""
-FACTS = (
-    *("turning", "axes", "units", "radius", "speed", "axle", "rays", "range"),
-    *("tolerance", "disturbances", "budget", "worlds"),
-)
+OMITTED = tuple(fact for fact in FACTS if fact != "score")
+"""The facts that a run may leave out: the score is told in all of them."""
 DOSES = {"unknown": (3, 6, 9, 12, 9, 12), "floor": (3, 6, 9, 12, 6, 12)}
 """Number of omitted facts in each run of the dose experiment."""
-ARMS = {"A": "fresh", "E": "repair", "I": "informed", "S": "rules"}
+ARMS = {
+    "A": "fresh",
+    "E": "repair",
+    "I": "informed",
+    "M": "measured",
+    "S": "rules",
+}
 FIRST, ROUNDS = 2, 4
-DOSE_EPISODES = 256
+DOSE_POOL, RACE_POOL = 16, 24
+"""Worlds of the pool, the same in all arms however many answers they have."""
 PAIRS = {"lost": 8, "floor": 8}
 CHEAPER = "A+", "best+"
 """Arms with further answers, until they cost as much as the dearest one."""
 OUT_WEIGHT = 5
 """How much more an answered character costs than an asked one."""
-CALLS, RACE_FIRST, RACE_EPISODES = 8, 4, 512
+CALLS, RACE_FIRST = 8, 4
 TRANSFERS = 8
 PLACEBO = Path("results/feedback/placebo.md")
 
@@ -75,13 +89,14 @@ class Cell:
     rules: str = ""
 
 
-def planned() -> list[Cell]:
+@functools.cache
+def planned() -> tuple[Cell, ...]:
     """All cells, in the order in which they are performed."""
     random = np.random.default_rng(SEED)
     groups = [*_doses(random), *_pairs(random)]
     random.shuffle(groups)
     cells = [cell for group in groups for cell in group]
-    return [*cells, *_transfers(cells, random)]
+    return (*cells, *_transfers(cells, random))
 
 
 def _doses(random: np.random.Generator) -> list[list[Cell]]:
@@ -90,17 +105,18 @@ def _doses(random: np.random.Generator) -> list[list[Cell]]:
     for level, doses in DOSES.items():
         for number, dose in enumerate(doses, 1):
             group = f"dose-{level}-{number}"
-            left = sorted(random.choice(len(FACTS), dose, replace=False).tolist())
-            omit = ",".join(FACTS[i] for i in left)
-            wording = ("facts", "facts-2")[int(random.integers(2))]
+            left = sorted(random.choice(len(OMITTED), dose, replace=False).tolist())
+            omit = ",".join(OMITTED[i] for i in left)
+            wording = list(WORDINGS)[int(random.integers(2))]
+            prompt = FactsPrompt(wording, tuple(omit.split(","))).name
             seed = int(random.integers(2**31))
             arms = list(ARMS)
             random.shuffle(arms)
             cells = [
-                Cell(f"{group}-{arm}", group, level, arm, seed, wording, omit)
+                Cell(f"{group}-{arm}", group, level, arm, seed, prompt, omit)
                 for arm in arms
             ]
-            further = Cell(f"{group}-A+", group, level, "A+", seed, wording, omit)
+            further = Cell(f"{group}-A+", group, level, "A+", seed, prompt, omit)
             # What all facts are worth, for the same worlds.
             ceiling = Cell(f"{group}-C", f"{group}-C", level, "C", seed, wording)
             groups.append([*cells, further, ceiling])
@@ -143,47 +159,59 @@ def _transfers(cells: list[Cell], random: np.random.Generator) -> list[Cell]:
 
 def options_of(cell: Cell, out: Path) -> dict[str, Any]:
     """The options of `synthesize` for a cell."""
-    about: dict[str, Any] = {"prompt": cell.prompt, "omit": cell.omit}
-    about |= {"seed": cell.seed, "search": "race"}
-    if cell.arm in ARMS:
-        sizes = {"candidates": FIRST, "iterations": FIRST + ROUNDS}
-        return {**about, **sizes, "ask": ARMS[cell.arm], "episodes": DOSE_EPISODES}
-    if cell.arm in CHEAPER:
-        # The same answers, and as many more as the dearest arm of the group paid for.
-        base = options_of(cell_named(cell.name[:-1]), out)
-        count = base["iterations"] + affordable(cell, out)
-        sizes = {"iterations": count}
-        if cell.arm == "best+":
-            sizes["candidates"] = count
-        return {**base, **sizes}
-    if cell.arm == "C":
-        sizes = {"candidates": FIRST, "iterations": FIRST}
-        return {**about, **sizes, "episodes": DOSE_EPISODES}
-    if cell.arm in {"best", "race"}:
-        first = CALLS if cell.arm == "best" else RACE_FIRST
-        sizes = {"candidates": first, "iterations": CALLS}
-        return {**about, **sizes, "episodes": RACE_EPISODES}
+    first, answers, ask = _sizes(cell, out)
+    pool = RACE_POOL if cell.group.startswith("race") else DOSE_POOL
+    about: dict[str, Any] = {
+        "prompt": cell.prompt,
+        "seed": cell.seed,
+        "search": "race",
+        "candidates": first,
+        "iterations": answers,
+        "ask": ask,
+        "episodes": episodes_for(pool, answers),
+    }
+    if not cell.rules:
+        return about
     kind, _, source = cell.rules.rpartition(" ")
     texts = [rule.text for rule in load_rules(out / source).in_force]
     if kind == "placebo":
         texts = placebo_of(sum(map(len, texts)))
-    sizes = {"candidates": 1, "iterations": 1, "episodes": DOSE_EPISODES}
-    return {**about, **sizes, "rules": given_book([f"[code] {text}" for text in texts])}
+    return about | {"rules": given_book([f"[code] {text}" for text in texts])}
+
+
+def _sizes(cell: Cell, out: Path) -> tuple[int, int, str]:
+    """First answers, all answers, and kinds of the other questions of a cell."""
+    fresh = ARMS["A"]
+    if cell.arm in ARMS:
+        return FIRST, FIRST + ROUNDS, ARMS[cell.arm]
+    if cell.arm == "race":
+        return RACE_FIRST, CALLS, ",".join(ASKED)
+    if cell.arm == "A+":  # arm A, and as many more as the dearest arm paid for
+        return FIRST, FIRST + ROUNDS + affordable(cell, out), fresh
+    count = {"C": FIRST, "best": CALLS, "rules": 1, "placebo": 1}.get(cell.arm)
+    if count is None:  # best+
+        count = CALLS + affordable(cell, out)
+    return count, count, fresh
+
+
+def episodes_for(pool: int, answers: int) -> int:
+    """The least episodes of a run whose pool has so many worlds for all answers."""
+    return 8 * math.ceil(pool * answers / 3)
 
 
 def affordable(cell: Cell, out: Path) -> int:
     """How many more answers cost as much as the dearest arm of a group has."""
-    arms = [each for each in planned() if each.group == cell.group]
-    spent = {
-        each.arm: cost_of(out / each.name) for each in arms if each.arm != cell.arm
-    }
-    own, calls = spent[cell.arm[:-1]], CALLS if cell.arm == "best+" else FIRST + ROUNDS
-    return int((max(spent.values()) - own) / (own / calls))
+    arms = [each for each in members_of(cell.group) if each.arm not in CHEAPER]
+    spent = {each.arm: cost_of(out / each.name) for each in arms}
+    folder = out / cell.name.removesuffix("+")
+    answers = len(load_run(folder).attempts)
+    own = spent[cell.arm.removesuffix("+")]
+    return int((max(spent.values()) - own) / (own / answers))
 
 
-def cell_named(name: str) -> Cell:
-    """The cell of a name."""
-    return next(each for each in planned() if each.name == name)
+def members_of(group: str) -> list[Cell]:
+    """The cells of a group, in their order."""
+    return [each for each in planned() if each.group == group]
 
 
 def characters(folder: Path) -> tuple[int, int]:
@@ -212,25 +240,28 @@ def placebo_of(length: int) -> list[str]:
 
 
 def perform(cell: Cell, out: Path, questions: Path) -> None:
-    """Performs a cell, unless it has ended."""
+    """Performs a cell, unless it has ended; those that it follows must have ended."""
     folder = out / cell.name
-    if (folder / "run.json").is_file() and load_run(folder).finished:
+    if has_ended(folder):
         return
-    if cell.arm in CHEAPER and not all(
-        (out / each.name / "run.json").is_file() and load_run(out / each.name).finished
-        for each in planned()
-        if each.group == cell.group and each.arm not in CHEAPER
-    ):
-        return  # once the others have ended
+    before = [cell.rules.rpartition(" ")[2]] if cell.rules else []
+    if cell.arm in CHEAPER:
+        own = members_of(cell.group)
+        before = [each.name for each in own if each.arm not in CHEAPER]
+    missing = [name for name in before if not has_ended(out / name)]
+    if missing:
+        raise SystemExit(f"{cell.name}: {missing[0]} has not ended")
     asked = questions / cell.group
     asked.mkdir(parents=True, exist_ok=True)
-    synthesize(
-        load_set(cell.level),
-        f"manual:{asked}",
-        out=folder,
-        max_tokens=100_000_000,
-        **options_of(cell, out),
-    )
+    tasks = load_set(cell.level)
+    options = options_of(cell, out)
+    limit = {"out": folder, "max_tokens": 100_000_000}
+    synthesize(tasks, f"manual:{asked}", **limit, **options)
+
+
+def has_ended(folder: Path) -> bool:
+    """Whether a run has ended."""
+    return (folder / "run.json").is_file() and load_run(folder).finished
 
 
 def main() -> None:
@@ -238,34 +269,46 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("plan")
-    for name in ("run", "cell"):
+    commands.add_parser("questions")
+    for name in ("run", "group"):
         command = commands.add_parser(name)
         command.add_argument("out", type=Path)
-        command.add_argument("names", nargs="*", help="cells or groups; all by default")
+        command.add_argument("names", nargs="*", help="groups; all by default")
         command.add_argument("--questions", type=Path, required=True)
-        command.add_argument("--jobs", type=int, default=2)
+        command.add_argument("--jobs", type=int, default=2, help="groups at a time")
     options = parser.parse_args()
-    cells = planned()
     if options.command == "plan":
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow(field.name for field in fields(Cell))
-        writer.writerows(asdict(cell).values() for cell in cells)
+        writer.writerows(asdict(cell).values() for cell in planned())
         return
-    wanted = set(options.names)
-    chosen = [c for c in cells if not wanted or {c.name, c.group} & wanted]
-    if options.command == "cell":
-        for cell in chosen:
-            perform(cell, options.out, options.questions)
+    if options.command == "questions":
+        for cell in planned():
+            print(cell.name, first_question_sha256(cell))
+        return
+    groups = dict.fromkeys(cell.group for cell in planned())
+    chosen = [group for group in groups if not options.names or group in options.names]
+    if options.command == "group":
+        for cell in planned():
+            if cell.group in chosen:
+                perform(cell, options.out, options.questions)
         return
 
-    def start(cell: Cell) -> None:
-        words = [sys.executable, "-m", "benchmarks.feedback_trial", "cell"]
-        words += [str(options.out), cell.name, "--questions", str(options.questions)]
+    def start(group: str) -> None:
+        # Groups side by side, the arms of a group one after the other.
+        words = [sys.executable, "-m", "benchmarks.feedback_trial", "group"]
+        words += [str(options.out), group, "--questions", str(options.questions)]
         code = run_process(words, check=False).returncode
-        print(json.dumps({"cell": cell.name, "exit": code}), flush=True)
+        print(json.dumps({"group": group, "exit": code}), flush=True)
 
     with ThreadPoolExecutor(options.jobs) as pool:
         list(pool.map(start, chosen))
+
+
+def first_question_sha256(cell: Cell) -> str:
+    """Hash of the first question of a cell, without rules."""
+    template = load_template(cell.prompt)
+    return sha256_of(problem_of(load_set(cell.level)).question((), template))
 
 
 if __name__ == "__main__":

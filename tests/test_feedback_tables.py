@@ -1,6 +1,7 @@
 """The analysis of the feedback trial, beside figures computed in another way."""
 
 import itertools
+import math
 import statistics
 
 import numpy as np
@@ -9,43 +10,90 @@ import pytest
 from scipy import stats
 
 from benchmarks.feedback_tables import (
-    after_rounds,
+    at_equal_cost,
     by_dose,
     contrasts,
+    costs,
+    differences,
+    dose_slope,
     holm,
     race_pairs,
     sign_flip_p,
+    stratified_interval,
     stratified_p,
     t_interval,
+    transfers,
 )
-from benchmarks.feedback_trial import ARMS, FACTS, planned
+from benchmarks.feedback_trial import (
+    ARMS,
+    DOSE_POOL,
+    OMITTED,
+    RACE_POOL,
+    episodes_for,
+    planned,
+)
+from tdac_agent.synthesis.workload import shares
+
+ANSWERS = {"A+": 9, "C": 2, "best": 8, "race": 8, "best+": 10, "rules": 1, "placebo": 1}
 
 
 def made_up(seed=3):
     """Scores of all cells of the plan, drawn at random."""
     random = np.random.default_rng(seed)
-    rows = [
-        {
-            "cell": cell.name,
-            "group": cell.group,
-            "level": cell.level,
-            "arm": cell.arm,
-            "omitted": len(cell.omit.split(",")) if cell.omit else 0,
-            "k": k,
-            "pool": round(float(random.random()), 3),
-            "time_score": float(random.random()),
-            "success": float(random.random()),
-        }
-        for cell in planned()
-        for k in range(1, {"A+": 9, "C": 3, "best+": 10}.get(cell.arm, 7))
-    ]
+    rows = []
+    for cell in planned():
+        answers = ANSWERS.get(cell.arm, 6)
+        cost = round(float(random.uniform(1e5, 2e5)))
+        rows += [
+            {
+                "cell": cell.name,
+                "group": cell.group,
+                "level": cell.level,
+                "arm": cell.arm,
+                "omitted": len(cell.omit.split(",")) if cell.omit else 0,
+                "answers": answers,
+                "asked": cost,
+                "answered": 0,
+                "cost": cost,
+                "k": k,
+                "valid": True,
+                "reads_params": False,
+                "like_builtin": 0.1,
+                "like_recorded": 0.1,
+                "complete": bool(random.random() < 0.8),
+                "pool": round(float(random.random()), 1),
+                "time_score": float(random.random()),
+                "success": float(random.random()),
+                "race_score": float(random.random()),
+            }
+            for k in range(1, answers + 1)
+        ]
     return pd.DataFrame(rows)
+
+
+def best_row(rows):
+    return max(rows, key=lambda row: (row.complete, row.pool, -row.k))
+
+
+def by_hand(scores, one, other, outcome="time_score"):
+    """Differences between two arms, without pandas."""
+    rows = list(scores.itertuples())
+    found = []
+    for group in sorted({row.group for row in rows if row.arm == one}):
+        first = [row for row in rows if (row.group, row.arm) == (group, one)]
+        second = [row for row in rows if (row.group, row.arm) == (group, other)]
+        if other == "A+":
+            most = math.ceil(first[0].cost * len(second) / second[0].cost)
+            second = [row for row in second if row.k <= max(2, most)]
+        found.append(
+            getattr(best_row(first), outcome) - getattr(best_row(second), outcome)
+        )
+    return found
 
 
 def test_the_plan():
     """12 runs with all arms and shared seeds, 16 pairs, 8 transfers, drawn for ever."""
     cells = planned()
-    assert cells == planned()
     assert len({cell.name for cell in cells}) == len(cells)
     dose = [cell for cell in cells if cell.name.startswith("dose-")]
     for arm in (*ARMS, "A+", "C"):
@@ -55,35 +103,42 @@ def test_the_plan():
         if not group.endswith("C"):
             assert len({(c.seed, c.prompt, c.omit) for c in own}) == 1
             assert own[-1].arm == "A+"  # once it is known what the others cost
-            assert set(own[0].omit.split(",")) <= set(FACTS)
+            assert set(own[0].omit.split(",")) <= set(OMITTED)
+            assert own[0].omit in own[0].prompt
     assert sum(cell.arm == "race" for cell in cells) == 16
     assert sum(cell.arm == "placebo" for cell in cells) == 8
 
 
-def test_the_best_of_each_round():
-    """The candidate that is best in the pool among those that there were."""
+@pytest.mark.parametrize("answers", range(1, 30))
+def test_the_pool_does_not_depend_on_the_number_of_answers(answers):
+    """All arms choose by the same worlds."""
+    for pool in (DOSE_POOL, RACE_POOL):
+        assert shares(episodes_for(pool, answers), 0, answers).block == pool
+
+
+@pytest.mark.parametrize("contrast", [("I", "A+"), ("E", "A+"), ("I", "M"), ("S", "I")])
+def test_differences(contrast):
+    """Each is that of the best candidates in the pool, against A+ at equal cost."""
     scores = made_up()
-    for row in after_rounds(scores).itertuples():
-        most = 2 + row.round
-        own = [
-            each
-            for each in scores.itertuples()
-            if each.cell == row.cell
-            and (each.k <= most or (row.round == 4 and row.arm == "A+"))
-        ]
-        best = max(own, key=lambda each: (each.pool, -each.k))
-        assert row.time_score == best.time_score
+    found = differences(scores, contrast, "time_score")
+    assert found.tolist() == pytest.approx(by_hand(scores, *contrast))
+
+
+def test_fresh_answers_at_equal_cost():
+    """As many as cost as much as the other arm, rounded up; at least the first ones."""
+    scores = made_up()
+    scores.loc[scores["arm"] == "A+", ["cost", "complete"]] = [90_000, True]
+    scores.loc[scores["arm"] == "A+", "pool"] = scores["k"] / 100  # the last is best
+    group = "dose-floor-1"
+    for cost, last in ((1_000, 2), (30_000, 3), (30_001, 4), (90_000, 9), (10**6, 9)):
+        assert at_equal_cost(scores, group, cost)["k"] == last
 
 
 def test_contrasts():
     """Means, p-values and intervals are those of plain Python and of SciPy."""
     scores = made_up()
-    rounds = after_rounds(scores)
-    final = rounds[rounds["round"] == 4]
-    table = contrasts(final, "time_score").set_index("contrast")
-    by_cell = {(r.group, r.arm): r.time_score for r in final.itertuples()}
-    groups = sorted({group for group, _ in by_cell})
-    change = [by_cell[g, "I"] - by_cell[g, "A+"] for g in groups]
+    table = contrasts(scores, "time_score").set_index("contrast")
+    change = by_hand(scores, "I", "A+")
     row = table.loc["I - A+"]
     assert row["mean"] == pytest.approx(statistics.fmean(change))
     found = stats.permutation_test(
@@ -93,11 +148,13 @@ def test_contrasts():
         vectorized=True,
         n_resamples=np.inf,
     )
-    assert row["p"] == pytest.approx(found.pvalue)
+    assert row["p"] == row["p_holm"] == pytest.approx(found.pvalue)
     low, high = stats.t.interval(
         0.95, len(change) - 1, statistics.fmean(change), stats.sem(change)
     )
     assert (row["low"], row["high"]) == pytest.approx((low, high))
+    assert table["p_holm"][1:].tolist() == holm(table["p"][1:].tolist())
+    assert t_interval(change) == pytest.approx((low, high))
 
 
 def test_holm():
@@ -109,6 +166,8 @@ def test_sign_flips():
     """Five equal differences have the least p-value that five can have."""
     assert sign_flip_p([0.1] * 5) == pytest.approx(2 / 32)
     assert sign_flip_p([0.1, -0.1]) == 1.0
+    with pytest.raises(AssertionError):
+        sign_flip_p([0.1, math.nan])
 
 
 def test_the_race():
@@ -116,6 +175,8 @@ def test_the_race():
     scores = made_up()
     pairs, summary = race_pairs(scores)
     assert len(pairs) == 16
+    change = by_hand(scores, "race", "best+", "race_score")
+    assert sorted(pairs["difference"]) == pytest.approx(sorted(change))
     small = pairs.groupby("level").head(3)
     groups = [own["difference"].tolist() for _, own in small.groupby("level")]
 
@@ -130,15 +191,37 @@ def test_the_race():
     p = sum(abs(statistic(each)) >= observed - 1e-12 for each in flips) / len(flips)
     assert stratified_p(small) == pytest.approx(p)
     assert summary["mean"] == pytest.approx(pairs["difference"].mean())
-    low, high = t_interval(pairs["difference"].tolist())
-    assert summary["low"] == pytest.approx(low, abs=0.05)
-    assert summary["high"] == pytest.approx(high, abs=0.05)
 
 
-def test_gains_by_dose():
-    """Each gain is that over fresh answers at equal cost in the same run."""
+def test_the_interval_of_the_race():
+    """With equal levels it is that of a pooled variance within levels."""
+    pairs = race_pairs(made_up())[0]
+    groups = [own["difference"].to_numpy() for _, own in pairs.groupby("level")]
+    pooled = sum(((own - own.mean()) ** 2).sum() for own in groups) / 14
+    half = stats.t.ppf(0.975, 14) * math.sqrt(pooled / 16)
+    mean = pairs["difference"].mean()
+    assert stratified_interval(pairs) == pytest.approx((mean - half, mean + half))
+
+
+def test_the_slope():
+    """A gain that grows with the dose is found, and none where there is none."""
     scores = made_up()
-    rounds = after_rounds(scores)
-    table = by_dose(rounds[rounds["round"] == 4])
+    final = scores["arm"] == "I"
+    scores["complete"] = True
+    scores.loc[scores["arm"] == "A+", "time_score"] = 0.1
+    scores.loc[final, "time_score"] = 0.1 + 0.05 * scores.loc[final, "omitted"]
+    found = dose_slope(scores)
+    assert found["slope"] == pytest.approx(0.05)
+    assert found["p"] < 0.02
+    assert dose_slope(made_up())["p"] > 0.001
+
+
+def test_other_tables():
+    """They have a row or a column for each arm."""
+    scores = made_up()
+    table = by_dose(scores)
     assert set(table["omitted"]) == {3, 6, 9, 12}
-    assert {"A+", "E", "I", "S"} <= set(table.columns)
+    assert {*ARMS, "A+", "C"} <= set(table.columns)
+    pairs, summary = transfers(scores)
+    assert len(pairs) == summary["pairs"] == 8
+    assert set(costs(scores)["arm"]) == set(scores["arm"])
