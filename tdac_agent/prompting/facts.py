@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from tdac_envs.core.errors import TaskError, hint
-
 FACTS = (
     *("turning", "axes", "units", "radius", "speed", "axle", "rays", "range"),
     *("tolerance", "disturbances", "budget", "worlds", "score"),
@@ -65,6 +63,9 @@ def fact_names(listed: str) -> tuple[str, ...]:
     Raises:
         TaskError: One of them is unknown.
     """
+    # Slow to import, and the help of the command needs the list alone.
+    from tdac_envs.core.errors import TaskError, hint
+
     found = set(filter(None, map(str.strip, listed.split(","))))
     for name in sorted(found - set(FACTS)):
         raise TaskError(
@@ -89,6 +90,8 @@ def with_omitted(prompt: str | None, omit: str) -> FactsPrompt | None:
         TaskError: A fact is unknown, or the prompt is another one.
     """
     further = fact_names(omit)
+    from tdac_envs.core.errors import TaskError
+
     prompt = prompt or ("facts" if further else "")
     found = facts_prompt(prompt)
     if found is not None:
