@@ -12,7 +12,7 @@ from pydantic import Field, JsonValue, model_validator
 from tdac_agent.errors import ProviderError, RunError
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.models.ready import needs_limit
-from tdac_agent.prompting.prompt import VARIANTS
+from tdac_agent.prompting.prompt import is_shipped
 from tdac_agent.runs.run_record import LoopSetting
 from tdac_agent.storage.hashes import sha256_of_file
 from tdac_agent.storage.shipped import shipped, shipped_names
@@ -112,7 +112,7 @@ class CampaignConfig(StrictModel):
         own = [
             name
             for name in self.options
-            if name in (*type(self).model_fields, "refine")
+            if name in (*type(self).model_fields, "refine", "omit")
         ]
         if own:
             raise ValueError(f"options: {own[0]} is set by another key of this file")
@@ -180,7 +180,7 @@ def required_permissions(
     if config.base_url is not None:
         yield Wish(f"send its questions, with your key, to {config.base_url}")
     for name in config.prompts:
-        if name not in VARIANTS:
+        if not is_shipped(name):
             template = base / name
             digest = sha256_of_file(template) if template.is_file() else ""
             yield Wish(f"fill in the template {template}", (), digest)

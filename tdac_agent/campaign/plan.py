@@ -20,9 +20,9 @@ from tdac_agent.campaign.config import (
 from tdac_agent.models.choice import Options, answers_sha256
 from tdac_agent.models.prices import FREE
 from tdac_agent.prompting.prompt import (
-    VARIANTS,
     PromptTemplate,
     generate_prompt,
+    is_shipped,
     load_template,
 )
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
@@ -210,7 +210,7 @@ def make_plan(config: CampaignConfig, base: Path, *, trust: bool = False) -> Pla
     wishes = required_permissions(config, base, [task for _, task in tasks.values()])
     permit(f"the campaign {config.name}", wishes, trust=trust)
     tasks = {n: (path, replace(t, trusted=True)) for n, (path, t) in tasks.items()}
-    prompts = {n: path_of(n, known=n in VARIANTS) for n in config.prompts}
+    prompts = {n: path_of(n, known=is_shipped(n)) for n in config.prompts}
     problems: list[tuple[str, Task | TaskSet]] = [*tasks.values(), *sets.values()]
     kinds = product(
         problems,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Collection
 
 from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.omitted_facts import with_facts
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.synth_flags import RunFlags
 from tdac_agent.cli.task_choice import chosen_problem
@@ -22,14 +24,21 @@ from tdac_agent.synthesis.synthesize import book_of
 from tdac_agent.synthesis.workload import shares
 
 
-def dry_run(flags: TaskFlags, options: SynthOptions, run_flags: RunFlags) -> int:
+def dry_run(
+    flags: TaskFlags,
+    options: SynthOptions,
+    run_flags: RunFlags,
+    typed: Collection[str],
+) -> int:
     """Prints the prompt alone to stdout, the rest to stderr; returns 0."""
     learner = str(options.learner)
     names = learner, str(options.optimizer or learner)
     for name in names:
         check_name(name)
-    template, book = load_template(options.prompt), book_of(options.rules)
+    book = book_of(options.rules)
     problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
+    options = with_facts(options, typed, on_set=problem.has_hidden)
+    template = load_template(options.prompt)
     options = settled(options, on_set=problem.has_hidden)
     server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]

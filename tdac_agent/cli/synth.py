@@ -14,6 +14,7 @@ from rich.markup import escape
 
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.dry_run import dry_run
+from tdac_agent.cli.omitted_facts import with_facts
 from tdac_agent.cli.progress import SynthProgress
 from tdac_agent.cli.run_view import show_run, show_selection
 from tdac_agent.cli.sentences import print_plain
@@ -55,18 +56,19 @@ def run(
     run_flags: RunFlags,
 ) -> int:
     """Synthesises a controller and prints the run; returns the exit code."""
+    sources = {name: context.get_parameter_source(name) for name in context.params}
+    typed = {n for n, s in sources.items() if s and s.name == "COMMANDLINE"}
     if run_flags.resume is not None:
-        sources = {name: context.get_parameter_source(name) for name in context.params}
-        typed = {n for n, s in sources.items() if s and s.name == "COMMANDLINE"}
         return resume(options, run_flags, typed)
     if run_flags.dry_run:
-        return dry_run(flags, options, run_flags)
+        return dry_run(flags, options, run_flags, typed)
     check_tier(options.tier)
     check_models(options)
     console = Console(stderr=run_flags.as_json)
     with console.status("preparing the task …"):
         problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
         problem = problem.allowed(options.suite, trust=run_flags.trust)
+    options = with_facts(options, typed, on_set=problem.has_hidden)
     folder = run_flags.out or next_folder(problem.name)
     return write(problem, folder, options, console)
 

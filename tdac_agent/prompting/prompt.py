@@ -7,6 +7,7 @@ that a provider can cache it.
 from __future__ import annotations
 
 import functools
+import textwrap
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,12 @@ import jinja2
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from tdac_agent.prompting.context import context_of
+from tdac_agent.prompting.facts import (
+    WORDINGS,
+    FactsPrompt,
+    fact_names,
+    facts_prompt,
+)
 from tdac_agent.prompting.rule_answer import MAX_OPERATIONS
 from tdac_agent.prompting.rules import MAX_RULE_CHARS, RepairRule, render_block
 from tdac_agent.tasks.registry import environment
@@ -36,7 +43,7 @@ class PromptTemplate:
     """Jinja2 template of the prompt for a new controller.
 
     Attributes:
-        name: `full`, `underspecified`, or the file's path.
+        name: `full`, `underspecified`, a prompt made of facts, or the file's path.
         text: The template; None for a shipped one.
     """
 
@@ -47,6 +54,15 @@ class PromptTemplate:
 FULL = PromptTemplate()
 
 
+def is_shipped(name: str) -> bool:
+    """Whether a prompt is a shipped variant, or made of facts, and not a file.
+
+    Raises:
+        TaskError: It omits an unknown fact.
+    """
+    return name in VARIANTS or facts_prompt(name) is not None
+
+
 def load_template(name: str) -> PromptTemplate:
     """Returns a shipped variant by its name, or the template in a file.
 
@@ -55,17 +71,41 @@ def load_template(name: str) -> PromptTemplate:
 
     Raises:
         PromptError: There is no such variant or file.
+        TaskError: A prompt made of facts omits an unknown one.
     """
+    facts = facts_prompt(name)
+    if facts is not None:
+        return PromptTemplate(facts.name)
     if name in VARIANTS:
         return PromptTemplate(name)
     try:
         return PromptTemplate(name, read_file(name, TEXT_BYTES).decode("utf-8"))
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        known = ", ".join(VARIANTS)
+        known = ", ".join([*VARIANTS, *WORDINGS])
         raise PromptError(
             f"no prompt {name!r}: {reason}; expected a template file or {known}"
         ) from error
+
+
+def check_omitted(template: PromptTemplate, omit: str) -> None:
+    """Checks that a template withholds what a run is to withhold.
+
+    Args:
+        template: The template.
+        omit: Facts, separated by commas.
+
+    Raises:
+        PromptError: It does not.
+        TaskError: A fact is unknown.
+    """
+    facts = facts_prompt(template.name) if template.text is None else None
+    withheld = () if facts is None else facts.omitted
+    if not set(fact_names(omit)) <= set(withheld):
+        wanted = FactsPrompt("facts", fact_names(omit)).name
+        raise PromptError(
+            f"the prompt {template.name} does not omit {omit}; give the prompt {wanted}"
+        )
 
 
 @functools.cache
@@ -74,15 +114,42 @@ def _templates(env_id: str | None = None) -> jinja2.Environment:
     folders = [Path(__file__).with_name("templates")]
     if env_id is not None:
         folders.append(environment(env_id).folder / "prompts")
+    facts = jinja2.FileSystemLoader(Path(__file__).with_name("facts"))
     # A user's template must not be able to run code.
-    return ImmutableSandboxedEnvironment(
-        loader=jinja2.FileSystemLoader(folders),
+    templates = ImmutableSandboxedEnvironment(
+        loader=jinja2.ChoiceLoader(
+            [jinja2.FileSystemLoader(folders), jinja2.PrefixLoader({"facts": facts})]
+        ),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
         autoescape=False,
     )
+    templates.filters |= {"g": _figure, "wrapped": _wrapped}
+    return templates
+
+
+def _figure(value: float, digits: int = 6) -> str:
+    """A number with so many significant digits."""
+    return f"{value:.{digits}g}"
+
+
+def _wrapped(text: str) -> str:
+    """A list whose items begin with `- ` at the start of a line, with other breaks."""
+    items = f"\n{text}".split("\n- ")
+    lines = [
+        textwrap.fill(
+            f"- {' '.join(item.split())}",
+            96,
+            subsequent_indent="  ",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for item in items
+        if item.strip()
+    ]
+    return "\n".join(lines)
 
 
 def generate_prompt(
@@ -97,8 +164,14 @@ def generate_prompt(
 
     Raises:
         PromptError: The template is broken, uses an unknown variable, or does not
-            contain the rules exactly once.
+            contain the rules exactly once, or is for task sets.
+        TaskError: The template omits an unknown fact.
     """
+    if template.text is None and facts_prompt(template.name) is not None:
+        raise PromptError(
+            f"the prompt {template.name!r} is for task sets; on a task, give "
+            f"{' or '.join(VARIANTS)}, or a template file"
+        )
     return fill_in(template, context_of(task), rules, task.spec.env)
 
 

@@ -6,8 +6,10 @@ import math
 from typing import Any
 
 from tdac_agent.prompting.context import allowed_code
+from tdac_agent.prompting.fact_context import fact_context
+from tdac_agent.prompting.facts import FACTS, FactsPrompt, facts_prompt
 from tdac_agent.prompting.params_text import params_text
-from tdac_agent.prompting.prompt import PromptError, PromptTemplate, fill_in
+from tdac_agent.prompting.prompt import FULL, PromptTemplate, fill_in
 from tdac_agent.prompting.robot_lines import robot_lines
 from tdac_agent.prompting.rules import RepairRule
 from tdac_agent.prompting.set_observations import (
@@ -27,6 +29,8 @@ from tdac_envs.mapping.params import RobotParams
 
 SET_TEMPLATE = "set"
 """Name of the shipped template, `full` to the user."""
+FACTS_TEMPLATE = "set_facts"
+"""Name of the template that is made of facts."""
 
 
 def set_prompt(
@@ -40,16 +44,17 @@ def set_prompt(
         template: The template.
 
     Raises:
-        PromptError: The template is broken, or there is none of this name for sets.
+        PromptError: The template is broken.
+        TaskError: The template omits an unknown fact.
     """
-    if template.text is None:
-        if template.name != "full":
-            raise PromptError(
-                f"the prompt {template.name!r} is for a single task; with --set, give "
-                "full or a template file"
-            )
-        template = PromptTemplate(SET_TEMPLATE)
-    return fill_in(template, set_context(tasks), rules)
+    context = set_context(tasks)
+    if template.text is not None:
+        return fill_in(template, context, rules)
+    if template.name == FULL.name:
+        return fill_in(PromptTemplate(SET_TEMPLATE), context, rules)
+    facts = facts_prompt(template.name) or FactsPrompt("facts", FACTS)
+    context |= fact_context(tasks, facts)
+    return fill_in(PromptTemplate(FACTS_TEMPLATE), context, rules)
 
 
 def check_generated(tasks: TaskSet) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.tariff import MAX_COST
-from tdac_agent.prompting.prompt import VARIANTS
+from tdac_agent.prompting.prompt import is_shipped
 from tdac_agent.runs.mark import MarkedJournal, files_of, is_marked, mark_of
 from tdac_agent.runs.run_record import PROMPT_FILE, RUN_FILE, Run, at_work, load_run
 from tdac_agent.storage.files import write_atomic
@@ -45,7 +45,7 @@ def wishes_of(run: Run, suite: Path | None, given: Container[str]) -> Iterator[W
         what = f"send its questions, with your key, to {run.base_url}"
         yield Wish(what, ("--base-url", run.base_url))
     template = run.folder / PROMPT_FILE
-    if run.prompt not in VARIANTS and "prompt" not in given:
+    if not is_shipped(run.prompt) and "prompt" not in given:
         what = f"fill in the template {template}"
         digest = sha256_of_file(template) if template.is_file() else ""
         yield Wish(what, ("--prompt", str(template)), digest)

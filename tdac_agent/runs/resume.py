@@ -10,7 +10,7 @@ from typing import Any
 from tdac_agent.errors import RunError
 from tdac_agent.problems.choice import kept_problem
 from tdac_agent.prompting.given_rules import given_book
-from tdac_agent.prompting.prompt import VARIANTS
+from tdac_agent.prompting.prompt import is_shipped
 from tdac_agent.runs.ownership import (
     called,
     has_earlier_mark,
@@ -228,7 +228,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "base_url": run.base_url,
         "refine": run.refine,
         "rules": book,
-        "prompt": run.prompt if run.prompt in VARIANTS else str(prompt),
+        "prompt": run.prompt if is_shipped(run.prompt) else str(prompt),
         "max_output": run.max_output,
         "out": folder,
     }

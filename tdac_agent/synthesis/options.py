@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tdac_agent.models.vendors import forms
 from tdac_agent.option_fields import Flag, flag_of, option
+from tdac_agent.prompting.facts import FACTS
 from tdac_agent.synthesis.question_kinds import ASKED, KINDS
 
 if TYPE_CHECKING:
@@ -94,6 +95,16 @@ class SynthOptions:
         "Prompt template: `full`, `underspecified`, or a file.",
         metavar="NAME",
         recorded=False,
+    )
+    omit: str = option(
+        "",
+        "Facts that the question withholds, separated by commas, with the prompt "
+        f"`facts` or `facts-2`: {', '.join(f'`{fact}`' for fact in FACTS)}.  [default: "
+        "none; without --prompt, `facts` if facts are omitted]",
+        metavar="FACTS",
+        panel=SETS,
+        scope="set",
+        identity=True,
     )
     refine: bool = option(
         True,

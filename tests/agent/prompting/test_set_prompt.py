@@ -120,7 +120,7 @@ def test_disturbances_are_told_with_distribution_and_size(tmp_path):
 
 
 def test_rules_and_templates(tmp_path):
-    """A template of one's own knows the variables; the other names are refused."""
+    """A template of one's own knows the variables."""
     tasks = load_set("unknown")
     rules = RuleBook().add("keep off walls", "task", 1, ()).in_force
     assert "- keep off walls [R1]" in set_prompt(tasks, rules, FULL)
@@ -128,5 +128,3 @@ def test_rules_and_templates(tmp_path):
     assert set_prompt(tasks, (), own).startswith("unknown 0.95\n")
     with pytest.raises(PromptError, match=r"known names: .*disturbances"):
         set_prompt(tasks, (), PromptTemplate("own", "{{ robots }}{{ rules_block }}"))
-    with pytest.raises(PromptError, match="is for a single task"):
-        set_prompt(tasks, (), PromptTemplate("underspecified"))

@@ -84,7 +84,6 @@ def test_a_level_without_a_built_in_controller(tdac, refused, tmp_path):
         (("--set", "known", "--suite", "x"), "no suite 'x': no such folder"),
         (("--set", "known", "--episodes", "1"), "'--episodes'"),
         (("--set", "known", "--feedback-episodes", "0"), "'--feedback-episodes'"),
-        (("--set", "known", "--prompt", "underspecified"), "is for a single task"),
         (("--set", "known", "--prompt", "none.j2"), "no prompt 'none.j2'"),
         (("--set", "known", "--learner", "nobody:x"), "unknown model"),
         (("--set", "known", "--tier", "none"), "tier"),
