@@ -17,8 +17,8 @@ from __future__ import annotations
 import argparse
 import csv
 import functools
+import itertools
 import json
-import math
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields
@@ -27,15 +27,16 @@ from subprocess import run as run_process
 from typing import Any
 
 import numpy as np
-from tdac_agent.prompting.facts import FACTS, WORDINGS, FactsPrompt
 
 from tdac_agent import synthesize
 from tdac_agent.problems.choice import problem_of
+from tdac_agent.prompting.facts import FACTS, WORDINGS, FactsPrompt
 from tdac_agent.prompting.given_rules import given_book, read_given
 from tdac_agent.prompting.prompt import load_template
 from tdac_agent.runs.run_record import load_rules, load_run
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.synthesis.question_kinds import ASKED
+from tdac_agent.synthesis.workload import shares
 from tdac_envs.ladder.task_sets import load_set
 
 SEED = 20261129
@@ -196,7 +197,8 @@ def _sizes(cell: Cell, out: Path) -> tuple[int, int, str]:
 
 def episodes_for(pool: int, answers: int) -> int:
     """The least episodes of a run whose pool has so many worlds for all answers."""
-    return 8 * math.ceil(pool * answers / 3)
+    sizes = itertools.count(2)
+    return next(each for each in sizes if shares(each, 0, answers).block == pool)
 
 
 def affordable(cell: Cell, out: Path) -> int:
