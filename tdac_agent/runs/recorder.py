@@ -88,7 +88,7 @@ class Recorder:
         Raises:
             PromptError: The template tells facts that the run is to withhold.
         """
-        check_omitted(template, str(self.run.options.get("omit", "")))
+        check_omitted(template, self.run.omit)
         folder = self.run.folder
         # Most runs have neither template nor tests: they are known from here on.
         self.run.mark = "" if lasting_secret() is None else "own"

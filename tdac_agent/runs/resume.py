@@ -57,6 +57,7 @@ CONFIGURATION = {
     "max_output": "max output",
     "given_sha256": "initial controller",
     "given_rules": "given rules",
+    "omit": "omitted facts",
     "prompt_sha256": "first question",
     "episodes": "number of episodes",
     "feedback_episodes": "feedback episodes",
@@ -229,6 +230,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "refine": run.refine,
         "rules": book,
         "prompt": run.prompt if is_shipped(run.prompt) else str(prompt),
+        **({"omit": run.omit} if run.omit else {}),
         "max_output": run.max_output,
         "out": folder,
     }

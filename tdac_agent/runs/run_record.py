@@ -152,6 +152,11 @@ class Run(PrintableRecord):
     given_rules: tuple[str, ...] = Field(
         (), description="Rules that the run began with, each with its scope."
     )
+    omit: str = Field(
+        "",
+        exclude_if=operator.not_,
+        description="Facts that the first question withholds, separated by commas.",
+    )
     prompt_sha256: str = Field("", description="Hash of the first question.")
     given_sha256: str | None = Field(
         None, description="Hash of the controller to start from."

@@ -50,7 +50,7 @@ def test_nothing_is_omitted_in_vain(few, out):
         with pytest.raises(PromptError, match="give the prompt facts:omit=radius"):
             synthesize(SetProblem(few), Script(), out=out, prompt=prompt, **values)
     assert "radius" not in begin(few, out, prompt="facts:omit=radius", omit="radius")
-    assert load_run(out).options["omit"] == "radius"
+    assert load_run(out).omit == "radius"
 
 
 def test_the_flags(done, tdac):
@@ -101,8 +101,8 @@ def test_a_command_records_the_facts(done, refused, few, tmp_path):
     done(*words, "--omit", "radius, turning")
     record = json.loads(Path("run/run.json").read_text())
     assert record["prompt"] == "facts:omit=turning,radius"
-    assert record["options"] == {"omit": "turning,radius"}
+    assert record["omit"] == "turning,radius"
     assert "has already finished" in done("synth", "--resume", "run")
     assert "leave out --omit" in refused("synth", "--resume", "run", "--omit", "axle")
     error = refused(*words, "--omit", "radius")
-    assert "omit turning,radius instead of radius" in error
+    assert "different omitted facts; different first question" in error
