@@ -16,12 +16,7 @@ import jinja2
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from tdac_agent.prompting.context import context_of
-from tdac_agent.prompting.facts import (
-    WORDINGS,
-    FactsPrompt,
-    fact_names,
-    facts_prompt,
-)
+from tdac_agent.prompting.facts import WORDINGS, facts_prompt
 from tdac_agent.prompting.rule_answer import MAX_OPERATIONS
 from tdac_agent.prompting.rules import MAX_RULE_CHARS, RepairRule, render_block
 from tdac_agent.tasks.registry import environment
@@ -86,26 +81,6 @@ def load_template(name: str) -> PromptTemplate:
         raise PromptError(
             f"no prompt {name!r}: {reason}; expected a template file or {known}"
         ) from error
-
-
-def check_omitted(template: PromptTemplate, omit: str) -> None:
-    """Checks that a template withholds what a run is to withhold.
-
-    Args:
-        template: The template.
-        omit: Facts, separated by commas.
-
-    Raises:
-        PromptError: It does not.
-        TaskError: A fact is unknown.
-    """
-    facts = facts_prompt(template.name) if template.text is None else None
-    withheld = () if facts is None else facts.omitted
-    if not set(fact_names(omit)) <= set(withheld):
-        wanted = FactsPrompt("facts", fact_names(omit)).name
-        raise PromptError(
-            f"the prompt {template.name} does not omit {omit}; give the prompt {wanted}"
-        )
 
 
 @functools.cache

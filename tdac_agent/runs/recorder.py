@@ -14,7 +14,7 @@ from tdac_agent.models.budget import Amount, Enough
 from tdac_agent.models.provider import Reply, Request
 from tdac_agent.models.retry import FailedCall
 from tdac_agent.problems.problem import Problem
-from tdac_agent.prompting.prompt import PromptTemplate, check_omitted
+from tdac_agent.prompting.prompt import PromptTemplate
 from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.runs.journal_state import REPEATED, JournalState, reply_of
 from tdac_agent.runs.mark import Files, MarkedJournal, files_of, mark_of
@@ -84,11 +84,7 @@ class Recorder:
             template: Template of the first question; a copy is kept unless shipped.
             given: Source of an initial controller, if there is one.
             **facts: Further fields of the journal record.
-
-        Raises:
-            PromptError: The template tells facts that the run is to withhold.
         """
-        check_omitted(template, self.run.omit)
         folder = self.run.folder
         # Most runs have neither template nor tests: they are known from here on.
         self.run.mark = "" if lasting_secret() is None else "own"

@@ -92,7 +92,8 @@ class SynthOptions:
     )
     prompt: str = option(
         "full",
-        "Prompt template: `full`, `underspecified`, or a file.",
+        "Prompt template: `full`, `underspecified`, `facts` or `facts-2` (on a task "
+        "set), or a file.",
         metavar="NAME",
         recorded=False,
     )

@@ -10,10 +10,10 @@ from tdac_agent.errors import Fault, RunError
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.problems.task_set import SetProblem
 from tdac_agent.prompting.facts import FACTS, WORDINGS
-from tdac_agent.prompting.prompt import PromptError
 from tdac_agent.runs.resume import resume_arguments
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.synthesis.synthesize import synthesize
+from tdac_envs.core.errors import TaskError
 
 
 def begin(few, out, **options):
@@ -43,14 +43,16 @@ def test_a_run_keeps_what_it_omits(few, out):
         )
 
 
-def test_nothing_is_omitted_in_vain(few, out):
-    """A question that tells what is to be withheld is never asked."""
-    values = {"search": "paper", "omit": "radius"}
-    for prompt in ("facts", "full", "facts:omit=axle"):
-        with pytest.raises(PromptError, match="give the prompt facts:omit=radius"):
-            synthesize(SetProblem(few), Script(), out=out, prompt=prompt, **values)
-    assert "radius" not in begin(few, out, prompt="facts:omit=radius", omit="radius")
-    assert load_run(out).omit == "radius"
+def test_the_library_omits_facts(few, out):
+    """`omit` works as an argument, and with a name that has other facts."""
+    question = begin(few, out, omit="radius, axle", prompt="facts:omit=rays", seed=1)
+    assert "radius" not in question
+    assert load_run(out).prompt == "facts:omit=radius,axle,rays"
+    assert load_run(out).omit == "radius,axle,rays"
+    again = {**resume_arguments(out), "out": out}
+    assert begin(few, out, prompt=again["prompt"], seed=1) == question
+    with pytest.raises(TaskError, match="'underspecified' is not made of facts"):
+        begin(few, out, omit="radius", prompt="underspecified")
 
 
 def test_the_flags(done, tdac):
