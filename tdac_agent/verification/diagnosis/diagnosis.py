@@ -186,9 +186,9 @@ def _no_arrival(rollout: Rollout, around: Surroundings, near: str) -> Diagnosis:
     end = _pose(trajectory, trajectory.steps)
     touch = around.touch(end, 5.0 * rollout.radius)
     if touch is not None and cause in ("stuck", "oscillating", "no motion"):
-        near = "wall" if touch.border else touch.thing
+        thing = "wall" if touch.border else touch.thing
         text += (
-            f" The nearest {near} is {around.units.far(touch.gap)} from the body, at "
+            f" The nearest {thing} is {around.units.far(touch.gap)} from the body, at "
             f"its {side_of(touch.bearing)}."
         )
     error, course = _course(rollout, around)

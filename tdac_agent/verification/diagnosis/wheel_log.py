@@ -129,8 +129,8 @@ class WheelLog:
         far = units.figure(self.step * gain)
         return [
             f"command (1, 1) drives {far} ahead in a step",
-            f"command (1, -1) turns on the spot by {angle:.1f}° to the robot's right in a "
-            "step",
+            "command (1, -1) turns on the spot by "
+            f"{angle:.1f}° to the robot's right in a step",
             f"headings and turns to the {side} are positive; y is to the {side} of x",
         ]
 

@@ -91,14 +91,12 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
 
     first, second, third = model.requests[1:4]
     assert "LATE.append(True)" in first.prompt
-    assert (
-        "- goals reached: 0.000; the best controller so far has 0.000" in first.prompt
-    )
-    assert "disturbed episodes; 4 " in first.prompt
-    assert "1. disturbed episode 1: no motion" in first.prompt
+    assert "- candidate 1: goals reached 0.000, mean time score 0.000" in first.prompt
+    assert "| mean of 4 |" in first.prompt
+    assert "4 of 4 failed:\n- episode 1: no motion" in first.prompt
     assert not re.search(r"seed \d", first.prompt)
     assert "What was tried" not in first.prompt
-    assert "must still pass all tests" in first.prompt
+    assert "All tests must still pass" in first.prompt
     assert re.search(r"Failed: \d+ of \d+ tests failed.*:\n```diff\n", second.prompt)
     assert second.prompt == third.prompt
 
