@@ -200,6 +200,23 @@ def test_all_verified_candidates_of_a_group_found_the_archive(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("place", [1, 2])
+def test_a_race_on_a_task(improve, on_task, fragile, good_source, place):
+    """The best first answer is delivered if nothing beats it, whichever it is."""
+    answers = [fragile, STILL]
+    answers.insert(place - 1, good_source)
+    words = {"search": "race", "candidates": 3, "iterations": 3}
+    run = improve(on_task, Script(*map(code, answers)), **words)
+    assert (run.status, run.setting) == ("passed", "race")
+    assert (run.folder / "controller.py").read_text() == good_source
+    assert report_of(run.folder).passed
+    found = read_improvement(run.folder)
+    assert found.first == found.selected == (place, 0)
+    assert (found.founders, len(found.members), found.asked) == (2, 2, 0)
+    assert row_of(run.folder)["variations"] == 0
+
+
+@pytest.mark.slow
 def test_the_end_of_the_budget_ends_the_search_alone(improve, on_task, good_source):
     """The verified controller stays verified."""
     model = Script(code(good_source))
