@@ -102,7 +102,7 @@ def row_of(folder: Path) -> dict[str, Any]:
         "status": status,
         "k": _begun(run),
         "iterations": run.iterations,
-        "variations": sum(each.parent is not None for each in run.attempts),
+        "variations": len(run.attempts) - len(run.of_loop) if run.improve else 0,
         "tau": run.tau,
         "tokens_in": run.tokens_in,
         "tokens_out": run.tokens_out,

@@ -25,6 +25,7 @@ from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.dialogue import Dialogue
 from tdac_agent.synthesis.iterations import Iterations
 from tdac_agent.synthesis.options import RACE, SynthOptions
+from tdac_agent.synthesis.question_kinds import RULES
 from tdac_agent.synthesis.race import MOST_STALE, Race
 from tdac_agent.synthesis.selection import select
 from tdac_agent.synthesis.settled import kinds_of, settled
@@ -174,6 +175,8 @@ def _check(wanted: SynthOptions, problem: Problem) -> None:
     more = wanted.search == RACE and (wanted.iterations or 0) > (wanted.candidates or 0)
     if (wanted.improve or more) and not kinds_of(wanted.ask):
         raise TaskError("ask: expected a kind of question, such as repair")
+    if wanted.improve and wanted.search != RACE and RULES in kinds_of(wanted.ask):
+        raise TaskError("ask: rules are for a race; leave them out, or give its search")
     if wanted.search == RACE:
         _check_race(wanted, problem)
     problem.check(wanted.improve)

@@ -64,7 +64,7 @@ def test_a_better_variation_is_asked_for_and_selected(
     )
     quick = slow.replace("0.6", "0.95")
     refused = f"import subprocess\n{slow}"
-    model = Script(*map(code, (slow, STILL, slow, refused, quick, slow, slow, slow)))
+    model = Script(*map(code, (slow, STILL, slow, refused, quick)))
     run = improve(on_set, model, ask="repair")
     asked = [kind for kind, *_ in model.asked()]
     assert asked == ["generate", *["improve"] * (len(asked) - 1)]
@@ -72,7 +72,10 @@ def test_a_better_variation_is_asked_for_and_selected(
     assert "The controller to improve" in first
     assert "return 0.6 * left" in first
     assert "What was tried" not in first
-    assert re.search(r"Mean time score -0\.\d{3}:\n```diff\n", second)
+    tried = (
+        r"Mean time score -0\.\d{3} in 4 episodes; lost .* failure \+1\.000.*:\n```diff"
+    )
+    assert re.search(tried, second)
     best = read_selection(tmp_path / "run")
     assert run.status == "selected"
     assert (run.folder / "controller.py").read_text() == quick
@@ -84,12 +87,11 @@ def test_a_better_variation_is_asked_for_and_selected(
     parents = [attempt.parent for attempt in run.attempts]
     assert parents[0] is None
     assert parents[1:5] == [(1, 0)] * 4
-    assert set(parents[5:]) <= {(1, 0), (24, 0)}
     notes = [attempt.notes[-1] for attempt in run.attempts[1:]]
     assert notes[1] == "same code as k=1 j=0"
     assert "+0." in notes[3]
     told = gather_run(run.folder)
-    assert [one.k for one in told.tried] == [1, *range(21, 28)]
+    assert [one.k for one in told.tried] == [1, *range(21, 25)]
     diff = (run.folder / "iterations/k24/j0/controller.diff").read_text()
     assert "-    return 0.6 * left" in diff  # from its parent
 

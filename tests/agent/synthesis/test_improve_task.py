@@ -91,14 +91,12 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
 
     first, second, third = model.requests[1:4]
     assert "LATE.append(True)" in first.prompt
-    assert (
-        "- goals reached: 0.000; the best controller so far has 0.000" in first.prompt
-    )
-    assert "disturbed episodes; 4 " in first.prompt
-    assert "1. disturbed episode 1: no motion" in first.prompt
+    assert "- candidate 1: goals reached 0.000, mean time score 0.000" in first.prompt
+    assert "| mean of 4 |" in first.prompt
+    assert "4 of 4 failed:\n- episode 1: no motion" in first.prompt
     assert not re.search(r"seed \d", first.prompt)
     assert "What was tried" not in first.prompt
-    assert "must still pass all tests" in first.prompt
+    assert "All tests must still pass" in first.prompt
     assert re.search(r"Failed: \d+ of \d+ tests failed.*:\n```diff\n", second.prompt)
     assert second.prompt == third.prompt
 
@@ -199,6 +197,23 @@ def test_all_verified_candidates_of_a_group_found_the_archive(
     assert [(each.k, each.parent) for each in found.members] == [(1, None), (2, None)]
     assert (found.first, found.selected, run.tau) == ((1, 0), (2, 0), 1)
     assert (run.folder / "controller.py").read_text() == good_source
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("place", [1, 2])
+def test_a_race_on_a_task(improve, on_task, fragile, good_source, place):
+    """The best first answer is delivered if nothing beats it, whichever it is."""
+    answers = [fragile, STILL]
+    answers.insert(place - 1, good_source)
+    words = {"search": "race", "candidates": 3, "iterations": 3}
+    run = improve(on_task, Script(*map(code, answers)), **words)
+    assert (run.status, run.setting) == ("passed", "race")
+    assert (run.folder / "controller.py").read_text() == good_source
+    assert report_of(run.folder).passed
+    found = read_improvement(run.folder)
+    assert found.first == found.selected == (place, 0)
+    assert (found.founders, len(found.members), found.asked) == (2, 2, 0)
+    assert row_of(run.folder)["variations"] == 0
 
 
 @pytest.mark.slow

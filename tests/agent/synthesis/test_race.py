@@ -349,6 +349,7 @@ def test_defaults_of_the_searches():
         ({"search": "rase"}, "search to be one of 'paper', 'race', got 'rase'"),
         ({"ask": "repair,speed"}, "ask to be one of .*, got 'speed'"),
         ({"ask": " , "}, "ask: expected a kind of question"),
+        ({"search": "paper", "improve": 32, "ask": "rules"}, "rules are for a race"),
         ({"improve": 32}, "improve: a race goes on after a success anyway"),
     ],
 )

@@ -209,7 +209,7 @@ def test_a_race_asks_no_more_than_is_said(race, learner, optimizer):
 @settings(deadline=None)
 @given(st.integers(1, 6), st.integers(1, 9), st.data(), names, names)
 def test_variations_ask_either_model(iterations, variations, data, learner, optimizer):
-    """A variation may be asked of the learner: the dearer one bounds the cost."""
+    """A variation may be asked of the learner; the dearer model bounds its cost."""
     run = run_of(learner, optimizer, iterations, 1).model_copy(
         update={"improve": 64, "episodes": None}
     )
@@ -237,7 +237,7 @@ def test_variations_ask_either_model(iterations, variations, data, learner, opti
     st.integers(1, 60),
 )
 def test_shares_of_a_race(episodes, improve, answers):
-    """They are at most all episodes; the pool has at least one."""
+    """They are all episodes; the pool has at least one, and all pools fit."""
     parts = shares(episodes, improve, answers)
     known = improve if episodes is None else episodes
     used = parts.feedback + parts.validation + parts.explore + 2 * parts.comparison

@@ -130,6 +130,16 @@ def test_missed_goal():
     assert found.d_min == pytest.approx(10, abs=1.5)
 
 
+def test_standing_near_a_wall_says_where_and_what_it_had_reached():
+    """What is near is told, and then how near the goal was."""
+    env = room((60, 10, 0), walls=[(60, 20)])
+    text = judged(env, always(0, 0))[1].text
+    near = re.search(r"The nearest \w+ is \d\.\d px from the body, at its \w+\. ", text)
+    assert near is not None
+    assert "wallHeading" not in text
+    assert text[near.end() :].startswith("Heading error")
+
+
 def test_stuck_says_where_and_since_when():
     """The place and the step at which progress ended."""
     _, found = judged(room(horizon=600), first(15, (1, 1), always(0, 0)))
