@@ -1,27 +1,13 @@
 """A task and a set to write controllers for, and runs with scripted models."""
 
-from dataclasses import dataclass, field
-
 import pytest
 from script import Script
+from subject import Subject
 from unconfirmed import synthesize
 
 from tdac_agent.models.retry import RetryPolicy
 
 ON_SET = {"search": "paper", "episodes": 12, "feedback_episodes": 2, "seed": 3}
-
-
-@dataclass
-class Ground:
-    """What controllers are written for, one that solves it, and further arguments."""
-
-    problem: object
-    good: str
-    given: dict = field(default_factory=dict)
-
-    @property
-    def is_task(self):
-        return not self.given
 
 
 @pytest.fixture(scope="session")
@@ -31,12 +17,12 @@ def task(policy_task):
 
 @pytest.fixture
 def on_task(task, good_source):
-    return Ground(task, good_source)
+    return Subject(task, good_source)
 
 
 @pytest.fixture
 def on_set(few, solver):
-    return Ground(few, solver, ON_SET)
+    return Subject(few, solver, ON_SET)
 
 
 @pytest.fixture(params=["on_task", "on_set"])

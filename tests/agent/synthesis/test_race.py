@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from conftest import Ground
 from few_worlds import quick, write_wide_set
 from script import NO_RULES, STILL, Paid, Script, code
+from subject import Subject
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.provider import Reply
@@ -28,7 +28,7 @@ TABLE = "\n| world | least s |"
 @pytest.fixture
 def wide(tmp_path):
     """A set that `quick` solves."""
-    return Ground(load_set(write_wide_set(tmp_path / "wide.yaml")), FAST, SMALL)
+    return Subject(load_set(write_wide_set(tmp_path / "wide.yaml")), FAST, SMALL)
 
 
 @pytest.fixture
@@ -157,8 +157,8 @@ def test_a_merge(race):
 @pytest.mark.slow
 def test_without_partners_no_merge_is_asked_for(race):
     """Two that are good in the same worlds have nothing to combine."""
-    model, run = race(SLOW, FAST, ask="merge", candidates=2)
-    assert len(model.requests) == 2
+    _, run = race(SLOW, FAST, SLOWER, ask="merge", candidates=2, iterations=3)
+    assert facts(run)[2] == (3, "fresh", None, None)
     assert run.status == "selected"
 
 
@@ -207,13 +207,34 @@ def test_one_that_is_clearly_worse_stops_early(race, out):
 
 
 @pytest.mark.slow
-def test_the_same_code_again_and_again_ends_the_race(race):
-    """Three times in a row; what drove is selected all the same."""
-    model, run = race(SLOW, SLOW, REFUSED, SLOW, ask="repair", iterations=9)
-    assert len(model.requests) == 4
-    assert [each.unchanged for each in run.attempts] == [False, True, False, True]
+def test_the_same_code_again_and_again(race):
+    """All calls are made; what drove is selected all the same."""
+    model, run = race(SLOW, SLOW, REFUSED, SLOW, SLOW, ask="repair", iterations=5)
+    assert len(model.requests) == 5
+    unchanged = [each.unchanged for each in run.attempts]
+    assert unchanged == [False, True, False, True, True]
     assert run.status == "selected"
     assert read_selection(run.folder).improvement.worlds == 0  # nothing was better
+
+
+@pytest.mark.slow
+def test_what_drives_show_of_the_robot(race):
+    """A measured question tells that alone."""
+    model, run = race(SLOW, FAST, ask="measured", iterations=2)
+    assert facts(run)[1] == (2, "measured", None, None)
+    known = prompts(model)[1].partition("What is known from earlier controllers")[2]
+    assert "command (1, 1) drives" in known
+    assert "candidate 1" not in known
+    assert TABLE not in known
+
+
+@pytest.mark.slow
+def test_without_a_controller_to_ask_about(race):
+    """The first question is asked again."""
+    model, run = race(REFUSED, FAST, SLOW, ask="repair", iterations=3)
+    assert [each.asked for each in run.attempts] == ["fresh", "fresh", "repair"]
+    assert prompts(model)[0] == prompts(model)[1]
+    assert (run.folder / "controller.py").read_text() == FAST
 
 
 @pytest.mark.slow
