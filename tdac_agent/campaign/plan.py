@@ -316,6 +316,7 @@ def loop_of(config: CampaignConfig, setting: LoopSetting) -> tuple[int, int, boo
         "best of N": (samples, 0, False),
         "one shot": (1, 0, False),
         "race": (iterations, 0, False),
+        "first answers": (iterations, 0, False),
     }[setting]
 
 

@@ -33,8 +33,16 @@ DELIVERED = ("verified", "passed", "selected")
 FINISHED = (*DELIVERED, "not verified")
 """Status of a run with nothing left to do."""
 LoopSetting = Literal[
-    "dual tier", "edit only", "prompt only", "best of N", "one shot", "race"
+    "dual tier",
+    "edit only",
+    "prompt only",
+    "best of N",
+    "one shot",
+    "race",
+    "first answers",
 ]
+RACES: tuple[LoopSetting, ...] = ("race", "first answers")
+"""Settings of `--search race`: with further questions, and without."""
 Setting = LoopSetting | Literal["agent"]
 Agent = Literal["", "unconfined", "over HTTP"]
 AGENT = "mcp"
@@ -247,7 +255,7 @@ class Run(PrintableRecord):
         if self.learner == AGENT:
             return "agent"
         if self.search == "race":
-            return "race"
+            return RACES[self.candidates >= self.iterations]
         return setting_of(self.iterations, self.patience, refine=self.refine)
 
     @property

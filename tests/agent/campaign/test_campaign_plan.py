@@ -10,7 +10,7 @@ from small import write_small_task
 from tdac_agent.campaign.config import CampaignError, find_config, read_config
 from tdac_agent.campaign.plan import PlannedRun, Shard, loop_of, make_plan
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
-from tdac_agent.runs.run_record import setting_of
+from tdac_agent.runs.run_record import Run, setting_of
 from tdac_agent.storage.shipped import shipped_names
 
 
@@ -160,7 +160,9 @@ def test_a_wrong_shard_is_refused(text):
 
 
 def test_an_unknown_campaign_names_those_that_are_shipped():
-    with pytest.raises(CampaignError, match="or ablation, models_2026, offline, paper"):
+    with pytest.raises(
+        CampaignError, match="or ablation, loop_vs_sampling, models_2026"
+    ):
         find_config("offlin")
 
 
@@ -172,6 +174,16 @@ def test_shipped_campaigns_can_be_planned(name):
     config = read_config(file)
     plan = make_plan(config, file.parent)
     assert len(plan) == len(list(plan.all())) == config.runs * len(plan.cells)
-    assert (config.iterations, config.patience) == (20, 1)
+    on_tasks = (20, 1) if config.tasks else (8, 1)
+    assert (config.iterations, config.patience) == on_tasks
     assert config.max_output == MAX_OUTPUT_TOKENS
     assert (config.max_cost is None) == (name == "offline.yaml")
+
+
+@pytest.mark.parametrize(("name", "first"), [("race", 4), ("first answers", 20)])
+def test_settings_of_a_race(name, first, written):
+    """All of its answers, and whether questions follow the first ones."""
+    iterations, patience, refine = loop_of(read_config(written()), name)
+    loop = {"iterations": iterations, "patience": patience, "refine": refine}
+    run = Run.model_construct(search="race", candidates=first, learner="m", **loop)
+    assert run.setting == name
