@@ -32,7 +32,7 @@ SIDE = 640
 PURPOSES = {
     "feedback": "feedback world",
     "validation": "validation world",
-    "improve": "world of the variations",
+    "improve": "pool world",
     "comparison": "world of the comparison",
 }
 """Names of worlds by what a candidate drove there for, in this order."""

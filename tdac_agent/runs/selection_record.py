@@ -82,6 +82,10 @@ class Improvement(StrictRecord):
         {}, description="Mean shares of the score that the first one lost, by cause."
     )
     lost_after: dict[str, float] = Field({}, description="Those of the selected one.")
+    reached_before: int | None = Field(
+        None, description="Number of worlds in which the first one reached the goal."
+    )
+    reached_after: int | None = Field(None, description="That of the selected one.")
 
 
 class Selection(StrictRecord):

@@ -55,11 +55,13 @@ class Compared(NamedTuple):
         changes: Means and differences by figure; empty if it is the same candidate.
         lost_before: Mean shares of the score that were lost before, by cause.
         lost_after: Those that are lost now.
+        reached: In how many episodes the goal was reached before, and now.
     """
 
     changes: dict[str, PairedChange]
     lost_before: dict[str, float]
     lost_after: dict[str, float]
+    reached: tuple[int, int] | tuple[None, None] = (None, None)
 
 
 def compared(
@@ -85,7 +87,10 @@ def compared(
         )
         for name, figure in figures.items()
     }
-    return Compared(changes, _rounded(before), _rounded(after))
+    reached = [sum(row.success for row in rows) for rows in (before, after)]
+    return Compared(
+        changes, _rounded(before), _rounded(after), (reached[0], reached[1])
+    )
 
 
 def _rounded(rows: Sequence[EpisodeRow]) -> dict[str, float]:
@@ -160,6 +165,8 @@ def selection_of(
             worlds=terms.shares.comparison if changes else 0,
             lost_before=found.lost_before,
             lost_after=found.lost_after,
+            reached_before=found.reached[0],
+            reached_after=found.reached[1],
             **(changes["time"].model_dump() if changes else {}),
         )
     return Selection(
