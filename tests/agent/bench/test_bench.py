@@ -120,6 +120,7 @@ def test_it_goes_on_after_an_interruption(warm, tmp_path, level, files):
     assert bench(files, [level], out=tmp_path / "other", **given) == first
 
 
+@pytest.mark.slow
 def test_hidden_worlds(warm, tmp_path, level, files, monkeypatch):
     """A salt is drawn when the entrants are on record, and revealed at the end."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))

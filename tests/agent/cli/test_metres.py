@@ -159,6 +159,7 @@ def test_a_place_is_quoted_as_typed(tdac, plan):
     assert re.search(r"start moved from \(5.37, 5.999\) to \(\d.\d5, \d.\d5\)", text)
 
 
+@pytest.mark.slow
 def test_one_shortest_path(tdac, done, plan):
     """The same length in `map` and `synth`, and that of `tdac evaluate`."""
     ends = ("--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6")

@@ -98,6 +98,7 @@ def test_builtin_is_the_controller_of_the_level(warm, level):
     assert row.knows == "sensors"
 
 
+@pytest.mark.slow
 def test_baselines_and_planners_drive_on_worlds_and_on_tasks(warm, level, small_task):
     """All that drives on a set drives on a task on a map, and the other way round."""
     words = ["reference", "go-to-goal", "random", "dwa"]

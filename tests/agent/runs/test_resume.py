@@ -299,6 +299,7 @@ def test_a_run_that_ended_before_it_had_begun_is_begun_again(refused, halted, tm
     assert f"repeat its command with --out {folder}" in err
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_clear_line(tmp_path, good):
     """Exit 3 before anything is asked; with room again the run goes on."""
     place = tmp_path / "small-disk"

@@ -98,6 +98,7 @@ def secret(monkeypatch, tmp_path):
     lasting_secret.cache_clear()
 
 
+@pytest.mark.slow
 def test_own_folders_need_nothing(tdac, run):
     """Verified again and gone on with as it was, wherever it lies; tests are named."""
     code, out, err = tdac("verify", run)
@@ -108,6 +109,7 @@ def test_own_folders_need_nothing(tdac, run):
     assert tdac("synth", "--resume", run)[0] == 0
 
 
+@pytest.mark.slow
 def test_own_folders_on_sets_need_nothing(tdac, run_on_set):
     """Their tests are run again, and gone on with; a foreign one asks."""
     code, out, err = tdac("verify", run_on_set, "-n", 1)
@@ -321,6 +323,7 @@ def with_earlier_mark(run):
     return run
 
 
+@pytest.mark.slow
 def test_a_run_of_an_earlier_version_is_marked_anew(tdac, run):
     """One line says how; its tests need a permission until then."""
     with_earlier_mark(run)

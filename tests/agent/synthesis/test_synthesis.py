@@ -60,6 +60,7 @@ def test_the_same_code_is_not_tested_again(write, ground, out):
     assert len(starts) == ground.is_task
 
 
+@pytest.mark.slow
 def test_a_broken_run_goes_on_where_it_was(write, ground, out):
     """What is on record is neither asked nor tested again; nor is a finished run."""
     with pytest.raises(Fault, match=r"^script: no access$"):

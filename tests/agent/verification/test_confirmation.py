@@ -164,6 +164,7 @@ def test_a_kept_confirmation_is_that_of_one_controller_and_number(
     assert kept_confirmation(tmp_path / "none", source, small_task, 1) is None
 
 
+@pytest.mark.slow
 def test_verify_tells_passed_from_verified(tdac, good, good_source, tmp_path):
     """`--no-confirm` and `--paper` end at passed; a failed confirmation exits 1."""
     file, junit = good / "controller.py", tmp_path / "junit.xml"
@@ -182,6 +183,7 @@ def test_verify_tells_passed_from_verified(tdac, good, good_source, tmp_path):
     assert cases["blind drives"].find("failure") is not None
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_after_a_failed_confirmation(small_task, good_source, warm, out):
     """Its failures are told to the model; the next confirmation has more drives."""
     model = Script(code(good_source + UNLESS_IT_SLIPS), code(good_source))
@@ -208,6 +210,7 @@ def test_a_run_that_is_never_confirmed(small_task, good_source, warm, out):
     assert run.controller.is_file()
 
 
+@pytest.mark.slow
 def test_what_passed_is_confirmed_later(small_task, good_source, warm, out):
     """By the same command without `--no-confirm`; nothing is asked or tested again."""
     given = {"out": out, "iterations": 1, "judge": warm}
@@ -242,6 +245,7 @@ def test_a_changed_confirmation_is_not_shown(
     assert read_confirmation(run) is None
 
 
+@pytest.mark.slow
 def test_a_forged_confirmation_is_not_believed(small_task, good_source, warm, out):
     """A run that goes on drives again what it did not write itself."""
     source = good_source + UNLESS_IT_SLIPS
