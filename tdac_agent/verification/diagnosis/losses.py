@@ -8,7 +8,10 @@ from pydantic import Field
 
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.storage.printable_record import StrictRecord
+from tdac_agent.verification.diagnosis.motion import ahead, arc_of, lengths, turns
 
+IDLE = ("standing", "turning", "slower")
+"""What a robot does with the rest of a step that it does not drive at full speed."""
 _STILL = 0.05
 """Motion below this share of the fastest counts as none."""
 
@@ -80,9 +83,6 @@ def losses_of(
     return Losses(**shares, detour=max(detour, 0.0))
 
 
-IDLE = ("standing", "turning", "slower")
-
-
 def used_and_kinds(
     trajectory: Trajectory, full_step: float, full_turn: float
 ) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
@@ -92,14 +92,10 @@ def used_and_kinds(
         Shares of the fastest motion, in [-1, 1], negative backwards; and one of `IDLE`
         for each step.
     """
-    poses = trajectory.poses
-    turn = np.diff(np.unwrap(poses[:, 2]))
-    middle = poses[:-1, 2] + turn / 2.0
-    step = np.diff(poses[:, :2], axis=0)
-    ahead = np.cos(middle) * step[:, 0] + np.sin(middle) * step[:, 1]
-    # A step is an arc; its chord is shorter.
-    arc = np.hypot(*step.T) / np.sinc(turn / (2.0 * np.pi))
-    used = np.clip(np.copysign(arc, ahead) / full_step, -1.0, 1.0)
+    turn = turns(trajectory)
+    arc = arc_of(lengths(trajectory), turn)
+    signed = np.copysign(arc, ahead(trajectory))
+    used = np.clip(signed / full_step, -1.0, 1.0)
     slow = np.abs(used) < _STILL
     kinds = np.where(slow, "standing", "slower")
     kinds[slow & (np.abs(turn) >= _STILL * full_turn)] = "turning"

@@ -31,6 +31,20 @@ def lengths(trajectory: Trajectory) -> NDArray[np.float64]:
     return np.asarray(np.hypot(*np.diff(trajectory.poses[:, :2], axis=0).T))
 
 
+def ahead(trajectory: Trajectory) -> NDArray[np.float64]:
+    """Motion of each step along the mean of its headings, negative backwards."""
+    step = np.diff(trajectory.poses[:, :2], axis=0)
+    middle = trajectory.poses[:-1, 2] + turns(trajectory) / 2.0
+    return np.asarray(np.cos(middle) * step[:, 0] + np.sin(middle) * step[:, 1])
+
+
+def arc_of(
+    chord: NDArray[np.float64], turn: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Lengths of arcs with these chords and turns, rad."""
+    return np.asarray(chord / np.sinc(turn / (2.0 * np.pi)))
+
+
 def forward(trajectory: Trajectory) -> NDArray[np.float64]:
     """Forward speed of each step as a fraction of the wheel limit."""
     return np.asarray(trajectory.actions.mean(axis=1, dtype=np.float64))

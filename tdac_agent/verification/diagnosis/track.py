@@ -12,6 +12,7 @@ from tdac_agent.tasks.parts import Surroundings
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Points, Units
 from tdac_agent.verification.diagnosis.losses import IDLE, used_and_kinds
+from tdac_agent.verification.diagnosis.motion import lengths
 from tdac_agent.verification.diagnosis.surroundings import (
     surroundings_of,
     trajectory_on_screen,
@@ -142,7 +143,7 @@ def _told(piece: Piece, trajectory: Trajectory, around: Surroundings) -> str:
         return (
             f"{when}: turned on the spot by {np.degrees(turned):.0f}° at {begin}{near}"
         )
-    length = float(np.hypot(*np.diff(places[:, :2], axis=0).T).sum())
+    length = float(lengths(trajectory)[piece.first : piece.last].sum())
     share = length / max(around.full_speed * seconds, 1e-9)
     speed = f"{100.0 * share:.0f} % of full speed"
     return f"{when}: drove at {speed} from {begin} to {end}{near}"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tdac_agent.episodes.trajectory import Trajectory
 from tdac_agent.tasks.setting import Nominal
 from tdac_agent.tasks.units import Units
+from tdac_agent.verification.diagnosis.motion import ahead, arc_of, turns
 
 LATEST = 6
 """Most delay that is looked for, steps."""
@@ -147,12 +148,8 @@ def wheel_speeds(
         task: Its task.
         up: Whether headings are counter-clockwise.
     """
-    poses = trajectory.poses
-    turn = np.diff(np.unwrap(poses[:, 2]))
-    step = np.diff(poses[:, :2], axis=0)
-    middle = poses[:-1, 2] + turn / 2.0
-    ahead = np.cos(middle) * step[:, 0] + np.sin(middle) * step[:, 1]
-    arc = ahead / np.sinc(turn / (2.0 * np.pi))
+    turn = turns(trajectory)
+    arc = arc_of(ahead(trajectory), turn)
     right = -turn if up else turn
     half = right * task.axle_length / 2.0
     return np.stack([arc + half, arc - half], axis=1) / task.full_step
