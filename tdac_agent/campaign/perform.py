@@ -22,7 +22,7 @@ from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.problems.choice import problem_of
 from tdac_agent.runs.ownership import is_own_folder, load_task, mark_anew
 from tdac_agent.runs.resume import existing_run
-from tdac_agent.runs.run_record import FINISHED, JOURNAL, RACES, RUN_FILE, Run, load_run
+from tdac_agent.runs.run_record import FINISHED, JOURNAL, RUN_FILE, Run, load_run
 from tdac_agent.runs.selection_record import HIDDEN_FILE
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.installation import seed_from
@@ -189,10 +189,7 @@ def _synthesize(
     folder.parent.mkdir(parents=True, exist_ok=True)
     limits = SET_LIMITS if problem.has_hidden else ()
     settings = {name: getattr(cell, name) for name in (*SETTINGS, *limits)}
-    settings["search"] = "race" if cell.setting in RACES else "paper"
-    if cell.setting == "first answers":
-        settings["candidates"] = cell.iterations
-    settings |= dict(cell.options)
+    settings |= cell.search | dict(cell.options)
     return synthesize(
         problem,
         learner,

@@ -27,7 +27,7 @@ from tdac_agent.prompting.prompt import (
 )
 from tdac_agent.prompting.set_prompt import check_generated, set_prompt
 from tdac_agent.runs.ownership import load_task
-from tdac_agent.runs.run_record import LoopSetting
+from tdac_agent.runs.run_record import RACES, LoopSetting
 from tdac_agent.storage.hashes import sha256_of, sha256_of_json
 from tdac_agent.tasks.setting import Setting as TaskSetting
 from tdac_agent.tasks.task import Task
@@ -83,6 +83,16 @@ class Cell:
     def on_set(self) -> bool:
         """Whether its runs are on a task set."""
         return self.episodes is not None
+
+    @property
+    def search(self) -> dict[str, Any]:
+        """Options of `tdac synth` that its setting stands for, beside K and J."""
+        chosen: dict[str, Any] = {
+            "search": "race" if self.setting in RACES else "paper"
+        }
+        if self.setting == "first answers":
+            chosen["candidates"] = self.iterations
+        return chosen
 
     @property
     def asks_models(self) -> bool:

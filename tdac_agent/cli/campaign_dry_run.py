@@ -28,9 +28,8 @@ from tdac_agent.models.choice import check_name
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.prices import PriceList, load_prices, price_file
 from tdac_agent.prompting.prompt import load_template
-from tdac_agent.runs.run_record import RACES
 from tdac_agent.synthesis.cost_forecast import CostForecast, cost_of
-from tdac_agent.synthesis.options import PAPER, RACE, SynthOptions
+from tdac_agent.synthesis.options import RACE, SynthOptions
 from tdac_agent.synthesis.settled import settled
 from tdac_agent.synthesis.workload import shares
 
@@ -116,12 +115,9 @@ def dry_run(options: CampaignOptions) -> int:
 
 
 def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
-    race = cell.setting in RACES
-    further = SynthOptions(search=RACE if race else PAPER).restored(dict(cell.options))
+    further = SynthOptions(**cell.search).restored(dict(cell.options))
     further = settled(further, on_set=cell.on_set)
-    first = further.candidates or 1
-    if cell.setting == "first answers":
-        first = cell.iterations
+    race = further.search == RACE
     forecast: CostForecast = cost_of(
         cell.task_name,
         question_of(plan.problem(cell), load_template(cell.prompt)),
@@ -130,7 +126,7 @@ def _row(cell: Cell, runs: int, plan: Plan, prices: PriceList) -> PlanRow:
         prices,
         iterations=cell.iterations,
         patience=cell.patience,
-        candidates=first,
+        candidates=further.candidates or 1,
         ask=further.ask if race else "",
         refine=cell.refine,
         variations=0 if race else shares(cell.episodes, further.improve).asked,
