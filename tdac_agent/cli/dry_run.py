@@ -6,7 +6,7 @@ import sys
 from collections.abc import Collection
 
 from tdac_agent.cli.console import Console, print_json
-from tdac_agent.cli.omitted_facts import with_facts
+from tdac_agent.cli.omitted_facts import check_omitted
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.cli.synth_flags import RunFlags
 from tdac_agent.cli.task_choice import chosen_problem
@@ -37,9 +37,9 @@ def dry_run(
         check_name(name)
     book = book_of(options.rules)
     problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
-    options = with_facts(options, typed, on_set=problem.has_hidden)
-    template = load_template(options.prompt)
+    check_omitted(options, typed, on_set=problem.has_hidden)
     options = settled(options, on_set=problem.has_hidden)
+    template = load_template(options.prompt)
     server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]
     episodes = options.episodes if problem.has_hidden else None

@@ -1,18 +1,17 @@
-"""`tdac synth --omit`: the prompt that withholds the facts."""
+"""`tdac synth --omit`: which prompts can withhold facts."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 
 from tdac_agent.prompting.facts import with_omitted
 from tdac_agent.synthesis.options import SynthOptions
 
 
-def with_facts(
+def check_omitted(
     options: SynthOptions, typed: Collection[str], *, on_set: bool
-) -> SynthOptions:
-    """The options with a prompt whose name carries the facts that it withholds.
+) -> None:
+    """Refuses `--omit` beside `--prompt full`, which otherwise stands for no choice.
 
     Args:
         options: Options of the synthesis.
@@ -22,10 +21,5 @@ def with_facts(
     Raises:
         TaskError: A fact is unknown, or the prompt is not made of facts.
     """
-    if not on_set:
-        return options
-    chosen = options.prompt if "prompt" in typed else None
-    facts = with_omitted(chosen, options.omit)
-    if facts is None:
-        return options
-    return replace(options, prompt=facts.name, omit=",".join(facts.omitted))
+    if on_set and "prompt" in typed:
+        with_omitted(options.prompt, options.omit)

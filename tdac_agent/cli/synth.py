@@ -14,7 +14,7 @@ from rich.markup import escape
 
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.dry_run import dry_run
-from tdac_agent.cli.omitted_facts import with_facts
+from tdac_agent.cli.omitted_facts import check_omitted
 from tdac_agent.cli.progress import SynthProgress
 from tdac_agent.cli.run_view import show_run, show_selection
 from tdac_agent.cli.sentences import print_plain
@@ -68,7 +68,7 @@ def run(
     with console.status("preparing the task …"):
         problem = chosen_problem(flags, options, run_flags, profile=run_flags.profile)
         problem = problem.allowed(options.suite, trust=run_flags.trust)
-    options = with_facts(options, typed, on_set=problem.has_hidden)
+    check_omitted(options, typed, on_set=problem.has_hidden)
     folder = run_flags.out or next_folder(problem.name)
     return write(problem, folder, options, console)
 
