@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from tdac_agent import load_task
 from tdac_agent.sandbox import Limits
 
 QUICK = Limits(import_seconds=1.5, reset_seconds=1.5, call_seconds=1.5, cpu_seconds=30)
@@ -37,3 +38,18 @@ def write_small_task(folder: Path, **changes) -> Path:
     }
     (folder / "task.yaml").write_text(yaml.safe_dump(content | changes))
     return folder
+
+
+def room_with_blocks(folder: Path, start, range_max, offset):
+    """A task in a room with two blocks, on a robot whose scanner is off its centre."""
+    cells = np.zeros((110, 170), np.bool_)
+    cells[:6] = cells[-6:] = cells[:, :6] = cells[:, -6:] = True
+    cells[30:42, 90:110] = cells[70:85, 40:52] = True
+    np.save(folder / "map.npy", cells)
+    robot = {
+        "radius": 8, "axle": 12, "max_wheel_speed": 30, "n_rays": 72,
+        "field_of_view": 355, "range_max": range_max, "scanner_offset": [*offset],
+    }  # fmt: skip
+    own = {"map": "map.npy", "start": [*start], "goal": [140, 85], "robot": robot}
+    (folder / "task.yaml").write_text(yaml.safe_dump(own))
+    return load_task(folder / "task.yaml")

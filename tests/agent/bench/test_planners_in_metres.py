@@ -4,9 +4,8 @@ import json
 
 import numpy as np
 import pytest
-import yaml
+from small import room_with_blocks
 
-from tdac_agent import load_task
 from tdac_agent.planners.names import planner_names
 from tdac_agent.planners.planner import planner_on, source_of, source_on
 from tdac_agent.verification.judge.set_files import level_params
@@ -28,17 +27,7 @@ SEEN = {
 @pytest.fixture
 def task(tmp_path):
     """A task in a room with two blocks, on a robot with an uneven fan of rays."""
-    cells = np.zeros((110, 170), np.bool_)
-    cells[:6] = cells[-6:] = cells[:, :6] = cells[:, -6:] = True
-    cells[30:42, 90:110] = cells[70:85, 40:52] = True
-    np.save(tmp_path / "map.npy", cells)
-    robot = {
-        "radius": 8, "axle": 12, "max_wheel_speed": 30, "n_rays": 72,
-        "field_of_view": 355, "range_max": 60, "scanner_offset": [-5, 3],
-    }  # fmt: skip
-    own = {"map": "map.npy", "start": [60, 52, 0.4], "goal": [140, 85], "robot": robot}
-    (tmp_path / "task.yaml").write_text(yaml.safe_dump(own))
-    return load_task(tmp_path / "task.yaml")
+    return room_with_blocks(tmp_path, (60, 52, 0.4), 60, (-5, 3))
 
 
 def as_set(task, seen, resolution):

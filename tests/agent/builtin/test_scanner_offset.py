@@ -4,9 +4,8 @@ import importlib.util
 
 import numpy as np
 import pytest
-import yaml
+from small import room_with_blocks
 
-from tdac_agent import load_task
 from tdac_agent.builtin.level import LEVELS
 from tdac_agent.builtin.provider import template_of
 from tdac_agent.planners.names import planner_names
@@ -23,17 +22,7 @@ PLANNERS = sorted({*planner_names()} - {"go-to-goal"})
 @pytest.fixture
 def task(tmp_path):
     """A task in a room with two blocks."""
-    cells = np.zeros((110, 170), np.bool_)
-    cells[:6] = cells[-6:] = cells[:, :6] = cells[:, -6:] = True
-    cells[30:42, 90:110] = cells[70:85, 40:52] = True
-    np.save(tmp_path / "map.npy", cells)
-    robot = {
-        "radius": 8, "axle": 12, "max_wheel_speed": 30, "n_rays": 72,
-        "field_of_view": 355, "range_max": 120, "scanner_offset": [*OFFSET],
-    }  # fmt: skip
-    own = {"map": "map.npy", "start": [*START], "goal": [140, 85], "robot": robot}
-    (tmp_path / "task.yaml").write_text(yaml.safe_dump(own))
-    return load_task(tmp_path / "task.yaml")
+    return room_with_blocks(tmp_path, START, 120, OFFSET)
 
 
 def state_after(source, task, folder, monkeypatch, steps=4, left_out=()):
