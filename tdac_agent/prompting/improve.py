@@ -26,19 +26,14 @@ class Tried(NamedTuple):
     result: str
 
 
-def improve_text(
-    figures: Sequence[str], feedback: str | None, tried: Sequence[Tried]
-) -> str:
-    """The figures of a controller, its failures, and what was tried with it.
+def improve_text(drives: Sequence[str], tried: Sequence[Tried]) -> str:
+    """How a controller drives, and what was tried with it.
 
     Args:
-        figures: Its figures, in lines.
-        feedback: How it failed; None if it never did.
+        drives: How it drives, in lines.
         tried: Earlier variations, oldest first.
     """
-    lines = list(figures)
-    if feedback is not None:
-        lines += ["", "### What failed", feedback]
+    lines = list(drives)
     if tried:
         lines += ["", "### What was tried with it"]
         for each in _shown(tried):

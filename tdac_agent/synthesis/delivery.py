@@ -208,7 +208,6 @@ def _candidate(
     drives = [row for report in candidate.feedback for row in report.episodes]
     figures = None if explored is None else explored.figures
     attempt = asked.get((candidate.k, candidate.j))
-    parents = () if attempt is None else (attempt.parent, attempt.merged)
     return CandidateFigures(
         k=candidate.k,
         j=candidate.j,
@@ -220,7 +219,7 @@ def _candidate(
         validation_time=candidate.score if candidate.validation else None,
         improve_time=None if figures is None else figures.time,
         asked="" if attempt is None else attempt.asked,
-        parents=tuple(each for each in parents if each is not None),
+        parents=() if attempt is None else attempt.parents,
         pool_worlds=len(pool),
         pool_reached=sum(each.success for each in pool),
         lost=_rounded(pool) if pool else {},

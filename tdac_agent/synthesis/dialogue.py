@@ -101,17 +101,7 @@ class Dialogue:
     def generate_all(self, ks: Sequence[int]) -> list[ModelAnswer]:
         """Asks for new controllers (k, 0), at the same time if the model permits it."""
         question = self._question()
-        requests = [
-            Request(
-                "generate",
-                question,
-                rules=self._texts(),
-                sample=self._at(k, 0),
-                stable=_stable(question),
-                max_tokens=self.calls.max_output,
-            )
-            for k in ks
-        ]
+        requests = [self._request("generate", question, k) for k in ks]
         asking = [partial(self._code, self.learner, request) for request in requests]
         if not is_concurrent(self.learner):
             return [ask() for ask in asking]
@@ -139,15 +129,7 @@ class Dialogue:
             aim: What to raise.
         """
         question = repair_question("improve", self._question(), source, text, aim=aim)
-        request = Request(
-            "improve",
-            question,
-            source,
-            rules=self._texts(),
-            sample=self._at(k, 0),
-            stable=_stable(question),
-            max_tokens=self.calls.max_output,
-        )
+        request = self._request("improve", question, k, source)
         return self._code(self.optimizer, request)
 
     def informed(self, k: int, known: str, count: int) -> ModelAnswer:
@@ -159,15 +141,7 @@ class Dialogue:
             count: Their number.
         """
         question = informed_question(self._question(), known, count)
-        request = Request(
-            "generate",
-            question,
-            rules=self._texts(),
-            sample=self._at(k, 0),
-            stable=_stable(question),
-            max_tokens=self.calls.max_output,
-        )
-        return self._code(self.learner, request)
+        return self._code(self.learner, self._request("generate", question, k))
 
     def summarise(self, k: int, j: int, source: str, failure: Feedback) -> None:
         """Asks for changes of the rules after a failure, and applies them.
@@ -212,6 +186,20 @@ class Dialogue:
 
     def _question(self) -> str:
         return self.problem.question(self.book.in_force, self.template)
+
+    def _request(
+        self, kind: Kind, question: str, k: int, source: str | None = None
+    ) -> Request:
+        """A question for candidate (k, 0), which may build on a controller."""
+        return Request(
+            kind,
+            question,
+            source,
+            rules=self._texts(),
+            sample=self._at(k, 0),
+            stable=_stable(question),
+            max_tokens=self.calls.max_output,
+        )
 
     def _repair(
         self,

@@ -73,8 +73,8 @@ class PoolFeedback:
         rows = sorted(candidate.pool, key=lambda row: (row.time_score, row.number))
         scores = [{row.number: row.time_score for row in each.pool} for each in others]
         causes = list(Losses().by_cause)
-        named = [f"candidate {each.name}" for each in others]
-        head = [self.word, "least s", "its s", "score", *causes, *named]
+        columns = [f"candidate {each.name}" for each in others]
+        head = [self.word, "least s", "its s", "score", *causes, *columns]
         lines = [_line(head), _line(["---"] * len(head))]
         shown = rows[:MOST_ROWS]
         for row in shown:

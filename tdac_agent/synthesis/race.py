@@ -133,11 +133,6 @@ class Race:
             return str(error)
         return ""
 
-    @property
-    def found(self) -> tuple[Archive, int]:
-        """The archive, and the number of questions that were answered."""
-        return self.archive, self.asked
-
     def _next_kind(self) -> str:
         """The kind of the next question; empty if there is nothing to ask."""
         fixed, live = is_fixed(self._dialogue.learner), self.archive.live
@@ -154,7 +149,7 @@ class Race:
 
     def _question(self, kind: str) -> None:
         """Asks a question of a kind."""
-        k = len(self._first) + self.asked + 1
+        k = self._begun + self.asked + 1
         parents = self._parents(kind)
         answer = self._answer(kind, k, parents)
         self.asked += 1
@@ -166,11 +161,10 @@ class Race:
         return len(self.archive.members) + len(self.archive.dropped)
 
     @property
-    def _first(self) -> range:
-        """Iterations before the first question."""
+    def _begun(self) -> int:
+        """Number of the last iteration before the first question."""
         run = self._recorder.run
-        first = run.candidates if run.search == "race" else run.iterations
-        return range(1, first + 1)
+        return run.candidates if run.search == "race" else run.iterations
 
     def _parents(self, kind: str) -> tuple[Member, ...]:
         """The members that a question is about."""
@@ -224,7 +218,7 @@ class Race:
 
     def _explored(self, candidate: Candidate, against: Member | None) -> Explored:
         """Lets a candidate drive; it stops early if it is clearly worse."""
-        trials, size = self._trials, self._trials.pool_size
+        trials, size = self._trials, self._trials.terms.shares.block
         refused = trials.admit(candidate)
         while refused is None and len(candidate.pool) < size:
             count = min(BLOCK, size - len(candidate.pool))
@@ -253,7 +247,7 @@ class Race:
         founder = self.asked == 0
         member = Member(candidate, explored.figures, parent, kind, founder)
         told = explored.said
-        if len(candidate.pool) < self._trials.pool_size:
+        if len(candidate.pool) < self._trials.terms.shares.block:
             reference = parent or top
             assert reference is not None
             told = f"dropped after {len(candidate.pool)} episodes, since it was worse "

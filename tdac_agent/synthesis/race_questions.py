@@ -58,37 +58,38 @@ class RaceQuestions:
             robot_only: Whether only what they show of the robot is told.
         """
         if robot_only:
-            lines = self._trials.pool_feedback.robot()
-            return f"### What all drives show of the robot\n{lines or '(nothing yet)'}"
+            return "\n".join(self._robot("(nothing yet)"))
         archive, told = self._archive, self._trials.pool_feedback
         # Of those that were dropped, the figures are of fewer episodes.
         ranked = [*_ranked(archive.members), *_ranked(archive.dropped)]
         parts = []
         if ranked:
             parts += ["### How they drove", *map(self._line, ranked[:MOST_KNOWN])]
-        robot = told.robot()
-        if robot:
-            parts += ["", "### What all drives show of the robot", robot]
+        robot = self._robot()
+        parts += ["", *robot] if robot else []
         if ranked:
             best, others = ranked[0].candidate, [each.candidate for each in ranked[1:]]
             parts += ["", f"### The best one, candidate {best.name}"]
             parts += self._drives(best, [], others)
         for each in ranked[1:3]:
-            failed = told.failures(each.candidate)
-            if failed:
-                parts += [
-                    "",
-                    f"### Failures of candidate {each.candidate.name}",
-                    failed,
-                ]
-        for one in archive.refused[-MOST_REFUSED:]:
-            parts += [
-                "",
-                f"### Candidate {one.candidate.name} failed tests, and did not drive",
-            ]
-            explored = one.candidate.explored
-            parts.append(cut((explored and explored.feedback) or one.said))
-        return "\n".join(parts)
+            failed, name = told.failures(each.candidate), each.candidate.name
+            parts += ["", f"### Failures of candidate {name}", failed] if failed else []
+        return "\n".join([*parts, *self._refused()])
+
+    def _robot(self, nothing: str = "") -> list[str]:
+        """What all drives show of the robot, under a heading; none if it is nothing."""
+        found = self._trials.pool_feedback.robot() or nothing
+        return ["### What all drives show of the robot", found] if found else []
+
+    def _refused(self) -> list[str]:
+        """Why the latest candidates that did not drive were refused."""
+        parts = []
+        for one in self._archive.refused[-MOST_REFUSED:]:
+            name, explored = one.candidate.name, one.candidate.explored
+            said = (explored and explored.feedback) or one.said
+            head = f"### Candidate {name} failed tests, and did not drive"
+            parts += ["", head, cut(said)]
+        return parts
 
     def about(self, kind: str, parents: tuple[Member, ...]) -> tuple[str, str]:
         """What a model is told about controllers, and what it is to do.
@@ -98,7 +99,7 @@ class RaceQuestions:
             parents: The member to improve; with `merge`, also the other one.
         """
         parent, *partners = parents
-        top, told = self._archive.best(), self._trials.pool_feedback
+        top = self._archive.best()
         others = [each.candidate for each in (*partners, top) if each is not parent]
         siblings = [
             each.candidate for each in self._archive.members if each is not parent
@@ -107,14 +108,13 @@ class RaceQuestions:
         if top is not parent:
             lines.append(self._line(top))
         lines += ["", *self._drives(parent.candidate, others[:2], siblings)]
-        robot = told.robot()
-        if robot:
-            lines += ["", "### What all drives show of the robot", robot]
+        robot = self._robot()
+        lines += ["", *robot] if robot else []
         for each in partners:
             source = each.candidate.source.rstrip()
             lines += ["", f"### The other controller, candidate {each.candidate.name}"]
             lines += ["```python", source, "```", *self._drives(each.candidate, [], [])]
-        text = improve_text(lines, None, self._tried(parent))
+        text = improve_text(lines, self._tried(parent))
         return text, f"{AIMS[kind]} {self._trials.aim}"
 
     def _line(self, member: Member) -> str:

@@ -167,11 +167,6 @@ class SuiteTrials:
         shares = self.terms.shares
         return asked < shares.asked and self.used + shares.block <= shares.explore
 
-    @property
-    def pool_size(self) -> int:
-        """See `Trials`."""
-        return self.terms.shares.block
-
     @cached_property
     def pool_feedback(self) -> PoolFeedback:
         """See `Trials`: starts of disturbed episodes lie near that of the task."""

@@ -20,6 +20,7 @@ from tdac_agent.prompting.rules import RuleBook
 from tdac_agent.runs.recorder import Event
 from tdac_agent.runs.resume import check_own, check_same, existing_run
 from tdac_agent.runs.run_record import Run
+from tdac_agent.synthesis.archive import Archive
 from tdac_agent.synthesis.calls import Calls, OutOfBudget
 from tdac_agent.synthesis.candidates import Candidate
 from tdac_agent.synthesis.dialogue import Dialogue
@@ -286,8 +287,8 @@ def _write(dialogue: Dialogue, trials: Trials, given: str | None) -> None:
         reason = trials.why_none(able)
         trials.terms.recorder.finish("not verified", reason=reason)
         return
-    archive, asked = (None, 0) if found.race is None else found.race.found
-    conclude(trials, Chosen(chosen, found.written, archive, asked, found.stopped))
+    race = found.archive, found.asked, found.stopped
+    conclude(trials, Chosen(chosen, found.written, *race))
 
 
 class _Found(NamedTuple):
@@ -297,13 +298,15 @@ class _Found(NamedTuple):
         written: All candidates.
         able: Those to select from.
         stopped: What ended it early.
-        race: The race, if there was one.
+        archive: What a race came to; None without one.
+        asked: Number of its questions that were answered.
     """
 
     written: list[Candidate]
     able: list[Candidate]
     stopped: str
-    race: Race | None = None
+    archive: Archive | None = None
+    asked: int = 0
 
 
 def _loop(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
@@ -327,7 +330,8 @@ def _loop(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
     race = Race(dialogue, trials, written, most=most, kinds=kinds)
     race.begin_with(able)
     stopped = race.run(MOST_STALE) or stopped
-    return _Found(written, trials.finalists(race.archive), stopped, race)
+    able = trials.finalists(race.archive)
+    return _Found(written, able, stopped, race.archive, race.asked)
 
 
 def _race(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
@@ -340,4 +344,4 @@ def _race(dialogue: Dialogue, trials: Trials, given: str | None) -> _Found:
     race.ask_first(given, min(first, parts.explore // parts.block))
     stopped = race.run()
     able = trials.finalists(race.archive) if race.archive.members else []
-    return _Found(written, able, stopped, race)
+    return _Found(written, able, stopped, race.archive, race.asked)

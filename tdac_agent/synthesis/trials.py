@@ -68,10 +68,6 @@ class Trials(Protocol):
         """What came of its tests so far."""
 
     @property
-    def pool_size(self) -> int:
-        """Number of episodes of a race, the same for all candidates."""
-
-    @property
     def pool_feedback(self) -> PoolFeedback:
         """Tells models how candidates drove in a race."""
 

@@ -179,11 +179,6 @@ class WorldTrials:
         shares = self.terms.shares
         return self.used["improve"] + shares.block <= shares.explore
 
-    @property
-    def pool_size(self) -> int:
-        """See `Trials`."""
-        return self.terms.shares.block
-
     @cached_property
     def pool_feedback(self) -> PoolFeedback:
         """See `Trials`."""
