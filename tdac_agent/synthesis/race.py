@@ -126,9 +126,7 @@ class Race:
                 kind = self._next_kind()
                 if not kind or not self._trials.can_explore(self.asked):
                     break
-                driven = self._driven
-                self._question(kind)
-                stale = 0 if self._driven > driven else stale + 1
+                stale = 0 if self._question(kind) else stale + 1
         except OutOfBudget as error:
             return str(error)
         return ""
@@ -147,18 +145,13 @@ class Race:
         # There is no controller to ask about.
         return "" if fixed else FRESH
 
-    def _question(self, kind: str) -> None:
-        """Asks a question of a kind."""
+    def _question(self, kind: str) -> bool:
+        """Asks a question of a kind; returns whether a new controller drove."""
         k = self._begun + self.asked + 1
         parents = self._parents(kind)
         answer = self._answer(kind, k, parents)
         self.asked += 1
-        self._entered(k, answer, kind, parents)
-
-    @property
-    def _driven(self) -> int:
-        """Number of candidates that drove."""
-        return len(self.archive.members) + len(self.archive.dropped)
+        return self._entered(k, answer, kind, parents)
 
     @property
     def _begun(self) -> int:
@@ -192,13 +185,13 @@ class Race:
 
     def _entered(
         self, k: int, answer: ModelAnswer, kind: str, parents: tuple[Member, ...]
-    ) -> None:
-        """Lets a controller drive, and records it."""
+    ) -> bool:
+        """Lets a controller drive and records it; returns whether a new one drove."""
         source, notes = answer
         if source is None:
             self._record(k, kind, parents, notes, valid=False)
             self._learn(kind, paid=False)
-            return
+            return False
         before = parents[0].candidate.source if parents else None
         folder = self._recorder.candidate(k, 0, source, before=before)
         same = [each for each in self._written if same_code(source, each.source)]
@@ -207,7 +200,7 @@ class Race:
             old = same[0].explored
             self._record(k, kind, parents, (*notes, said), old, unchanged=True)
             self._learn(kind, paid=False)
-            return
+            return False
         candidate = Candidate(k, 0, source, folder)
         self._written.append(candidate)
         against = parents[0] if parents else self.archive.top
@@ -215,6 +208,7 @@ class Race:
         said, paid = self._join(candidate, explored, parents, kind)
         self._record(k, kind, parents, (*notes, said), explored)
         self._learn(kind, paid=paid)
+        return explored.drove
 
     def _explored(self, candidate: Candidate, against: Member | None) -> Explored:
         """Lets a candidate drive; it stops early if it is clearly worse."""

@@ -207,7 +207,7 @@ def test_a_race_on_a_task(improve, on_task, fragile, good_source, place):
     answers.insert(place - 1, good_source)
     words = {"search": "race", "candidates": 3, "iterations": 3}
     run = improve(on_task, Script(*map(code, answers)), **words)
-    assert (run.status, run.setting) == ("passed", "race")
+    assert (run.status, run.setting) == ("passed", "first answers")
     assert (run.folder / "controller.py").read_text() == good_source
     assert report_of(run.folder).passed
     found = read_improvement(run.folder)
