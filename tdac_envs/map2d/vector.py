@@ -19,7 +19,7 @@ from tdac_envs.map2d.env import Map2DEnv, movers_of
 from tdac_envs.map2d.kernels import step_rows
 from tdac_envs.map2d.metric_input import options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
-from tdac_envs.map2d.observed import infos_of, noisy
+from tdac_envs.map2d.observed import infos_of
 from tdac_envs.movers.state import Movers
 
 
@@ -58,6 +58,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         self._view = _view_of([setup.metric for setup in self.setups])
         noisy = [setup.has_inexact_ranges for setup in self.setups]
         self._noisy = np.flatnonzero(noisy)
+        self._inexact = np.array([_inexact(setup) for setup in self.setups])
         sonar = [setup.sonar is not None for setup in self.setups]
         self._listening = np.flatnonzero(sonar)
         self._receivers = [setup.receiver() for setup in self.setups]
@@ -137,9 +138,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
             for i in np.intersect1d(self._listening, robots).tolist():
                 self._listen(i, observations["ranges"])
         if self._noisy.size:
-            for i in np.intersect1d(self._noisy, robots).tolist():
-                exact, random = self.robots.ranges[i], self._noise(i)
-                self._ranges[i] = noisy(exact, self.setups[i], random)
+            self._disturb(np.intersect1d(self._noisy, robots))
             observations["ranges"][self._noisy] = self._ranges[self._noisy]
         if self._disturbances.odometry:
             seen = self._disturbances.measure(robots, self.robots, self._noise)
@@ -165,12 +164,43 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
         pose = state[: HEADING + 1].copy()
         self._receivers[i].receive(pose, ranges, bool(state[STEPS] == 0.0), random)
 
+    def _disturb(self, robots: NDArray[np.int64]) -> None:
+        """Disturbs the ranges of these robots, each as `noisy` does."""
+        seen = self.robots.ranges[robots].astype(np.float64)
+        spread, dropped, least, blind, most = self._inexact[robots].T[..., None]
+        rays = seen.shape[1]
+        if spread.any():
+            factors = np.ones_like(seen)
+            for i, row in zip(robots.tolist(), factors, strict=True):
+                size = self.setups[i].range_noise
+                if size:
+                    row[:] = self._noise(i).normal(1.0, size, rays)
+            inexact = np.clip(seen * factors, 0.0, most)
+            seen = np.where(spread > 0.0, inexact, seen)
+        if least.any():
+            seen = np.where(seen < least, blind, seen)
+        if dropped.any():
+            for i, row in zip(robots.tolist(), seen, strict=True):
+                share = self.setups[i].range_dropout
+                if share:
+                    far = self.setups[i].nominal.robot.range_max
+                    row[self._noise(i).random(rays) < share] = far
+        self._ranges[robots] = seen
+
     def _listen(self, i: int, ranges: NDArray[np.float32]) -> None:
         """Replaces the ranges of robot i by those of its sonars."""
         robots, discs = row_of(self.robots, i), self._movers[i].discs()
         terrain = self.tasks[i].terrain
         self.setups[i].sonar.read(terrain, robots.state, discs, robots.ranges)
         ranges[i] = robots.ranges
+
+
+def _inexact(setup: Any) -> tuple[float, ...]:
+    """Noise, dropouts, smallest range, what is read below it, and largest range."""
+    return (
+        *(setup.range_noise, setup.range_dropout, setup.range_min, setup.blind),
+        setup.nominal.robot.range_max,
+    )
 
 
 def _view_of(frames: Sequence[MapFrame | None]) -> MetricView | None:
