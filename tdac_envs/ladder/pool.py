@@ -26,11 +26,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tdac_envs.core.dynamics import code_sha256
 from tdac_envs.core.hashing import sha256_of
 from tdac_envs.core.trusted_folders import is_usable, user_cache
 from tdac_envs.drive.task import Pose
 from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.ladder.difficulty import Difficulty
+from tdac_envs.ladder.frozen import ON_MAPS_OF_SETS
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import Terrain
@@ -38,6 +40,8 @@ from tdac_envs.mapping.params import RobotParams
 from tdac_envs.movers.destinations import Destinations
 from tdac_envs.movers.state import Movers
 
+_FORMAT = 1
+"""Format of the files."""
 _MAPPED = 16_384
 """Mapped tasks that a process keeps; Linux allows 65,530 mappings."""
 _IN_MEMORY = 256
@@ -164,10 +168,8 @@ def _remove_others(folder: Path) -> None:
 
 @cache
 def _sources() -> str:
-    """Hash of the code that makes worlds."""
-    files = sorted(Path(__file__).parent.rglob("*.py"))
-    # raw read: shipped
-    return sha256_of(*(file.read_bytes() for file in files))[:16]
+    """Hash of the code that makes worlds, which no docstring changes."""
+    return sha256_of(code_sha256(*ON_MAPS_OF_SETS), f"\n{_FORMAT}")[:16]
 
 
 def _write(path: Path, task: Map2DTask, difficulty: Difficulty) -> None:
@@ -190,10 +192,11 @@ def _write(path: Path, task: Map2DTask, difficulty: Difficulty) -> None:
     parts = [len(head).to_bytes(8, "little"), head.encode("ascii")]
     parts += [np.ascontiguousarray(array).tobytes() for array in arrays.values()]
     body = b"".join(part + bytes(-len(part) % _ALIGNED) for part in parts)
-    if shutil.disk_usage(path.parent).free < _LEAST_FREE:
-        return
     check = zlib.crc32(body).to_bytes(8, "little")
+    # Another version of the code may remove the folder meanwhile.
     with contextlib.suppress(OSError):
+        if shutil.disk_usage(path.parent).free < _LEAST_FREE:
+            return
         handle, name = tempfile.mkstemp(dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:
