@@ -20,6 +20,13 @@ from tdac_envs.drive.vector import DrivenVectorEnv, Observations
 from tdac_envs.learning.dead_reckoning import DeadReckoning, reckoning, source_of
 from tdac_envs.learning.guidance import GuidedRoute, look_ahead, route_to_goal
 from tdac_envs.learning.map_view import MapViews, check_map_view, viewed_space
+from tdac_envs.learning.seen_map import (
+    VIEWS,
+    Seeing,
+    SeenMaps,
+    View,
+    with_view,
+)
 from tdac_envs.learning.wrappers import (
     Frame,
     check_closeness,
@@ -115,6 +122,7 @@ class WrappedVectorEnv(VectorWrapper):
         self.batch = batch
         self.names = tuple(names)
         self._reckoned: DeadReckoning | None = None
+        self._maps: SeenMaps | None = None
         self._bind()
         self.single_observation_space = self._space
         self.observation_space = batch_space(self._space, self.num_envs)
@@ -140,8 +148,9 @@ class WrappedVectorEnv(VectorWrapper):
 
     def close(self, **kwargs: Any) -> None:
         """Stops the threads."""
-        if self._routes is not None:
-            self._routes.close()
+        for threads in (self._routes, self._maps):
+            if threads is not None:
+                threads.close()
         super().close(**kwargs)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -172,6 +181,8 @@ class WrappedVectorEnv(VectorWrapper):
         if name == "closeness":
             check_closeness(own)
             return lambda seen, _: frame.closeness(seen)
+        if name in VIEWS:
+            return self._own_map_stage(VIEWS[name])
         if name == "guidance":
             check_guidance(setups[0])
             true = _joined([Frame.of_task(setup.nominal) for setup in setups])
@@ -186,6 +197,10 @@ class WrappedVectorEnv(VectorWrapper):
             self._space = viewed_space(own)
             views = self._views = self._views or MapViews(self.batch.tasks)
             return lambda seen, poses: {**seen, "map": views.around(poses)}
+        return self._flattening()
+
+    def _flattening(self) -> Callable[[Any, Array], Any]:
+        own = self._space
         self._space = spaces.flatten_space(own)
         if not isinstance(own, spaces.Dict):
             return lambda seen, _: seen
@@ -194,7 +209,25 @@ class WrappedVectorEnv(VectorWrapper):
             [seen[key].reshape(self.num_envs, -1) for key in keys], axis=-1
         )
 
+    def _own_map_stage(self, key: View) -> Callable[[Any, Array], Any]:
+        each = [Seeing.of(setup, self._space) for setup in self.batch.setups]
+        if any(not seeing.is_like(each[0]) for seeing in each):
+            raise TaskError("seen-map and waypoints need robots that see alike")
+        made = SeenMaps(each[0], self.num_envs, self.batch.threads)
+        self._maps = maps = self._maps or made
+        self._space = with_view(self._space, key)
+        return lambda seen, _: {**seen, key: maps.view(key)}
+
+    def _given_maps(self) -> list[Any]:
+        """The map that each robot is given, or None."""
+        tasks = self.batch.tasks
+        given = self._maps is not None and self._maps.seeing.given
+        return [task.terrain.grid.cells if given else None for task in tasks]
+
     def _current(self, observations: Observations) -> Seen:
+        if self._maps is not None:
+            steps = self.batch.robots.state[:, STEPS]
+            self._maps.follow(observations, steps, self._given_maps())
         if self._routes is not None:
             self._routes.refresh()
         if self._views is not None:
@@ -219,6 +252,8 @@ class WrappedVectorEnv(VectorWrapper):
         for i in over:
             for key, value in final[i].items():
                 last[key][i] = value
+        if self._maps is not None:
+            self._maps.end(np.array(over), last)
         if self._reckoned is not None:
             final_pose: Any = self._reckoned.ahead(last[self._source])
             last["pose"] = final_pose

@@ -30,6 +30,7 @@ from tdac_envs.epuck.infrared import LARGEST
 from tdac_envs.learning.dead_reckoning import SOURCES, reckoning, source_of
 from tdac_envs.learning.guidance import REACH, GuidedRoute, route_to_goal
 from tdac_envs.learning.map_view import MapView
+from tdac_envs.learning.seen_map import SHAPES, SeenMap, Waypoints
 from tdac_envs.map2d.task import Map2DTask
 
 if TYPE_CHECKING:
@@ -114,7 +115,7 @@ class Frame:
         if self.readings in observation:
             readings = observation[self.readings] / np.asarray(self.largest, np.float32)
             own[self.readings] = np.clip(readings, 0.0, 1.0)
-        return own
+        return own | {key: observation[key] for key in SHAPES if key in observation}
 
     def closeness(self, observation: Observation) -> Observation:
         """Converts relative observations, or a batch, as `Closeness` does."""
@@ -158,6 +159,7 @@ class Frame:
         if self.readings in keys:
             shape = own[self.readings].shape
             found[self.readings] = spaces.Box(0.0, 1.0, shape, np.float32)
+        found |= {key: own[key] for key in SHAPES if key in keys}
         return spaces.Dict(found)
 
 
@@ -332,6 +334,8 @@ WRAPPERS: dict[str, Callable[[Env], Env]] = {
     "closeness": Closeness,
     "guidance": Guidance,
     "map-view": MapView,
+    "seen-map": SeenMap,
+    "waypoints": Waypoints,
     "flatten": FlattenObservation,
 }
 """Wrappers by the names that `wrap`, `tdac train` and `tdac evaluate` accept."""

@@ -42,6 +42,7 @@ LOST = {
 MAP = {"map": True, "frame": "map"}
 VIEWED = "goal-relative", "closeness", "map-view", "flatten"
 SHARES = ("goal-relative", "flatten")
+OWN_MAP = "seen-map", "waypoints", "goal-relative", "closeness", "flatten"
 
 
 @pytest.mark.parametrize("level", LEVELS)
@@ -63,7 +64,10 @@ def test_the_default_is_sensors_alone(level):
 @pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
 @pytest.mark.parametrize(
     ("values", "names"),
-    [({}, None), (LOST, None), (MAP, VIEWED), ({}, SHARES)],
+    [
+        *(({}, None), (LOST, None), (MAP, VIEWED), ({}, SHARES), ({}, OWN_MAP)),
+        *((LOST, OWN_MAP), (MAP, OWN_MAP), ({"resolution": 0.05}, OWN_MAP)),
+    ],
 )
 def test_a_batch_tells_what_single_environments_tell(few, mode, values, names):
     """To the last bit, also at the ends of episodes and after them."""
