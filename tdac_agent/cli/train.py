@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import shlex
+import statistics
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 
@@ -27,6 +28,7 @@ from tdac_agent.training.plan import (
     make_plan,
     read_plan,
 )
+from tdac_agent.training.seeds import seed_folder, train_seeds
 from tdac_agent.training.set_plan import SELECTED, TRAINED, make_set_plan, set_of
 from tdac_agent.training.train import check_extra, train
 from tdac_envs.core.errors import TaskError
@@ -45,6 +47,8 @@ def run(options: TrainOptions) -> int:
     console = Console(stderr=options.as_json)
     with console.status("preparing the tasks …"):
         plan, folder = _plan_and_folder(_with_named_files(options))
+    if options.seeds is not None:
+        return _run_seeds(options, plan, folder, console)
     console.print(_heading(plan, folder), soft_wrap=True, highlight=False)
     columns = (
         TextColumn("{task.completed:,.0f} steps"),
@@ -61,12 +65,87 @@ def run(options: TrainOptions) -> int:
             command = shlex.join(["tdac", "train", "--resume", str(folder)])
             print_plain(console, f"to continue: {command}")
             raise
-    best = max(points, key=lambda point: point.worth)
+    best = _best(points)
     if options.as_json:
         print_json({"folder": str(folder), "best": _json(best)})
     else:
         _show(plan, folder, best, points[-1], console)
     return 0 if best.success_rate >= _learnt_at(plan) else 1
+
+
+def _run_seeds(
+    options: TrainOptions, plan: TrainingPlan, folder: Path, console: Console
+) -> int:
+    """Trains with several seeds and prints the results; returns as `run` does."""
+    first, count = plan.seed, options.seeds or 1
+    seeds = range(first, first + count)
+    console.print(
+        f"{_heading(plan, folder)}; {count} seeds", soft_wrap=True, highlight=False
+    )
+    columns = (
+        TextColumn("{task.completed:,.0f} steps"),
+        BarColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as bar:
+        row = bar.add_task("", total=plan.steps * count)
+        done = dict.fromkeys(seeds, 0)
+
+        def watch(seed: int, steps: int, point: Point | None) -> None:
+            done[seed] = steps
+            bar.update(row, completed=sum(done.values()))
+            if point is not None:
+                bar.console.print(f"seed {seed} {_line(point, False)}", highlight=False)
+
+        try:
+            curves = train_seeds(plan, seeds, folder, watch, trust=options.trust)
+        except KeyboardInterrupt:
+            print_plain(console, f"to continue: the same command, with --out {folder}")
+            raise
+    best = {seed: _best(points) for seed, points in curves.items()}
+    if options.as_json:
+        print_json(
+            {"folder": str(folder), "best": {s: _json(p) for s, p in best.items()}}
+        )
+    else:
+        _show_seeds(plan, folder, best, curves, console)
+    learnt = _learnt_at(plan)
+    return 0 if all(point.success_rate >= learnt for point in best.values()) else 1
+
+
+def _best(points: list[Point]) -> Point:
+    return max(points, key=lambda point: point.worth)
+
+
+def _show_seeds(
+    plan: TrainingPlan,
+    folder: Path,
+    best: dict[int, Point],
+    curves: dict[int, list[Point]],
+    console: Console,
+) -> None:
+    rates = [point.success_rate for point in best.values()]
+    last = [points[-1].success_rate for points in curves.values()]
+    console.print(
+        f"reached the goal in {plan.episodes} evaluation episodes: "
+        f"{statistics.mean(rates):.0%} on average over the seeds "
+        f"({min(rates):.0%} to {max(rates):.0%}); "
+        f"{statistics.mean(last):.0%} at the end",
+        highlight=False,
+        soft_wrap=True,
+    )
+    for seed, point in best.items():
+        file = seed_folder(folder, seed) / POLICY
+        print_plain(
+            console,
+            f"  seed {seed}: {point.success_rate:>4.0%} after {point.steps:,} steps, "
+            f"{point.seconds:.0f} s; {curves[seed][-1].success_rate:>4.0%} at the end "
+            f"({file})",
+        )
+    if plan.set is not None:
+        files = [str(seed_folder(folder, seed)) for seed in best]
+        words = ["tdac", "bench", *files, "builtin", "--set", plan.set]
+        print_plain(console, f"to compare: {shlex.join(words)}")
 
 
 def _learnt_at(plan: TrainingPlan) -> float:
@@ -136,10 +215,15 @@ def _plan_and_folder(options: TrainOptions) -> tuple[TrainingPlan, Path]:
     wanted = {name: typed[name] for name in PLANNED if name in typed}
     if options.wrappers is not None:
         wanted["wrappers"] = tuple(wrapper_names(options.wrappers))
+    if options.uses != "rays":
+        if options.wrappers is not None:
+            raise TaskError("--uses chooses the wrappers: leave out --wrapper")
+        wanted["uses"] = options.uses
     if options.set_name is not None:
         check_scope(True, TaskFlags(), options)
         plan = make_set_plan(options.set_name, **wanted)
     else:
+        check_scope(False, TaskFlags(), options)
         noise = Disturbance(**{name: getattr(options, name) for name in NOISES})
         plan = make_plan(options.tasks or ("maze",), disturbance=noise, **wanted)
     return plan, options.out or _next_folder(plan)

@@ -73,6 +73,13 @@ class TrainOptions:
         least=1,
     )
     seed: int = option(0, "Seed of networks, starts and noise.", least=0)
+    seeds: int | None = option(
+        None,
+        "Train with so many seeds, from --seed on, side by side on all cores; each has "
+        "a folder seed-N.",
+        least=1,
+        most=100,
+    )
     out: Path | None = out_option("Training folder.  [default: runs/ALGO-NAME-N]")
     resume: Path | None = out_option(
         "Continue the training in this folder with its own settings, from its last "
@@ -82,6 +89,13 @@ class TrainOptions:
     as_json: bool = json_option()
     wrappers: tuple[str, ...] | None = wrappers_option(
         f"{WRAPPER}  [default: from --config]", "--wrapper", panel=TRAINING
+    )
+    uses: Literal["rays", "memory", "planner"] = option(
+        "rays",
+        "What the policy uses besides goal and wheels: its rays; also a map of what "
+        "they have shown; or points on the way that is found on this map.",
+        panel=TRAINING,
+        scope="set",
     )
     n_envs: int | None = option(
         None,
@@ -129,7 +143,7 @@ class TrainOptions:
 @app.command(
     epilog="Examples: `tdac train --task maze`; `tdac train --task epuck --algo sac "
     "--seed 1`; `tdac train --task maze --task office --variation random`; "
-    "`tdac train --set unknown --steps 100000`"
+    "`tdac train --set unknown --seeds 5`"
 )
 @typed_options("train:run")
 def train(options: TrainOptions) -> None:

@@ -30,6 +30,7 @@ class Hyperparameters:
         n_envs: Number of robots in parallel.
         steps: Training steps, all robots together.
         policy: Name of the policy class in stable-baselines3.
+        initial_action: What both wheels do on average before the training, in [-1, 1].
         env: Arguments of the training environments.
         model: Further arguments of the algorithm's class, as written in the file.
     """
@@ -38,6 +39,7 @@ class Hyperparameters:
     n_envs: int
     steps: int
     policy: str
+    initial_action: float
     env: dict[str, Any]
     model: dict[str, Any]
 
@@ -71,6 +73,7 @@ def read_hyperparameters(file: Path, env: str) -> Hyperparameters:
             int(model.pop("n_envs", 1)),
             int(model.pop("n_timesteps")),
             str(model.pop("policy", "MlpPolicy")),
+            _share("initial_action", model.pop("initial_action", 0.0)),
             dict(model.pop("env_kwargs", {})),
             model,
         )
@@ -78,12 +81,24 @@ def read_hyperparameters(file: Path, env: str) -> Hyperparameters:
         raise TaskError(f"{file}, {env}: {error}") from error
 
 
+def _share(name: str, value: Any) -> float:
+    """A number in [-1, 1].
+
+    Raises:
+        ValueError: It is none.
+    """
+    if not isinstance(value, int | float) or not -1.0 <= value <= 1.0:
+        raise ValueError(f"{name}: expected a number from -1 to 1, got {value!r}")
+    return float(value)
+
+
 def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
     """Converts arguments of a file to those of stable-baselines3.
 
     Args:
         model: Arguments as in the file: `lin_1e-3` for a rate that falls to zero,
-            `noise_type: normal` and `noise_std` for action noise.
+            `noise_type: normal` and `noise_std` for action noise, and the name of a
+            class of `torch.nn` as `activation_fn` of the policy.
 
     Raises:
         TaskError: A schedule or type of noise is not supported.
@@ -97,7 +112,25 @@ def model_arguments(model: dict[str, Any]) -> dict[str, Any]:
 
         zeros = np.zeros(2)  # one per wheel
         arguments["action_noise"] = NormalActionNoise(zeros, zeros + float(spread))
+    network = arguments.get("policy_kwargs")
+    if isinstance(network, dict) and isinstance(network.get("activation_fn"), str):
+        own = {"activation_fn": _activation(network["activation_fn"])}
+        arguments["policy_kwargs"] = network | own
     return arguments
+
+
+def _activation(name: str) -> Any:
+    """The class of an activation function.
+
+    Raises:
+        TaskError: There is no such class.
+    """
+    from torch import nn
+
+    found = getattr(nn, name, None)
+    if not (isinstance(found, type) and issubclass(found, nn.Module)):
+        raise TaskError(f"activation_fn: torch.nn has no {name!r}")
+    return found
 
 
 def _wrapper_names(paths: list[str] | str) -> tuple[str, ...] | None:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.callbacks import BaseCallback
@@ -25,7 +26,7 @@ from tdac_agent.training.checkpoint_marks import CHECKPOINT, REPLAY, install_che
 from tdac_agent.training.curve import Point, read_curve, write_curve
 from tdac_agent.training.hyperparameters import model_arguments
 from tdac_agent.training.plan import TrainingPlan, make_batch
-from tdac_agent.training.policy_files import write_policy
+from tdac_agent.training.policy_files import LAST, write_best, write_policy
 from tdac_agent.training.set_plan import make_set_batch, make_trials
 from tdac_envs.learning.wrapped_vector import Seen, WrappedVectorEnv
 
@@ -40,7 +41,9 @@ Watch = Callable[[int, Point | None, Point | None], None]
 """Called with the steps so far, the new evaluation if any, and the best one."""
 
 
-def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
+def learn(
+    plan: TrainingPlan, folder: Path, watch: Watch, threads: int | None = None
+) -> list[Point]:
     """Trains to the end of a plan, from the folder's last checkpoint if it has one.
 
     A checkpoint follows each evaluation, so that a crash loses only the training since
@@ -50,6 +53,7 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
         plan: Plan of the training.
         folder: Folder of the training.
         watch: Called with the progress; see `Watch`.
+        threads: Number of threads that step robots; by default the number of cores.
 
     Returns:
         The learning curve.
@@ -60,11 +64,11 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
     # Networks of this size are slower with more than one thread.
     torch.set_num_threads(1)
     if plan.set is None:
-        batch = make_batch(plan, plan.n_envs, training=True)
+        batch = make_batch(plan, plan.n_envs, training=True, threads=threads)
     else:
-        batch = make_set_batch(plan)
+        batch = make_set_batch(plan, threads)
     envs = VecMonitor(batch, info_keywords=("is_success",))
-    trials = _trials(plan)
+    trials = _trials(plan, threads)
     try:
         model = _model(plan, folder, envs)
         done = int(model.num_timesteps)
@@ -80,10 +84,11 @@ def learn(plan: TrainingPlan, folder: Path, watch: Watch) -> list[Point]:
         trials.close()
 
 
-def _trials(plan: TrainingPlan) -> _Trials:
+def _trials(plan: TrainingPlan, threads: int | None) -> _Trials:
     if plan.set is not None:
-        return make_trials(plan)
-    return VecMonitor(make_batch(plan, plan.episodes), info_keywords=("collision",))
+        return make_trials(plan, threads)
+    batch = make_batch(plan, plan.episodes, threads=threads)
+    return VecMonitor(batch, info_keywords=("collision",))
 
 
 def evaluate_batch(model: Any, envs: VecMonitor, seed: int | Sequence[int]) -> Point:
@@ -152,14 +157,15 @@ class _Evaluations(BaseCallback):
             self._evaluate(steps)
 
     def finish(self) -> None:
-        """Evaluates the model if it was trained after the last evaluation."""
+        """Evaluates the model if it was trained after the last evaluation; keeps it."""
         steps = int(self.model.num_timesteps)
+        write_policy(self.model, self._folder / LAST, self._plan, steps)
         if not self.points or self.points[-1].steps < steps:
             self._evaluate(steps)
 
     def _evaluate(self, steps: int) -> None:
         if isinstance(self._trials, WrappedVectorEnv):
-            result = evaluate_on_worlds(self.model, self._trials)
+            result = evaluate_on_worlds(self.model, self._trials, self._plan.episodes)
         else:
             seed = EVALUATION_SEED + self._plan.seed
             result = evaluate_batch(self.model, self._trials, seed)
@@ -172,7 +178,7 @@ class _Evaluations(BaseCallback):
         )
         if self._best is None or point.worth >= self._best.worth:
             self._best = point
-            write_policy(self.model, self._folder, self._plan, point)
+            write_best(self.model, self._folder, self._plan, point)
         self.points.append(point)
         write_curve(self._folder, self.points)
         _write_checkpoint(self.model, self._folder)
@@ -190,10 +196,12 @@ def _model(plan: TrainingPlan, folder: Path, envs: VecMonitor) -> Any:
         chosen = {"seed": plan.seed, "device": "cpu", "tensorboard_log": log}
         chosen |= model_arguments(plan.hyperparameters)
         try:
-            return kind(POLICIES.get(plan.policy, plan.policy), envs, **chosen)
+            model = kind(POLICIES.get(plan.policy, plan.policy), envs, **chosen)
         except (TypeError, ValueError, AssertionError) as error:
             reason = " ".join(str(error).split())
             raise RunError(f"hyperparameters of {plan.algo}: {reason}") from error
+        _act_at_first(model, plan)
+        return model
     try:
         model = kind.load(file, envs, device="cpu", tensorboard_log=log)
         if (folder / REPLAY).is_file():
@@ -203,6 +211,21 @@ def _model(plan: TrainingPlan, folder: Path, envs: VecMonitor) -> Any:
         reason = " ".join(str(error).split())[:160]
         raise RunError(f"cannot resume from {file}: {reason}") from error
     return model
+
+
+def _act_at_first(model: Any, plan: TrainingPlan) -> None:
+    """Makes the initial action of a plan the mean of a new policy.
+
+    Raises:
+        RunError: The policy has no mean action.
+    """
+    if not plan.initial_action:
+        return
+    last = getattr(model.policy, "action_net", None)
+    if not isinstance(last, torch.nn.Linear):
+        raise RunError(f"hyperparameters of {plan.algo}: it has no initial_action")
+    with torch.no_grad():
+        last.bias.add_(plan.initial_action)
 
 
 def _write_checkpoint(model: Any, folder: Path) -> None:
@@ -215,51 +238,57 @@ def _write_checkpoint(model: Any, folder: Path) -> None:
         install_checkpoint(draft, folder / name)
 
 
-def evaluate_on_worlds(model: Any, trials: WrappedVectorEnv) -> Point:
-    """Drives robot i once through world i, with deterministic actions.
+def evaluate_on_worlds(model: Any, trials: WrappedVectorEnv, worlds: int) -> Point:
+    """Drives once through each of the first worlds, with deterministic actions.
+
+    A robot that has ended takes the next world, so the few that drive until the horizon
+    do not keep the others waiting.
 
     Args:
         model: Model with a method `predict`.
         trials: The robots, which are not reset automatically.
+        worlds: Number of worlds.
 
     Returns:
         The results, with 0 steps, 0 seconds and no success rate in training (nan).
     """
     count = trials.num_envs
-    seen = _begun(trials)
-    ended = np.zeros(count, np.bool_)
-    reached, hit, returns, lengths = np.zeros((4, count))
+    reached, hit, returns, lengths = np.zeros((4, worlds))
+    # The world of each robot; behind the last one, results do not count.
+    world = np.arange(count)
+    following = count
+    seen = _begun(trials, world % worlds)
     state, over = None, np.ones(count, np.bool_)
-    while not ended.all():
+    while (world < worlds).any():
         actions, state = model.predict(seen, state, over, deterministic=True)
         seen, rewards, terminated, truncated, infos = trials.step(actions)
-        returns[~ended] += rewards[~ended]
-        lengths[~ended] += 1
+        counts = world < worlds
+        returns[world[counts]] += rewards[counts]
+        lengths[world[counts]] += 1
         over = terminated | truncated
-        first = over & ~ended
-        if first.any():
-            reached[first] = infos["is_success"][first]
-            hit[first] = infos["collision"][first]
-        ended |= over
-        if over.any() and not ended.all():
-            # World 0 is at hand: these robots' further episodes do not count.
-            trials.reset(options={"index": 0, "reset_mask": over})
+        ended = over & counts
+        if ended.any():
+            reached[world[ended]] = infos["is_success"][ended]
+            hit[world[ended]] = infos["collision"][ended]
+        for i in np.flatnonzero(over).tolist():
+            world[i], following = following, following + 1
+            mask = np.arange(count) == i
+            index = min(int(world[i]), worlds - 1)
+            seen, _ = trials.reset(options={"index": index, "reset_mask": mask})
     return _point(reached, hit, returns, lengths)
 
 
-def _begun(trials: WrappedVectorEnv) -> Seen:
-    """The first observations, of robot i in world i."""
+def _begun(trials: WrappedVectorEnv, worlds: NDArray[np.int64]) -> Seen:
+    """The first observations, of each robot in its world."""
     rows: list[Any] = []
-    # In descending order, so that the last world made is 0.
-    for i in reversed(range(trials.num_envs)):
+    for i, index in enumerate(worlds.tolist()):
         mask = np.arange(trials.num_envs) == i
-        seen, _ = trials.reset(options={"index": i, "reset_mask": mask})
+        seen, _ = trials.reset(options={"index": index, "reset_mask": mask})
         rows.append(
             {key: value[i] for key, value in seen.items()}
             if isinstance(seen, dict)
             else seen[i]
         )
-    rows.reverse()
     if isinstance(rows[0], dict):
         return {key: np.stack([row[key] for row in rows]) for key in rows[0]}
     return np.stack(rows)

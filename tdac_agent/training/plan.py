@@ -63,6 +63,9 @@ class TrainingPlan(StrictModel):
     seed: int = 0
     n_envs: int
     policy: str = "MlpPolicy"
+    initial_action: float = Field(
+        0.0, ge=-1, le=1, description="Mean action before the training, both wheels."
+    )
     hyperparameters: dict[str, Any]
     evaluate_every: int = Field(description="Steps between evaluations.")
     episodes: int = Field(EPISODES, description="Episodes of each evaluation.")
@@ -137,6 +140,7 @@ def make_plan(
         seed=seed,
         n_envs=max(count, len(tasks)),
         policy=policy_class(defaults, names),
+        initial_action=defaults.initial_action,
         hyperparameters=defaults.model,
         evaluate_every=max(wanted // EVALUATIONS, 1),
         episodes=max(episodes, len(tasks)),
@@ -177,13 +181,20 @@ def tasks_of(plan: TrainingPlan) -> list[Task]:
     return tasks
 
 
-def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any:
+def make_batch(
+    plan: TrainingPlan,
+    count: int,
+    *,
+    training: bool = False,
+    threads: int | None = None,
+) -> Any:
     """Makes a batch of robots on a plan's tasks, with its wrappers, for SB3.
 
     Args:
         plan: Plan of the training.
         count: Number of robots.
         training: Whether the batch is for training instead of evaluation.
+        threads: Number of threads; by default the number of cores.
 
     Raises:
         TaskError: A task has changed since the plan was made, or cannot be used.
@@ -197,7 +208,8 @@ def make_batch(plan: TrainingPlan, count: int, *, training: bool = False) -> Any
         for task in tasks
     ]
     make = load_env_creator(str(gym.spec(tasks[0].spec.env).vector_entry_point))
-    return SB3VecEnv(wrapped_batch(plan, make, count, "SameStep", each=each))
+    options = {"threads": threads, "each": each}
+    return SB3VecEnv(wrapped_batch(plan, make, count, "SameStep", **options))
 
 
 def wrapped_batch(

@@ -18,10 +18,12 @@ from tdac_agent.training.plan import TrainingPlan
 from tdac_agent.training.set_plan import set_of
 
 FACTS = "policy.json"
+LAST = "last.zip"
+"""The policy at the end of a training, beside the best one."""
 LEARNERS = ("stable_baselines3", "sb3_contrib", "torch")
 
 
-def write_policy(model: Any, folder: Path, plan: TrainingPlan, point: Point) -> None:
+def write_best(model: Any, folder: Path, plan: TrainingPlan, point: Point) -> None:
     """Writes `policy.zip`, which `tdac evaluate` reads, and `policy.json`.
 
     Args:
@@ -30,6 +32,19 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, point: Point) -> 
         plan: Plan of the training.
         point: Evaluation of the model.
     """
+    write_policy(model, folder / POLICY, plan, point.steps)
+    write_atomic(folder / FACTS, _facts(plan, point))
+
+
+def write_policy(model: Any, file: Path, plan: TrainingPlan, steps: int) -> None:
+    """Writes a policy with its metadata.
+
+    Args:
+        model: Model of stable-baselines3.
+        file: File to write or replace, `NAME.zip`.
+        plan: Plan of the training.
+        steps: Steps of the training so far.
+    """
     saved = SavedPolicy(
         algo=plan.algo,
         tasks=plan.tasks,
@@ -37,13 +52,17 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, point: Point) -> 
         set_sha256=plan.set_sha256,
         wrappers=plan.wrappers,
         variation=plan.env_kwargs.get("variation", plan.variation),
-        steps=point.steps,
+        steps=steps,
         seed=plan.seed,
     )
-    draft = folder / f".{POLICY}"
+    draft = file.with_name(f".{file.name}")
     model.save(draft)
     write_metadata(draft, saved)
-    os.replace(draft, folder / POLICY)
+    os.replace(draft, file)
+
+
+def _facts(plan: TrainingPlan, point: Point) -> str:
+    """The text of `policy.json`."""
     # JSON has no nan; the training success rate is nan until an episode has ended.
     evaluation = {
         key: None if math.isnan(value) else value
@@ -59,5 +78,4 @@ def write_policy(model: Any, folder: Path, plan: TrainingPlan, point: Point) -> 
         "cores": os.cpu_count(),
         "versions": {**versions(), **learners},
     }
-    text = json.dumps(facts, indent=2, allow_nan=False)
-    write_atomic(folder / FACTS, text + "\n")
+    return json.dumps(facts, indent=2, allow_nan=False) + "\n"

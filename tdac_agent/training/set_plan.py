@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.training.hyperparameters import (
@@ -30,6 +30,15 @@ from tdac_envs.learning.wrapping import default_wrappers, wrap_for_rl
 
 TRAINED, SELECTED = "train", "dev"
 """The split of the training, and that of its evaluations, which select the policy."""
+Uses = Literal["rays", "memory", "planner"]
+"""Rays alone; also a map of what they showed; also points on a way on this map."""
+OWN_MAP: dict[str, tuple[str, ...]] = {
+    "memory": ("seen-map",),
+    "planner": ("waypoints",),
+}
+"""The wrappers that come first."""
+_AT_ONCE = 50
+"""Most robots of an evaluation."""
 _OWN = {"level", "split", "salt_file", "privileged"}
 
 
@@ -40,6 +49,7 @@ def make_set_plan(
     steps: int | None = None,
     seed: int = 0,
     wrappers: tuple[str, ...] | None = None,
+    uses: Uses = "rays",
     n_envs: int | None = None,
     episodes: int | None = None,
     config: Path | None = None,
@@ -52,6 +62,7 @@ def make_set_plan(
         steps: Training steps, all robots together.
         seed: Seed of networks, worlds and noise.
         wrappers: Names of wrappers, innermost first.
+        uses: What the policy uses besides; the default wrappers follow from it.
         n_envs: Number of robots in parallel.
         episodes: Worlds of each evaluation. By default `EPISODES`, or as many as the
             set has.
@@ -72,6 +83,7 @@ def make_set_plan(
     tasks.check_count(SELECTED, episodes or 1, "episodes")
     env: Any = make(name, split=SELECTED)
     chosen = default_wrappers(env) if defaults.wrappers is None else defaults.wrappers
+    chosen = OWN_MAP.get(uses, ()) + tuple(chosen)
     names = chosen if wrappers is None else wrappers
     wrap_for_rl(env, names)  # checks that they support what is observed
     count = tasks.count(SELECTED)
@@ -90,6 +102,7 @@ def make_set_plan(
         seed=seed,
         n_envs=n_envs or defaults.n_envs,
         policy=policy_class(defaults, names),
+        initial_action=defaults.initial_action,
         hyperparameters=defaults.model,
         evaluate_every=max(wanted // EVALUATIONS, 1),
         episodes=episodes or min(EPISODES, count or EPISODES),
@@ -109,25 +122,35 @@ def set_of(plan: TrainingPlan) -> TaskSet:
     return tasks
 
 
-def make_set_batch(plan: TrainingPlan) -> Any:
+def make_set_batch(plan: TrainingPlan, threads: int | None = None) -> Any:
     """Makes the robots of a training, with its wrappers, for SB3.
+
+    Args:
+        plan: The plan.
+        threads: Number of threads; by default the number of cores.
 
     Raises:
         TaskError: The set has changed since the plan was made, or cannot be used.
     """
     from tdac_envs.learning.sb3 import SB3VecEnv
 
-    batch = _batch(plan, plan.n_envs, TRAINED, "SameStep", plan.env_kwargs)
+    own = {**plan.env_kwargs, "threads": threads}
+    batch = _batch(plan, plan.n_envs, TRAINED, "SameStep", own)
     return SB3VecEnv(batch)
 
 
-def make_trials(plan: TrainingPlan) -> WrappedVectorEnv:
-    """Makes the robots of an evaluation; robot i is for world i.
+def make_trials(plan: TrainingPlan, threads: int | None = None) -> WrappedVectorEnv:
+    """Makes the robots of an evaluation.
+
+    Args:
+        plan: The plan.
+        threads: Number of threads; by default the number of cores.
 
     Raises:
         TaskError: As for `make_set_batch`.
     """
-    return _batch(plan, plan.episodes, SELECTED, "Disabled", {})
+    count = min(plan.episodes, _AT_ONCE)
+    return _batch(plan, count, SELECTED, "Disabled", {"threads": threads})
 
 
 def _batch(

@@ -25,6 +25,7 @@ def train(
     watch: Watch | None = None,
     *,
     trust: bool = False,
+    threads: int | None = None,
 ) -> list[Point]:
     """Trains, and writes the best policy and its learning curve to a folder.
 
@@ -36,6 +37,8 @@ def train(
         folder: Folder of the training; made if missing.
         watch: Called with the steps so far, a new evaluation or None, and the best one.
         trust: Whether another installation's checkpoint may be loaded.
+        threads: Number of threads that step robots, which does not affect the results;
+            by default the number of cores.
 
     Returns:
         The learning curve.
@@ -54,7 +57,7 @@ def train(
         if not held:
             raise RunError(f"another process trains in {folder}")
         check(folder, trust=trust)
-        return learn(plan, folder, watch or (lambda *_: None))
+        return learn(plan, folder, watch or (lambda *_: None), threads)
 
 
 def check_extra() -> None:

@@ -28,7 +28,7 @@ class Slices:
     """
 
     def __init__(self, threads: int | None = None) -> None:
-        self._threads = threads or _cores()
+        self._threads = threads or available_cores()
         self._executor: ThreadPoolExecutor | None = None
         self._process = os.getpid()
 
@@ -86,7 +86,7 @@ class Slices:
         return executor
 
 
-def _cores() -> int:
+def available_cores() -> int:
     """Number of cores that this process may use; of all cores if that is unknown."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

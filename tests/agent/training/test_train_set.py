@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from tdac_agent.evaluation.evaluate import evaluate
 from tdac_agent.training.curve import read_curve
 from tdac_agent.training.hyperparameters import config_file
 from tdac_agent.training.plan import read_plan
+from tdac_agent.training.seeds import train_seeds
 from tdac_agent.training.set_plan import make_set_plan, make_trials
 from tdac_agent.training.train import train
 from tdac_envs import load_set
@@ -68,11 +70,11 @@ def trained(tmp_path, few, config):
 
 @pytest.mark.parametrize("level", ["known", "unknown", "lost"])
 def test_a_plan_has_what_robots_of_the_level_have(level):
-    """No guidance, closeness, no view of the map unless one asks for it; 64 robots."""
+    """No guidance, closeness, no view of the map unless one asks for it; 256 robots."""
     plan = make_set_plan(level, steps=1000)
     assert plan.wrappers == ("goal-relative", "closeness", "flatten")
     assert (plan.set, plan.set_sha256) == (level, load_set(level).sha256)
-    assert (plan.n_envs, plan.episodes, plan.tasks) == (64, 100, ())
+    assert (plan.n_envs, plan.episodes, plan.tasks) == (256, 100, ())
 
 
 @pytest.mark.parametrize("values", [{}, LOST])
@@ -90,11 +92,12 @@ def test_a_training_records_its_set(trained, values):
 
 @pytest.mark.slow_after(1)
 @pytest.mark.parametrize("algo", ["recurrent-ppo", "ppo"])
-def test_its_evaluation_is_that_of_the_judge(trained, algo, warm):
-    """World i of dev for robot i: the judge drives the same, one after the other.
+def test_its_evaluation_is_that_of_the_judge(trained, algo, warm, monkeypatch):
+    """Three robots share the worlds of dev: the judge drives the same, one by one.
 
     A recurrent policy begins each episode with an empty memory.
     """
+    monkeypatch.setattr("tdac_agent.training.set_plan._AT_ONCE", 3)
     tasks, _, points, out = trained(algo, **LOST)
     best = max(points, key=lambda point: point.worth)
     found = evaluate([out / "policy.zip"], [tasks], 4, split="dev", judge=warm)
@@ -222,3 +225,51 @@ def test_the_commands_in_turn(tdac, rejected, done, tmp_path, few, config):
         rows = list(csv.DictReader(file))
     assert [row["index"] for row in rows] == ["0", "1"]
     assert {row["knows"] for row in rows} == {"sensors"}
+
+
+@pytest.mark.parametrize(
+    ("uses", "first", "knows"),
+    [("memory", "seen-map", "+ memory"), ("planner", "waypoints", "+ planner")],
+)
+def test_a_policy_with_a_map_of_its_own(few, config, tmp_path, uses, first, knows):
+    """It trains and drives, and the tables say what it uses."""
+    level = few()
+    plan = make_set_plan(level, steps=128, episodes=2, config=config(), uses=uses)
+    assert plan.wrappers == (first, "goal-relative", "closeness", "flatten")
+    train(plan, tmp_path / "out")
+    found = evaluate([tmp_path / "out"], [load_set(level)], 2, split="dev")
+    assert found.rows[0].knows == knows
+
+
+def test_a_new_policy_drives_forward(few, config, tmp_path):
+    """Before the training both wheels do what `initial_action` says, on average."""
+    level = few()
+    file = config(learning_rate=1e-12, initial_action=0.25)
+    plan = make_set_plan(level, steps=128, episodes=2, config=file)
+    train(plan, tmp_path / "out")
+    from stable_baselines3 import PPO
+
+    policy = PPO.load(tmp_path / "out" / "policy.zip").policy
+    bias = policy.action_net.bias.detach().numpy()
+    assert np.allclose(bias, 0.25, atol=1e-6)
+    for value in (2.0, "fast"):
+        with pytest.raises(TaskError, match="initial_action: expected"):
+            make_set_plan(level, config=config(initial_action=value))
+
+
+def test_seeds_are_trained_side_by_side(few, config, tmp_path):
+    """Each as alone, to the last digit; the same call again leaves them as they are."""
+    level = few()
+    plan = make_set_plan(level, steps=256, episodes=3, config=config())
+    told = []
+    curves = train_seeds(plan, range(3, 5), tmp_path / "s", lambda *a: told.append(a))
+    assert list(curves) == [3, 4]
+    alone = train(plan.model_copy(update={"seed": 4}), tmp_path / "alone")
+    plain = [replace(point, seconds=0.0) for point in alone]
+    assert [replace(point, seconds=0.0) for point in curves[4]] == plain
+    assert {seed for seed, _, _ in told} == {3, 4}
+    again = train_seeds(plan, range(3, 5), tmp_path / "s", lambda *_: None)
+    assert again == curves
+    (tmp_path / "s" / "seed-4" / "training.json").unlink()
+    with pytest.raises(RunError, match="not empty and contains no training"):
+        train_seeds(plan, range(3, 5), tmp_path / "s", lambda *_: None)
