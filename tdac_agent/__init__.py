@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from tdac_agent.synthesis.synthesize import synthesize
     from tdac_agent.tasks.disturbance import Disturbance
     from tdac_agent.tasks.task import Task
+    from tdac_agent.training.save_policy import save_policy
     from tdac_agent.verification.diagnosis.report import Report
     from tdac_agent.verification.verify import verify
     from tdac_agent.verification.verify_episodes import (
@@ -33,6 +34,7 @@ __all__ = [
     "load_controller",
     "load_run",
     "load_task",
+    "save_policy",
     "synthesize",
     "verify",
     "verify_episodes",
@@ -53,6 +55,7 @@ _MODULE_OF = {
     "load_controller": "evaluation.policy",
     "load_run": "runs.run_record",
     "load_task": "runs.ownership",
+    "save_policy": "training.save_policy",
     "synthesize": "synthesis.synthesize",
     "verify": "verification.verify",
     "verify_episodes": "verification.verify_episodes",

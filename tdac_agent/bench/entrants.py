@@ -10,6 +10,7 @@ from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.evaluation.policies import (
     BUILTIN,
+    FOLLOWER,
     PRIVILEGED,
     Entrant,
     entrant_of,
@@ -62,7 +63,7 @@ def named(words: Sequence[str]) -> tuple[Named, ...]:
         if not each.name or not each.words:
             raise TaskError(f"expected NAME=FILE, got {each.name!r} and {each.words}")
         for word in each.words:
-            if word not in (*planner_names(), PRIVILEGED):
+            if word not in (*planner_names(), PRIVILEGED, FOLLOWER):
                 _check(word)
     return found
 

@@ -10,7 +10,7 @@ from tdac_agent.metrics.paired import Estimate
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_envs.ladder.frozen import dynamics_of, ladder_of
 
-Kind = Literal["builtin", "planner", "controller", "learned", "privileged"]
+Kind = Literal["builtin", "planner", "controller", "learned", "baseline", "privileged"]
 """What an entrant is."""
 
 

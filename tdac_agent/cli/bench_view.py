@@ -117,7 +117,7 @@ def _notes(row: BenchRow, knows_map: bool) -> list[str]:
         notes.append(f"{row.entrant}, failures: {causes}")
     counts = [each.hidden for each in row.files if each.hidden and each.hidden > 1]
     # Nobody chooses among versions of what comes with the package.
-    if counts and row.kind not in ("builtin", "planner"):
+    if counts and row.kind not in ("builtin", "planner", "baseline"):
         notes.append(
             f"{row.entrant}: evaluation {max(counts)} of its file on hidden worlds; "
             "only the first one is to be reported"

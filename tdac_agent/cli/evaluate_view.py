@@ -38,7 +38,9 @@ LEGEND = (
 )
 SET_LEGEND = (
     "knows: what the policy may use; sensors include the goal, and the pose where the "
-    "set observes it. 95 %: exact interval of the rate (Clopper-Pearson); with several "
+    "set observes it; + memory: its own map of what its rays showed; + planner: points "
+    "on the way that is found on this map; + map: the given one. 95 %: exact "
+    "interval of the rate (Clopper-Pearson); with several "
     "runs on each world, worlds are resampled. SCT: success x OT / T (least possible "
     "/ actual time); SPL: success x L / driven (shortest / actual path); BARN: at most "
     "0.5 (docs/task-sets.md). hit: episodes with a contact; late: cut off at the "

@@ -19,9 +19,12 @@ import numpy as np
 from gymnasium import Space, spaces
 from numpy.typing import NDArray
 
+from tdac_agent.episodes.after_wrappers import Stages
 from tdac_agent.episodes.sb3_file import (
     ACTIVATION,
+    EXTRACTOR,
     SavedNetwork,
+    SavedPolicy,
     load_weights,
     read_policy,
 )
@@ -44,7 +47,7 @@ _NETWORKS = {
 }
 """Policy class for observations in a Box, by the module of the saved class."""
 _ACTIVATIONS = {"ReLU", "Tanh", "ELU", "LeakyReLU", "GELU", "SiLU", "Sigmoid", "SELU"}
-
+_EXTRACTORS = {"FlattenExtractor", "CombinedExtractor", "NatureCNN"}
 
 # Layers up to this size are built in memory: the policy class computes its noise there.
 _SMALL = 10_000
@@ -57,18 +60,25 @@ class Learned:
         file: Model file of stable-baselines3.
         wrappers: Names of the wrappers it was trained with, innermost first.
         env: Environment of the episode.
+        seed: Seed of its noise, if it acts with noise.
 
     Raises:
         ControllerFault: The policy cannot be used in this environment.
     """
 
-    def __init__(self, file: Path, wrappers: tuple[str, ...], env: JudgedEnv) -> None:
+    def __init__(
+        self, file: Path, wrappers: tuple[str, ...], env: JudgedEnv, seed: int = 0
+    ) -> None:
         plain: Any = env
+        saved = _saved(file)
         try:
             self._env: Any = wrap_for_rl(plain, wrappers)
+            own = self._env.observation_space
+            self._after = Stages(saved.after if saved else (), own)
         except TaskError as error:
             raise ControllerFault(str(error), "import") from error
-        space, actions = self._env.observation_space, env.action_space
+        self._noisy, self._seed = bool(saved and saved.actions == "noisy"), seed
+        space, actions = self._after.space, env.action_space
         text = f"{space} {actions}"
         self._network = _load_network(file, _Spaces(space, actions, text))
         self._memory: Any = None
@@ -76,13 +86,18 @@ class Learned:
     def reset(self, observation: Observation) -> None:  # noqa: ARG002
         """Begins an episode, with an empty memory."""
         self._memory = None
+        self._after.reset()
+        if self._noisy:
+            import torch
+
+            torch.manual_seed(self._seed)
 
     def policy(self, observation: Observation) -> NDArray[np.float32]:
         """Returns the action, shape (2,), float32."""
-        wrapped = self._wrapped(self._env, observation)
+        wrapped = self._after.apply(self._wrapped(self._env, observation))
         try:
             action, self._memory = self._network.predict(
-                wrapped, self._memory, deterministic=True
+                wrapped, self._memory, deterministic=not self._noisy
             )
         # Manipulated weights can cause various errors of torch.
         except (ValueError, RuntimeError) as error:
@@ -108,6 +123,19 @@ class _Spaces:
     observation: Space[Any] = field(compare=False)
     action: Space[Any] = field(compare=False)
     text: str
+
+
+@lru_cache(maxsize=4)
+def _saved(file: Path) -> SavedPolicy | None:
+    """Returns what a policy's file records about it.
+
+    Raises:
+        ControllerFault: It is not a policy.
+    """
+    try:
+        return read_policy(file).saved
+    except ControllerFileError as error:
+        raise ControllerFault(str(error), "import") from error
 
 
 @lru_cache(maxsize=4)
@@ -141,6 +169,9 @@ def check_kind(saved: SavedNetwork) -> None:
         ControllerFileError: The policy is of an unknown kind, its settings do not fit
             its class or its weights, or an extra is not installed.
     """
+    own = saved.settings
+    if own.features_extractor_class or own.features_extractor_kwargs:
+        return  # Its layers follow from the observations, which are not known yet.
     try:
         first, second = _shapes(saved, 4), _shapes(saved, 5)
     except ControllerFault as fault:
@@ -250,6 +281,13 @@ def _policy_kwargs(saved: SavedNetwork) -> dict[str, Any]:
         kwargs["activation_fn"] = getattr(nn, match[1], None)
         if match[1] not in _ACTIVATIONS:
             raise ControllerFault(f"unknown activation {match[1][:80]}", "import")
+    match = re.fullmatch(EXTRACTOR, kwargs.pop("features_extractor_class", None) or "")
+    if match is not None:
+        from stable_baselines3.common import torch_layers
+
+        if match[1] not in _EXTRACTORS:
+            raise ControllerFault(f"unknown extractor {match[1][:80]}", "import")
+        kwargs["features_extractor_class"] = getattr(torch_layers, match[1])
     if saved.module == _WITHOUT_SDE:
         kwargs.pop("use_sde")
     elif saved.module != _SAC:

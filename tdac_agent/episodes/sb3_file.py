@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
+from tdac_agent.episodes.after_wrappers import Stage
 from tdac_agent.episodes.torch_file import Weights, read_weights
 from tdac_agent.errors import ControllerFileError
 from tdac_agent.storage.files import write_atomic
@@ -36,6 +38,11 @@ _MOST_GROWTH, _SLACK_BYTES = 8, 1_000_000
 _FOR_TRAINING = {"optimizer_class", "optimizer_kwargs"}
 ACTIVATION = r"<class 'torch\.nn\.modules\.activation\.(\w+)'>"
 
+EXTRACTOR = r"<class 'stable_baselines3\.common\.torch_layers\.(\w+)'>"
+_CODE = {"activation_fn": ACTIVATION, "features_extractor_class": EXTRACTOR}
+"""Settings that name a class of torch or stable-baselines3."""
+
+Size = Annotated[int, Field(ge=0, le=4096)]
 Layers = Annotated[list[Annotated[int, Field(ge=1, le=4096)]], Field(max_length=16)]
 Number = Annotated[float, Field(ge=-1e6, le=1e6)]
 
@@ -49,6 +56,12 @@ class SavedPolicy(StrictModel):
     set: str | None = Field(None, description="Name of its task set, instead of tasks.")
     set_sha256: str | None = Field(None, description="Hash of this set.")
     wrappers: tuple[str, ...] = Field(description="Innermost first; see `wrap`.")
+    after: tuple[Stage, ...] = Field(
+        (), max_length=8, description="Then, what SB3's own wrappers did."
+    )
+    actions: Literal["likely", "noisy"] = Field(
+        "likely", description="The most likely action, or one with the policy's noise."
+    )
     variation: str = Field("jitter", description="Variation of the training.")
     steps: int | None = Field(None, description="Steps of the training.")
     seed: int | None = None
@@ -73,7 +86,10 @@ class Settings(StrictModel):
     enable_critic_lstm: bool = True
     normalize_images: bool = True
     share_features_extractor: bool = True
-    features_extractor_kwargs: dict[str, None] | None = Field(None, max_length=0)
+    features_extractor_class: str | None = Field(None, pattern=f"^{EXTRACTOR}$")
+    features_extractor_kwargs: (
+        dict[Literal["features_dim", "cnn_output_dim", "normalized_image"], Size] | None
+    ) = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +205,8 @@ def _network(data: bytes) -> tuple[str, Settings]:
         if not key.startswith(":") and key not in _FOR_TRAINING
     }
     for key, value in kept.items():
-        if isinstance(value, str) and key != "activation_fn":
+        known = _CODE.get(key)
+        if isinstance(value, str) and not (known and re.fullmatch(known, value)):
             raise ValueError(f"its {key} is code, which is not run: {value[:80]}")
     try:
         return module, Settings.model_validate(kept)

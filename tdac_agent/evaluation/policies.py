@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import tempfile
 from collections.abc import Sequence
@@ -25,15 +26,18 @@ from tdac_agent.planners.planner import planner_on
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.problems.set_episodes import planner_sha256
 from tdac_agent.sandbox import ControllerFault
+from tdac_agent.sandbox.folder import WEIGHTS_BYTES
 from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file
+from tdac_agent.verification.judge.drivers import WaypointDriver
 from tdac_agent.verification.judge.policy_spec import Kind, PolicySpec
 from tdac_agent.verification.judge.set_files import write_set
 from tdac_agent.verification.verify import read_source
 from tdac_agent.verification.verify_episodes import written_by
-from tdac_envs.core.errors import TaskError, hint
+from tdac_envs.core.dynamics import code_of, code_sha256
+from tdac_envs.core.errors import TaskError, hint, one_line_reason
 from tdac_envs.core.intake import read_file
 from tdac_envs.ladder.env import make
 from tdac_envs.ladder.task_sets import TaskSet
@@ -41,8 +45,11 @@ from tdac_envs.learning.wrappers import WRAPPERS, check_wrappers
 
 OURS: tuple[Kind, ...] = ("reference", "random", "go-to-goal", "follow-guidance")
 BUILTIN, PRIVILEGED = "builtin", "privileged"
-EntrantKind = Literal["builtin", "planner", "controller", "learned", "privileged"]
-"""What an entrant is; baselines of ours have none."""
+FOLLOWER: Kind = "follow-waypoints"
+EntrantKind = Literal[
+    "builtin", "planner", "controller", "learned", "baseline", "privileged"
+]
+"""What an entrant is; further baselines of ours have none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +93,7 @@ def entrants_of(
 
     Args:
         policies: `reference`, `builtin`, `random`, `go-to-goal`, `follow-guidance`,
+            `follow-waypoints`,
             names of planners, controller files, folders of runs and trainings,
             policies saved by stable-baselines3.
         wrappers: Wrappers of saved policies that do not record their own.
@@ -127,10 +135,19 @@ def entrant_of(
         return Entrant(word, PolicySpec("controller"), kind="builtin")
     if word in planner_names():
         return Entrant(word, PolicySpec("controller"), kind="planner")
+    if word == FOLLOWER:
+        return Entrant(word, PolicySpec(FOLLOWER), _follower_sha256(), "baseline")
     if word == PRIVILEGED:
         spec = PolicySpec("privileged")
         return Entrant(word, spec, planner_sha256(), "privileged")
     return _of_path(word, wrappers)
+
+
+def _follower_sha256() -> str:
+    """The hash of the code that follows waypoints."""
+    own = [f"learning/seen_{name}.py" for name in ("map", "kernels", "ways")]
+    driver = inspect.getsource(WaypointDriver)
+    return sha256_of(code_sha256(*own) + code_of(driver))
 
 
 def _of_path(word: str, wrappers: Sequence[str] | None) -> Entrant:
@@ -141,7 +158,7 @@ def _of_path(word: str, wrappers: Sequence[str] | None) -> Entrant:
         found = _controller(word, path / "controller.py")
         return replace(found, env=_env_of(path), set_file=_set_of(path))
     if not path.is_file():
-        names = sorted((*OURS, BUILTIN, *planner_names()))
+        names = sorted((*OURS, BUILTIN, FOLLOWER, *planner_names()))
         raise ControllerFileError(not_found("policy", word, names))
     if path.suffix == ".zip":
         return _learned(word, path, wrappers)
@@ -180,8 +197,27 @@ def _controller(name: str, file: Path) -> Entrant:
         raise ControllerFileError(f"no controller.py in {name!r}")
     source = read_source(file)
     check_controller(name, source)
-    policy = PolicySpec("controller", file.resolve())
-    return Entrant(name, policy, sha256_of(source), "controller")
+    weights = file.with_suffix(".npz")
+    if not weights.is_file() or file.name == "controller.py":
+        policy = PolicySpec("controller", file.resolve())
+        return Entrant(name, policy, sha256_of(source), "controller")
+    policy = PolicySpec("controller", file.resolve(), weights=weights.resolve())
+    numbers = _weights(name, weights)
+    both = f"{sha256_of(source)} {sha256_of(numbers)}"
+    return Entrant(name, policy, sha256_of(both), "learned")
+
+
+def _weights(name: str, file: Path) -> bytes:
+    """Content of the weights of a learned controller.
+
+    Raises:
+        ControllerFileError: They cannot be read.
+    """
+    try:
+        return read_file(file, WEIGHTS_BYTES)
+    except (OSError, ValueError) as error:
+        reason = one_line_reason(error)
+        raise ControllerFileError(f"{name!r}: weights {file}: {reason}") from error
 
 
 def _env_of(run_folder: Path) -> str | None:
@@ -268,17 +304,23 @@ def _fitted_to_set(entrant: Entrant, tasks: TaskSet) -> Entrant:
         return replace(entrant, policy=policy, sha256=sha256_of_file(file))
     if entrant.saved is not None:
         _check_training(entrant.name, entrant.saved, tasks)
-    if entrant.kind == "learned":
+    if entrant.policy.kind == "sb3":
         _check_observations(entrant, tasks)
     return entrant
 
 
+MAPPED = {"map-view", "seen-map", "waypoints"}
+"""Wrappers that show the given map, where there is one."""
+
+
 def knowledge(policy: PolicySpec, problem: Task | TaskSet) -> str:
     """What a policy may use: `sensors` include the goal, and the pose if observed."""
-    if isinstance(problem, Task) or policy.kind not in ("controller", "sb3"):
+    if isinstance(problem, Task) or policy.kind not in ("controller", "sb3", FOLLOWER):
         return policy.knows
-    mapped = policy.kind == "controller" and problem.file.map
-    return "+ map" if mapped or "map-view" in policy.wrappers else "sensors"
+    reads_map = policy.kind != "sb3" or MAPPED & set(policy.wrappers)
+    if problem.file.map and reads_map:
+        return "+ map"
+    return "sensors" if policy.kind == "controller" else policy.knows
 
 
 def _check_observations(entrant: Entrant, tasks: TaskSet) -> None:

@@ -33,6 +33,7 @@ _KINDS = {
     "planner": "classical planner",
     "controller": "controller file",
     "learned": "learned",
+    "baseline": "follows waypoints",
     "privileged": "knows the true world",
 }
 # Inches that the labels below and above the panels need.

@@ -26,7 +26,10 @@ from tdac_envs.ladder.set_limits import CpuSpec
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.task import Map2DTask
 
-ON_SETS = ("controller", "sb3", "random", "reference", "go-to-goal", "privileged")
+ON_SETS = (
+    *("controller", "sb3", "random", "reference", "go-to-goal", "follow-waypoints"),
+    "privileged",
+)
 """Kinds of policy that drive on task sets."""
 
 
@@ -87,13 +90,15 @@ class OfSet:
             raise TaskError(
                 f"{policy.kind} does not drive on a task set: give controller files, "
                 "run folders, .zip files of stable-baselines3, builtin, reference, "
-                "go-to-goal or random"
+                "go-to-goal, follow-waypoints or random"
             )
         if policy.kind == "privileged" and not self.tasks.file.movers:
             raise TaskError(
                 "without movers, a planner that knows the world takes the least "
                 "possible time: its time score is 1 by definition"
             )
+        if policy.kind == "follow-waypoints" and self.tasks.file.is_epuck:
+            raise TaskError("follow-waypoints needs ranges, and an e-puck has none")
         if policy.kind == "go-to-goal" and "pose" not in self.tasks.file.observed:
             raise TaskError(
                 f"go-to-goal needs a pose, and {self.name} does not observe one"

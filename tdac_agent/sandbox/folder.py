@@ -9,6 +9,10 @@ from pathlib import Path
 
 from tdac_agent.sandbox.errors import SandboxError
 
+WEIGHTS = "weights.npz"
+"""Numbers of a learned controller."""
+WEIGHTS_BYTES = 16 << 20
+"""Size limit of this file, which each episode copies."""
 MAX_FOLDER_BYTES = 256 << 20
 
 
@@ -33,8 +37,15 @@ class PrivateFolder:
         for folder in (self.root, self.work, self.scratch):
             folder.mkdir(mode=0o700)
 
-    def copy_files(self, workdir: Path | None, source: bytes) -> None:
+    def copy_files(
+        self, workdir: Path | None, source: bytes, weights: bytes | None = None
+    ) -> None:
         """Copy the files of `workdir` to `work` and write the controller.
+
+        Args:
+            workdir: Folder with the files; None for none.
+            source: Text of `controller.py`.
+            weights: Content of `WEIGHTS`, if there is one.
 
         Raises:
             SandboxError: The folder cannot be read or is too large.
@@ -43,6 +54,8 @@ class PrivateFolder:
             if workdir is not None:
                 self._copy(workdir)
             (self.work / "controller.py").write_bytes(source)
+            if weights is not None:
+                (self.work / WEIGHTS).write_bytes(weights)
             for path in (*self.work.iterdir(), self.work):
                 os.utime(path, (0, 0))  # they tell nothing of the judge's own files
         except OSError as error:

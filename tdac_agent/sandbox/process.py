@@ -117,12 +117,18 @@ class Child:
         self.controller_pid = self._line.pid = facts.pop("pid", self.pid)
         return facts
 
-    def copy_files(self, workdir: Path | None, controller_source: str | bytes) -> None:
+    def copy_files(
+        self,
+        workdir: Path | None,
+        controller_source: str | bytes,
+        weights: bytes | None = None,
+    ) -> None:
         """Copy a working folder and a controller into a child that has none yet.
 
         Args:
             workdir: Folder whose files the controller may read, without subfolders.
             controller_source: Text of `controller.py`.
+            weights: Content of `weights.npz`, which it may read, too.
 
         Raises:
             ControllerError: The source is larger than 200 kB.
@@ -133,7 +139,7 @@ class Child:
         if len(controller_source) > MAX_SOURCE_BYTES:
             text = f"{len(controller_source)} bytes (limit {MAX_SOURCE_BYTES})"
             raise ControllerError("SourceTooLarge", text, 0, "", "import")
-        self.folder.copy_files(workdir, controller_source)
+        self.folder.copy_files(workdir, controller_source, weights)
 
     def load(self, timeout: float | None = None) -> dict[str, str]:
         """Import the controller; return the type name of each public name."""

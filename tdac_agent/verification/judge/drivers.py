@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.episodes.episode import Driver
+from tdac_agent.sandbox import ControllerFault
 from tdac_agent.tasks.registry import environment
 from tdac_agent.tasks.setting import JudgedEnv
 from tdac_agent.tasks.units import Point
 from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.suite.reference import steer
+from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.env import Observation
 from tdac_envs.learning.guidance import GuidedRoute, route_to_goal
+from tdac_envs.learning.seen_map import Waypoints
 from tdac_envs.learning.wrappers import Frame
 
 # Duration of a random action, s: jittering wheels would not move the robot.
@@ -79,11 +82,33 @@ class SteeringDriver:
         pose, goal = observation["pose"], observation["goal"]
         place = goal if self._route is None else self._route.ahead(pose[None])[0]
         ahead, left = self._frame.seen(pose, place).tolist()
-        bearing = math.atan2(left, ahead)
-        turn = min(max(_GAIN * bearing, -1.0), 1.0)
-        speed = max(0.0, 1.0 - abs(bearing) / _ON_THE_SPOT)
-        largest = max(1.0, speed + abs(turn))
-        return (speed - turn) / largest, (speed + turn) / largest
+        return _steered(ahead, left)
+
+    def waited(self) -> float:
+        """Always 0: it runs in this process."""
+        return 0.0
+
+
+class WaypointDriver:
+    """Drives to the next point on the way that is found on a map of its own.
+
+    With what a policy with the wrapper `waypoints` observes, and no learning.
+    """
+
+    def __init__(self, env: JudgedEnv) -> None:
+        plain: Any = env
+        try:
+            self._env = Waypoints(plain)
+        except TaskError as error:
+            raise ControllerFault(str(error), "import") from error
+
+    def reset(self, observation: Observation) -> None:
+        """Does nothing: a map begins with its episode."""
+
+    def policy(self, observation: Observation) -> tuple[float, float]:
+        """Turns to the point, and drives faster the better it is aligned."""
+        ahead, left = self._env.observation(observation)["waypoints"][0].tolist()
+        return _steered(ahead, left)
 
     def waited(self) -> float:
         """Always 0: it runs in this process."""
@@ -116,11 +141,20 @@ class RandomDriver:
         return 0.0
 
 
-def _learned(policy: PolicySpec, env: JudgedEnv) -> Driver:
+def _steered(ahead: float, left: float) -> tuple[float, float]:
+    """Wheel speeds towards a place in the robot's frame."""
+    bearing = math.atan2(left, ahead)
+    turn = min(max(_GAIN * bearing, -1.0), 1.0)
+    speed = max(0.0, 1.0 - abs(bearing) / _ON_THE_SPOT)
+    largest = max(1.0, speed + abs(turn))
+    return (speed - turn) / largest, (speed + turn) / largest
+
+
+def _learned(policy: PolicySpec, env: JudgedEnv, seed: int) -> Driver:
     from tdac_agent.episodes.learned import Learned
 
     assert policy.file is not None
-    return Learned(policy.file, policy.wrappers, env)
+    return Learned(policy.file, policy.wrappers, env, seed)
 
 
 _OURS: dict[str, Callable[[PolicySpec, JudgedEnv, int], Driver]] = {
@@ -128,7 +162,8 @@ _OURS: dict[str, Callable[[PolicySpec, JudgedEnv, int], Driver]] = {
     "random": lambda _, env, seed: RandomDriver(env, seed),
     "go-to-goal": lambda _, env, __: SteeringDriver(env, guided=False),
     "follow-guidance": lambda _, env, __: SteeringDriver(env, guided=True),
-    "sb3": lambda policy, env, _: _learned(policy, env),
+    "follow-waypoints": lambda _, env, __: WaypointDriver(env),
+    "sb3": _learned,
 }
 
 

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from tdac_agent.episodes.episode import Driver, not_driven, run_policy
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.sandbox import Child, ControllerFault, Limits, SandboxError
+from tdac_agent.sandbox.folder import WEIGHTS_BYTES
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.setting import JudgedEnv
@@ -35,6 +36,7 @@ from tdac_agent.verification.judge.set_checks import (
 from tdac_agent.verification.judge.task_world import TaskEpisodes
 from tdac_agent.verification.judge.worlds import (
     FOREVER,
+    Program,
     SetWorlds,
     TaskWorld,
     Worlds,
@@ -134,20 +136,24 @@ class EpisodeRun:
         job: The job.
         child_pool: The child pool.
         worlds: Where they take place.
-        source: Bytes of the controller; empty without one.
+        program: The controller, if one drives.
     """
 
     job: EpisodeJob
     child_pool: ChildPool
     worlds: TaskEpisodes | SetEpisodes
-    source: bytes
+    program: Program
 
     @classmethod
     def of(cls, job: EpisodeJob, child_pool: ChildPool) -> EpisodeRun:
         """Opens the worlds, and reads the controller."""
-        file = job.policy.file if job.policy.kind == "controller" else None
+        policy = job.policy
+        file = policy.file if policy.kind == "controller" else None
         source = b"" if file is None else read_file(file, RECORD_BYTES)
-        return cls(job, child_pool, opened(job.worlds), source)
+        weights = None
+        if policy.weights is not None:
+            weights = read_file(policy.weights, WEIGHTS_BYTES)
+        return cls(job, child_pool, opened(job.worlds), Program(source, weights))
 
 
 def opened(worlds: TaskWorld | SetWorlds) -> TaskEpisodes | SetEpisodes:
@@ -239,7 +245,7 @@ def drive_number(run: EpisodeRun, number: int) -> Driven:
 
 def _checked(run: EpisodeRun) -> tuple[Checks, str]:
     """The static tests, and the first steps on a public world; also the tier."""
-    results, job, worlds = static_checks(run.source), run.job, run.worlds
+    results, job, worlds = static_checks(run.program.source), run.job, run.worlds
     if len(results) == 1:  # it does not parse
         return Checks(results=results), job.tier
     assert not isinstance(worlds, TaskEpisodes)
@@ -316,7 +322,7 @@ def _drive(
     record.seen = worlds.seen
     child = run.child_pool.take(run.job.tier, run.job.limits)
     try:
-        worlds.supply(child, number, run.source)
+        worlds.supply(child, number, run.program)
         rollout = drive(worlds.load(child) if most == FOREVER else _loaded(child))
     except ControllerFault as fault:
         rollout = not_driven(record, name, fault)

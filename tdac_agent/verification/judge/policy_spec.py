@@ -13,6 +13,7 @@ Kind = Literal[
     "random",
     "go-to-goal",
     "follow-guidance",
+    "follow-waypoints",
     "privileged",
 ]
 
@@ -25,21 +26,30 @@ class PolicySpec:
         kind: Kind of policy.
         file: File of a controller, or of a policy of stable-baselines3.
         wrappers: Names of the observation wrappers of such a policy.
+        weights: File with the numbers of a learned controller.
         on_level: Whether a controller reads the files of a task set on a task, too.
     """
 
     kind: Kind
     file: Path | None = None
     wrappers: tuple[str, ...] = ()
+    weights: Path | None = None
     on_level: bool = False
 
     @property
     def knows(self) -> str:
-        """Label of the information it may use; `sensors` includes pose and goal."""
+        """Label of the information it may use; `sensors` includes pose and goal.
+
+        A memory is a map of what its rays showed, a planner finds ways on this map.
+        """
         if self.kind == "controller":
             return "+ map"
         if self.kind == "follow-guidance" or "guidance" in self.wrappers:
             return "+ guidance"
         if self.kind == "reference":
             return "privileged"
+        if self.kind == "follow-waypoints" or "waypoints" in self.wrappers:
+            return "+ planner"
+        if "seen-map" in self.wrappers:
+            return "+ memory"
         return "nothing" if self.kind == "random" else "sensors"

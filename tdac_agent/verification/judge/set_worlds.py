@@ -19,7 +19,7 @@ from tdac_agent.tasks.units import UNITS, Units, units_in
 from tdac_agent.verification.judge.cpu_budget import Budgeted
 from tdac_agent.verification.judge.episode_row import EpisodeRow, plan_facts
 from tdac_agent.verification.judge.set_files import write_files
-from tdac_agent.verification.judge.worlds import FOREVER, SetWorlds
+from tdac_agent.verification.judge.worlds import FOREVER, Program, SetWorlds
 from tdac_envs.core.salt import read_salt
 from tdac_envs.drive.env import Observation
 from tdac_envs.ladder.env import TaskSetEnv, make
@@ -67,13 +67,13 @@ class SetEpisodes:
         """See `Worlds`."""
         return f"world {number}"
 
-    def supply(self, child: Child, number: int, source: bytes) -> None:
+    def supply(self, child: Child, number: int, program: Program) -> None:
         """See `Worlds`. Neither split nor number are told."""
         # The judge's own copy of the task, so that the files can be written before.
         task = self.env.setup.source.task(number)
         with tempfile.TemporaryDirectory() as name:
             write_files(Path(name), self.file, task)
-            child.copy_files(Path(name), source)
+            child.copy_files(Path(name), *program)
 
     def seen(self, observation: Observation) -> Observation:
         """See `Worlds`."""

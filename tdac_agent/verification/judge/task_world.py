@@ -16,7 +16,7 @@ from tdac_agent.verification.diagnosis.measures import (
     least_steps,
     shortest_path_length,
 )
-from tdac_agent.verification.judge.worlds import FOREVER, TaskWorld
+from tdac_agent.verification.judge.worlds import FOREVER, Program, TaskWorld
 from tdac_envs.drive.env import Observation
 
 
@@ -42,17 +42,17 @@ class TaskEpisodes:
         """See `Worlds`."""
         return f"seed {number}"
 
-    def supply(self, child: Child, number: int, source: bytes) -> None:  # noqa: ARG002
+    def supply(self, child: Child, number: int, program: Program) -> None:  # noqa: ARG002
         """See `Worlds`."""
         if not self.worlds.on_level:
-            child.copy_files(self.worlds.task, source)
+            child.copy_files(self.worlds.task, *program)
             return
         # Only for controllers of task sets, which need much that a task does not.
         from tdac_agent.verification.judge.set_files import write_as_level
 
         with tempfile.TemporaryDirectory() as name:
             write_as_level(Path(name), self.task)
-            child.copy_files(Path(name), source)
+            child.copy_files(Path(name), *program)
 
     def seen(self, observation: Observation) -> Observation:
         """See `Worlds`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 from pydantic import BaseModel, ConfigDict
 
@@ -21,6 +21,18 @@ FOREVER = 1 << 62
 PUBLIC = ("dev", "test", "train")
 
 
+class Program(NamedTuple):
+    """A controller.
+
+    Attributes:
+        source: Bytes of its file; empty without one.
+        weights: Bytes of its weights, if it was learned.
+    """
+
+    source: bytes
+    weights: bytes | None = None
+
+
 class Worlds(Protocol):
     """Makes episodes by number: a seed of a task, or the index of a world."""
 
@@ -34,7 +46,7 @@ class Worlds(Protocol):
     def name(self, number: int) -> str:
         """Name of an episode in texts."""
 
-    def supply(self, child: Child, number: int, source: bytes) -> None:
+    def supply(self, child: Child, number: int, program: Program) -> None:
         """Gives a child the controller and the files that it may read.
 
         Raises:

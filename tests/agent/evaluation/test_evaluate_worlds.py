@@ -101,7 +101,7 @@ def test_builtin_is_the_controller_of_the_level(warm, level):
 @pytest.mark.slow
 def test_baselines_and_planners_drive_on_worlds_and_on_tasks(warm, level, small_task):
     """All that drives on a set drives on a task on a map, and the other way round."""
-    words = ["reference", "go-to-goal", "random", "dwa"]
+    words = ["reference", "go-to-goal", "random", "dwa", "follow-waypoints"]
     found = evaluate(words, [load_set(level), small_task], 2, judge=warm)
     knows = {row.policy: row.knows for row in found.of("few")}
     assert knows == {
@@ -109,9 +109,10 @@ def test_baselines_and_planners_drive_on_worlds_and_on_tasks(warm, level, small_
         "go-to-goal": "sensors",
         "random": "nothing",
         "dwa": "sensors",
+        "follow-waypoints": "+ planner",
     }
     errors = [row.outcomes.get("error", 0) for row in found.rows]
-    assert errors == [0] * 8
+    assert errors == [0] * 10
     reached = {row.policy: row.successes for row in found.of(small_task.name)}
     assert (reached["reference"], reached["dwa"], reached["random"]) == (2, 2, 0)
     assert {pair.task for pair in found.comparisons} == {"few", small_task.name}

@@ -15,6 +15,7 @@ from tdac_agent.problems.part import Part
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.episode_job import opened
 from tdac_agent.verification.judge.policy_spec import PolicySpec
+from tdac_agent.verification.judge.worlds import Program
 from tdac_envs import load_set
 from tdac_envs.ladder.set_file import set_names
 
@@ -94,7 +95,7 @@ def watched(name, folder, child_pool, index):
     worlds = opened(episodes.worlds(part, folder, PolicySpec("controller")))
     child = child_pool.take("auto", episodes.limits)
     with contextlib.closing(child):
-        worlds.supply(child, index, SPY)
+        worlds.supply(child, index, Program(SPY))
         driver = worlds.load(child)
         seen, _ = worlds.env.reset(options={"index": index})
         driver.reset(seen)
