@@ -1,14 +1,14 @@
 """Trains the learned entrants of `results/ladder` (`make results-rl`).
 
     python -m benchmarks.ladder_trainings OUT [NAME...] [--keep results/ladder/learned]
+        [--jobs N]
 
-NAME is `ALGO-LEVEL-SEED`, by default all of them, in the order of `TRAININGS`: PPO with
-five seeds on `known`, `unknown` and `crowd`, RecurrentPPO with five on `unknown`,
-`lost` and `moving`, one seed of PPO on the other levels, and one of PPO with a view of
-the map (`ppo-with-map`) on `known`. OUT has a folder for each;
-finished ones are left as they are, and an interrupted one goes on from its last
-evaluation. `--keep` copies policies, facts and learning curves of the finished ones to
-a folder that is small enough to be kept.
+NAME is `KIND-LEVEL-STEPS-SEED`, such as `ppo-planner-unknown-10M-0`; by default all of
+`TRAININGS`, in their order, as many at a time as there are cores. A kind is what
+learns and what it uses (`tdac train --algo`, `--uses`); the settings are those of
+`tdac train --set`. OUT has a folder for each; finished ones are left as they are, and
+an interrupted one goes on from its last evaluation. `--keep` copies policies, facts and
+learning curves of the finished ones to a folder that is small enough to be kept.
 """
 
 from __future__ import annotations
@@ -17,38 +17,61 @@ import argparse
 import multiprocessing
 import shutil
 import sys
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from typing import cast
 
 from benchmarks.baseline_trainings import finished
 from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.training.curve import CURVE_FILE, PLAN_FILE
 from tdac_agent.training.hyperparameters import Algo
 from tdac_agent.training.plan import TrainingPlan
-from tdac_agent.training.policy_files import FACTS
-from tdac_agent.training.set_plan import make_set_plan
+from tdac_agent.training.policy_files import FACTS, LAST
+from tdac_agent.training.set_plan import Uses, make_set_plan
 from tdac_agent.training.train import train
+from tdac_envs.core.slices import available_cores
 
-SEEDS = range(5)
-WITH_MAP = "ppo-with-map"
-"""PPO with the view of the map, which it does not have by default."""
+KINDS: dict[str, tuple[Algo, Uses]] = {
+    "ppo": ("ppo", "rays"),
+    "ppo-planner": ("ppo", "planner"),
+    "ppo-memory": ("ppo", "memory"),
+    "recurrent-ppo": ("recurrent-ppo", "rays"),
+}
+"""Algorithm, and what the policy uses, by name."""
+STEPS = {"2M": 2_000_000, "10M": 10_000_000, "50M": 50_000_000}
+HEADLINE, OTHERS = ("unknown", "floor"), ("lost", "known", "moving", "crowd")
+SEEDS, HEADLINE_SEEDS = range(5), range(10)
 TRAININGS = [
     *(
-        ("ppo", level, seed)
+        (kind, level, steps, seed)
+        for steps in ("10M", "2M")
+        for levels in (HEADLINE, OTHERS)
         for seed in SEEDS
-        for level in ("unknown", "known", "crowd")
+        for level in levels
+        for kind in KINDS
     ),
     *(
-        ("recurrent-ppo", level, seed)
+        (kind, "epuck", steps, seed)
+        for steps in ("10M", "2M")
         for seed in SEEDS
-        for level in ("unknown", "lost", "moving")
+        for kind in ("recurrent-ppo", "ppo")
     ),
-    *(("ppo", level, 0) for level in ("lost", "moving", "epuck")),
-    (WITH_MAP, "known", 0),
+    *(
+        (kind, level, "10M", seed)
+        for seed in HEADLINE_SEEDS[len(SEEDS) :]
+        for level in HEADLINE
+        for kind in KINDS
+    ),
+    *(
+        (kind, level, "50M", seed)
+        for seed in SEEDS
+        for level in HEADLINE
+        for kind in ("ppo", "ppo-planner")
+    ),
 ]
-"""Algorithm, level and seed."""
+"""Kind, level, steps and seed."""
 NAMES = {"-".join(map(str, each)): each for each in TRAININGS}
-KEPT = POLICY, FACTS, PLAN_FILE, CURVE_FILE
+KEPT = POLICY, LAST, FACTS, PLAN_FILE, CURVE_FILE
 
 
 def main() -> None:
@@ -56,30 +79,37 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--jobs", type=int, default=available_cores())
     options = parser.parse_args()
-    # A process for each, since its thousands of worlds take gigabytes.
+    names = options.names or list(NAMES)
+    if wrong := [name for name in names if name not in NAMES]:
+        parser.error(f"no training {wrong[0]}: expected KIND-LEVEL-STEPS-SEED")
+    run = partial(run_one, out=options.out, keep=options.keep)
+    with ThreadPoolExecutor(options.jobs) as pool:
+        failed = [name for name in pool.map(run, names) if name]
+    if failed:
+        sys.exit(f"failed: {', '.join(failed)}")
+
+
+def run_one(name: str, out: Path, keep: Path | None) -> str:
+    """Runs a training in a process of its own; returns its name if it failed."""
+    # Its thousands of worlds take gigabytes.
     processes = multiprocessing.get_context("spawn")
-    for name in options.names or NAMES:
-        arguments = name, options.out / name, options.keep
-        process = processes.Process(target=train_one, args=arguments)
-        process.start()
-        process.join()
-        if process.exitcode != 0:
-            sys.exit(f"{name} ended with exit code {process.exitcode}")
+    process = processes.Process(target=train_one, args=(name, out / name, keep))
+    process.start()
+    process.join()
+    return "" if process.exitcode == 0 else name
 
 
-def plan_of(algo: str, level: str, seed: int) -> TrainingPlan:
+def plan_of(kind: str, level: str, steps: str, seed: int) -> TrainingPlan:
     """The plan of a training in `TRAININGS`."""
-    if algo == WITH_MAP:
-        seen = "goal-relative", "closeness", "map-view", "flatten"
-        return make_set_plan(level, "ppo", seed=seed, wrappers=seen)
-    return make_set_plan(level, cast(Algo, algo), seed=seed)
+    algo, uses = KINDS[kind]
+    return make_set_plan(level, algo, seed=seed, uses=uses, steps=STEPS[steps])
 
 
 def train_one(name: str, folder: Path, keep: Path | None) -> None:
     """Runs a training, or what is left of it, and keeps what came out."""
-    algo, level, seed = NAMES[name]
-    points = train(plan_of(algo, level, seed), folder)
+    points = train(plan_of(*NAMES[name]), folder, threads=1)
     best = max(points, key=lambda point: point.worth)
     print(name, f"{best.steps} steps, reached {best.success_rate:.2f}", flush=True)
     if keep is not None and finished(folder):

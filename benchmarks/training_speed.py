@@ -1,11 +1,14 @@
 """Measures steps/s of PPO, end to end, on our environments and on CartPole-v1.
 
-    python -m benchmarks.training_speed [--steps N] [--rounds N]
+    python -m benchmarks.training_speed [--steps N] [--rounds N] [--sets]
 
 It uses the hyperparameters of `tdac train` for maps, and the defaults of
 stable-baselines3 (ten epochs in batches of 64). The cases run in turns, and the best
 round of each counts. The environments' share is the time within the batch's `step` and
 `reset`, as called by PPO.
+
+With `--sets`, the trainings of `tdac train --set` instead, by what the policy uses, in
+steps per second of CPU time; the worlds of the pool that are drawn are made before.
 """
 
 from __future__ import annotations
@@ -21,9 +24,17 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import VecEnvWrapper
 
-from tdac_agent.training.hyperparameters import model_arguments
+from tdac_agent.training.hyperparameters import Algo, model_arguments
+from tdac_agent.training.learning import ALGOS, POLICIES
 from tdac_agent.training.plan import make_batch, make_plan
+from tdac_agent.training.set_plan import Uses, make_set_batch, make_set_plan
 
+ON_SETS: list[tuple[str, Algo, Uses]] = [
+    *(("unknown", "ppo", uses) for uses in ("rays", "memory", "planner")),
+    *((level, "ppo", "rays") for level in ("lost", "floor")),
+    ("unknown", "recurrent-ppo", "rays"),
+]
+POOL = 4096
 DICT = ("goal-relative", "guidance")
 
 
@@ -43,9 +54,11 @@ class Speed:
 class Timed(VecEnvWrapper):
     """Adds up the seconds of `step` and `reset`."""
 
-    def __init__(self, envs: Any) -> None:
+    def __init__(
+        self, envs: Any, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
         super().__init__(envs)
-        self.seconds = 0.0
+        self.seconds, self._clock = 0.0, clock
 
     def reset(self) -> Any:
         return self._timed(self.venv.reset)
@@ -57,9 +70,9 @@ class Timed(VecEnvWrapper):
         return self._timed(self.venv.step_wait)
 
     def _timed(self, call: Callable[[], Any]) -> Any:
-        began = time.perf_counter()
+        began = self._clock()
         found = call()
-        self.seconds += time.perf_counter() - began
+        self.seconds += self._clock() - began
         return found
 
 
@@ -101,12 +114,48 @@ def of_task(name: str, wrappers: tuple[str, ...] | None = None) -> Callable[[], 
     return lambda: make_batch(plan, plan.n_envs, training=True)
 
 
+def set_speed(level: str, algo: Algo, uses: Uses, steps: int) -> Speed:
+    """Measures a training on a set after one rollout, by CPU time."""
+    plan = make_set_plan(level, algo, uses=uses)
+    batch = make_set_batch(plan, threads=1)
+    pool = batch.batch.batch.setups[0].source
+    for index in range(POOL):
+        pool.task(index)
+    timed = Timed(batch, time.process_time)
+    arguments = model_arguments(plan.hyperparameters)
+    policy = POLICIES.get(plan.policy, plan.policy)
+    model = ALGOS[algo](policy, timed, device="cpu", seed=0, **arguments)
+    model.learn(model.n_steps * plan.n_envs)
+    before, began = timed.seconds, time.process_time()
+    model.learn(steps)
+    took = time.process_time() - began
+    batch.close()
+    return Speed(model.num_timesteps / took, (timed.seconds - before) / took)
+
+
+def print_sets(steps: int, rounds: int) -> None:
+    """Measures and prints the trainings on sets."""
+    best = dict.fromkeys(ON_SETS, Speed(0.0, 0.0))
+    for _ in range(rounds):
+        for case in ON_SETS:
+            best[case] = max(best[case], set_speed(*case, steps))
+    for (level, algo, uses), found in best.items():
+        print(
+            f"{level:<8} {algo:<14} {uses:<8}{found.steps_per_second:>8,.0f} steps per "
+            f"CPU second, environments {found.share:.0%} of the time"
+        )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.training_speed")
     parser.add_argument("--steps", type=int, default=65_536)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--sets", action="store_true")
     options = parser.parse_args()
     torch.set_num_threads(1)
+    if options.sets:
+        print_sets(max(options.steps, 2 * 65_536), options.rounds)
+        return
     count = make_plan(("maze",)).n_envs
     several = "MultiInputPolicy"
     cases = [
