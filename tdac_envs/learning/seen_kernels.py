@@ -25,15 +25,23 @@ _PASSED = 2
 """Evidence against a wall: a ray that passes."""
 _SHORT = 1.5
 """A ray says nothing about the last cells before its end."""
-RING = 4
+PER_RADIUS = 4
+"""Cells in a body radius."""
+RING = 2 * PER_RADIUS
 """Cells nearer than this to a wall, or equally near, cost more."""
 WALL = 2000
 """Cost of a step in a cell with a wall, in steps elsewhere."""
-# By squared distance from a wall: the body needs two cells on each side.
+_STEPS = {0.0: WALL, 0.9: 90, 1.0: 40, 1.15: 20, 1.35: 8, 1.6: 5, 1.8: 3, 2.0: 2}
+"""Cost of a step by the largest distance from a wall, body radii."""
 _BESIDE = np.array(
-    [WALL, 90, 90, 90, 40, 20, 20, 20, 8, 6, 4, 4, 4, 3, 3, 3, 2], np.int16
+    [
+        next(cost for far, cost in _STEPS.items() if near <= (far * PER_RADIUS) ** 2)
+        for near in range(RING * RING + 1)
+    ],
+    np.int16,
 )
-MARGIN = 5
+"""By the squared distance from a wall: below a body radius, the body hardly fits."""
+MARGIN = RING + 1
 """Cells at the edges of a map where no robot is."""
 
 

@@ -25,6 +25,7 @@ from tdac_envs.drive.stepping import STEPS
 from tdac_envs.learning.dead_reckoning import DeadReckoning, reckoning, source_of
 from tdac_envs.learning.seen_kernels import (
     MARGIN,
+    PER_RADIUS,
     UNKNOWN,
     add_scans,
     add_walls,
@@ -35,7 +36,7 @@ from tdac_envs.map2d.setup import Map2DSetup
 
 Array = NDArray[np.float64]
 
-CELL = 0.5
+CELL = 1.0 / PER_RADIUS
 """Side of a cell, body radii."""
 SECTORS = 24
 RINGS = (1.0, 2.5, 5.0, 10.0, 20.0)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.compiled import kernel, subkernel
 from tdac_envs.learning.seen_kernels import MARGIN, WALL, Array, Costs
 
-MOST_AHEAD = 64
+MOST_AHEAD = 128
 """Points of a route that are kept."""
 _EVERY = 12
 """Steps after which a new route is found."""
