@@ -122,6 +122,7 @@ def request_of(
         episodes_of(problem),
         part,
         member.source,
+        member.weights,
         lineage=member.lineage,
         tier=tier,
         trajectories=True,

@@ -191,7 +191,7 @@ def add_walls(
     """
     height, width = cells.shape
     # Cells on each side that belong to the same pixel, if cells are smaller.
-    more = int(math.ceil(max(scale - 1.0, 0.0) / 2.0))
+    more = math.ceil(max(scale - 1.0, 0.0) / 2.0)
     for y in range(-1, height + 1):
         for x in range(-1, width + 1):
             free = 0 <= x < width and 0 <= y < height and not cells[y, x]
