@@ -122,10 +122,10 @@ def request_of(
         episodes_of(problem),
         part,
         member.source,
-        member.weights,
         lineage=member.lineage,
         tier=tier,
         trajectories=True,
+        weights=member.weights,
     )
 
 

@@ -54,7 +54,6 @@ class Request:
         episodes: The task or the task set.
         part: Which of its episodes.
         source: Source of a controller, instead of its file.
-        weights: Content of its weights, if it has any.
         test: A test that may end them early; then there are no scores.
         lineage: Id of the run that wrote a controller, if one did.
         patience: Time-outs after which the rest is skipped; None for never.
@@ -63,6 +62,7 @@ class Request:
         trajectories: Whether the trajectories of public episodes are kept.
         own_tests: Runs the user's own tests on a set; without a pass, nothing is
             driven.
+        weights: Content of the controller's weights, if it has any.
     """
 
     policy: PolicySpec
@@ -70,7 +70,6 @@ class Request:
     episodes: Episodes
     part: Part
     source: bytes | None = None
-    weights: bytes | None = None
     test: EndingTest | None = None
     lineage: str | None = None
     patience: int | None = None
@@ -78,6 +77,7 @@ class Request:
     limits: Limits | None = None
     trajectories: bool = False
     own_tests: Callable[[], Report] | None = None
+    weights: bytes | None = None
 
 
 def drive(
