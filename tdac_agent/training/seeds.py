@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.errors import RunError
+from tdac_agent.training.checkpoint_marks import check
 from tdac_agent.training.curve import Point
 from tdac_agent.training.plan import MOST_SEED, TrainingPlan
 from tdac_agent.training.train import prepare, train
@@ -51,12 +52,15 @@ def train_seeds(
         The learning curve of each seed.
 
     Raises:
+        NotTrustedError: As for `train`.
         RunError: As for `train`, or a process was killed.
         TaskError: As for `train`. All other trainings have ended then.
     """
     plans = [_with_seed(plan, seed) for seed in seeds]
     for each in plans:
-        prepare(seed_folder(folder, each.seed), each)
+        own = seed_folder(folder, each.seed)
+        prepare(own, each)
+        check(own, trust=trust)
     # Spawned: torch and compiled code have threads, which a fork does not copy.
     context = multiprocessing.get_context("spawn")
     told: Any = context.SimpleQueue()

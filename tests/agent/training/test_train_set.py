@@ -2,6 +2,7 @@
 
 import csv
 import json
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -16,6 +17,8 @@ from tdac_agent.episodes.sb3_file import POLICY, read_policy
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
 from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.tasks.trust import NotTrustedError
+from tdac_agent.training.checkpoint_marks import CHECKPOINT
 from tdac_agent.training.curve import read_curve
 from tdac_agent.training.hyperparameters import config_file
 from tdac_agent.training.plan import read_plan, write_plan
@@ -289,6 +292,11 @@ def test_seeds_end_together_and_are_checked_first(few, config, tmp_path):
     with hold(folder / LOCK_FILE), pytest.raises(RunError, match="contains no train"):
         train_seeds(plan, range(1, 3), tmp_path / "s", lambda *_: None)
     write_plan(folder, plan.model_copy(update={"seed": 1}))
+    (folder / CHECKPOINT).write_text("somebody else's")
+    with pytest.raises(NotTrustedError, match=CHECKPOINT) as told:
+        train_seeds(plan, range(1, 3), tmp_path / "s", lambda *_: None)
+    assert pickle.loads(pickle.dumps(told.value)).lines == told.value.lines
+    (folder / CHECKPOINT).unlink()
     with hold(folder / LOCK_FILE), pytest.raises(RunError, match="another process tr"):
         train_seeds(plan, range(1, 4), tmp_path / "s", lambda *_: None)
     for seed in (2, 3):
