@@ -125,6 +125,7 @@ def request_of(
         lineage=member.lineage,
         tier=tier,
         trajectories=True,
+        weights=member.weights,
     )
 
 

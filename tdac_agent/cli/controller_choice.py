@@ -14,6 +14,7 @@ from tdac_agent.errors import ControllerFileError
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
+from tdac_agent.verification.verify import weights_file
 
 
 def with_own_set(controller: str, flags: TaskFlags) -> TaskFlags:
@@ -68,6 +69,12 @@ def controller_file(controller: str) -> Path:
         raise ControllerFileError(f"no controller {controller!r}: no such file")
     if path.suffix != ".py":
         raise ControllerFileError(f"{controller!r} is not a controller: expected a .py")
+    if (weights := weights_file(path)) is not None:
+        raise ControllerFileError(
+            f"{controller!r} has weights beside it, {weights.name}, which it gets from "
+            "tdac evaluate, tdac bench and tdac play --set only: move them away, or "
+            "use one of these"
+        )
     return path
 
 

@@ -17,7 +17,14 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.strict_model import StrictModel
 
 MOST_NUMBERS = 100_000
-Numbers = Annotated[list[FiniteFloat], Field(max_length=MOST_NUMBERS)]
+"""Most numbers in an observation, or in one entry of a `Dict`."""
+_MOST_KEYS = 64
+LARGEST = 1e30
+"""Largest number that a network, in single precision, is to get."""
+Numbers = Annotated[
+    list[Annotated[float, Field(ge=-LARGEST, le=LARGEST)]],
+    Field(max_length=MOST_NUMBERS),
+]
 Variances = Annotated[
     list[Annotated[FiniteFloat, Field(ge=0.0)]], Field(max_length=MOST_NUMBERS)
 ]
@@ -27,9 +34,11 @@ class Normalize(StrictModel):
     """`VecNormalize`: mean 0 and variance 1, by the statistics of the training."""
 
     kind: Literal["normalize"] = "normalize"
-    mean: Numbers | dict[str, Numbers] = Field(description="In the order of `ravel`.")
-    var: Variances | dict[str, Variances]
-    clip: float = Field(10.0, gt=0.0)
+    mean: Numbers | Annotated[dict[str, Numbers], Field(max_length=_MOST_KEYS)] = Field(
+        description="In the order of `ravel`."
+    )
+    var: Variances | Annotated[dict[str, Variances], Field(max_length=_MOST_KEYS)]
+    clip: float = Field(10.0, gt=0.0, le=LARGEST)
     epsilon: float = Field(1e-8, gt=0.0, le=1.0)
 
 
@@ -135,6 +144,12 @@ def _like(space: Space[Any], stage: Stage) -> Space[Any]:
     if not isinstance(space, spaces.Box) or not space.shape:
         raise TaskError(f"expected observations of numbers, got {space}")
     if isinstance(stage, FrameStack):
+        size = stage.count * int(np.prod(space.shape))
+        if size > MOST_NUMBERS:
+            raise TaskError(
+                f"the policy stacks {size:,} numbers (limit {MOST_NUMBERS:,}): use "
+                "fewer frames"
+            )
         low = np.repeat(space.low, stage.count, axis=-1)
         high = np.repeat(space.high, stage.count, axis=-1)
         return spaces.Box(low, high, dtype=space.dtype.type)

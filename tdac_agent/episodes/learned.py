@@ -70,7 +70,8 @@ class Learned:
         self, file: Path, wrappers: tuple[str, ...], env: JudgedEnv, seed: int = 0
     ) -> None:
         plain: Any = env
-        saved = _saved(file)
+        stamp = _stamp(file)
+        saved = _saved(file, stamp)
         try:
             self._env: Any = wrap_for_rl(plain, wrappers)
             own = self._env.observation_space
@@ -80,7 +81,7 @@ class Learned:
         self._noisy, self._seed = bool(saved and saved.actions == "noisy"), seed
         space, actions = self._after.space, env.action_space
         text = f"{space} {actions}"
-        self._network = _load_network(file, _Spaces(space, actions, text))
+        self._network = _load_network(file, stamp, _Spaces(space, actions, text))
         self._memory: Any = None
 
     def reset(self, observation: Observation) -> None:  # noqa: ARG002
@@ -125,8 +126,23 @@ class _Spaces:
     text: str
 
 
+_Stamp = tuple[tuple[int, int, int] | None, ...]
+
+
+def _stamp(file: Path) -> _Stamp:
+    """What tells a file that was written anew from the old one, as a key of a cache."""
+    found: list[tuple[int, int, int] | None] = []
+    for path in (file, file.with_suffix(".json")):
+        try:
+            status = path.stat()
+            found.append((status.st_mtime_ns, status.st_ino, status.st_size))
+        except OSError:
+            found.append(None)
+    return tuple(found)
+
+
 @lru_cache(maxsize=4)
-def _saved(file: Path) -> SavedPolicy | None:
+def _saved(file: Path, stamp: _Stamp) -> SavedPolicy | None:  # noqa: ARG001
     """Returns what a policy's file records about it.
 
     Raises:
@@ -139,7 +155,7 @@ def _saved(file: Path) -> SavedPolicy | None:
 
 
 @lru_cache(maxsize=4)
-def _load_network(file: Path, fit: _Spaces) -> Any:
+def _load_network(file: Path, stamp: _Stamp, fit: _Spaces) -> Any:  # noqa: ARG001
     """Returns the network of a saved policy, with its weights."""
     try:
         saved = read_policy(file)
@@ -211,8 +227,12 @@ def _build(saved: SavedNetwork, observation: Space[Any], action: Space[Any]) -> 
         with _without_memory():
             return kind(observation, action, lambda _: 0.0, **kwargs)
     # Unsuitable settings can cause various errors.
-    except (TypeError, ValueError, KeyError, AssertionError, RuntimeError) as error:
-        message = f"the policy's settings do not fit its class: {one_line(error)}"
+    except (
+        *(TypeError, ValueError, LookupError, AttributeError, ArithmeticError),
+        *(AssertionError, RuntimeError, MemoryError),
+    ) as error:
+        reason = one_line(error) or type(error).__name__
+        message = f"the policy's settings do not fit its class: {reason}"
         raise ControllerFault(message, "import") from error
 
 

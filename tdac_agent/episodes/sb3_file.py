@@ -22,7 +22,7 @@ from tdac_agent.errors import ControllerFileError
 from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.errors import first_problem, one_line_reason
 from tdac_envs.core.extras import install_command
-from tdac_envs.core.intake import TEXT_BYTES, one_line, parse_json, read_file, read_zip
+from tdac_envs.core.intake import one_line, parse_json, read_file, read_zip
 from tdac_envs.core.strict_model import StrictModel
 
 METADATA = "tdac.json"
@@ -32,6 +32,9 @@ POLICY = "policy.zip"
 DATA = "data"
 MOST_BYTES = 128_000_000
 """Largest size of the file, and of its unpacked parts together."""
+
+METADATA_BYTES = 16_000_000
+"""Largest size of the metadata: the statistics of large observations have room."""
 
 # stable-baselines3 does not compress; another program may.
 _MOST_GROWTH, _SLACK_BYTES = 8, 1_000_000
@@ -181,8 +184,10 @@ def _metadata(file: Path, inside: bytes | None) -> SavedPolicy | None:
     beside = file.with_suffix(".json")
     try:
         text = inside
+        if text is not None and len(text) > METADATA_BYTES:
+            raise ValueError(f"it is larger than {METADATA_BYTES:,} B")
         if text is None and beside.is_file():
-            text = read_file(beside, TEXT_BYTES)
+            text = read_file(beside, METADATA_BYTES)
         return None if text is None else SavedPolicy.model_validate(parse_json(text))
     except (OSError, ValueError) as error:
         raise ControllerFileError(

@@ -269,6 +269,7 @@ def _compete(entrant: Entrant, problem: Problem, part: Part, terms: _Terms) -> D
         episodes_of(problem),
         part,
         source=entrant.source,
+        weights=entrant.weights,
         patience=MOST_LATE if isinstance(problem, Task) else None,
         tier=terms.tier,
         limits=terms.limits,

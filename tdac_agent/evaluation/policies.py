@@ -34,7 +34,7 @@ from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE, read_task_file
 from tdac_agent.verification.judge.drivers import WaypointDriver
 from tdac_agent.verification.judge.policy_spec import Kind, PolicySpec
 from tdac_agent.verification.judge.set_files import write_set
-from tdac_agent.verification.verify import read_source
+from tdac_agent.verification.verify import read_source, weights_file
 from tdac_agent.verification.verify_episodes import written_by
 from tdac_envs.core.dynamics import code_of, code_sha256
 from tdac_envs.core.errors import TaskError, hint, one_line_reason
@@ -44,6 +44,8 @@ from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.learning.wrappers import WRAPPERS, check_wrappers
 
 OURS: tuple[Kind, ...] = ("reference", "random", "go-to-goal", "follow-guidance")
+_ZIPPED = b"PK"
+"""How a zip file begins."""
 BUILTIN, PRIVILEGED = "builtin", "privileged"
 FOLLOWER: Kind = "follow-waypoints"
 EntrantKind = Literal[
@@ -65,7 +67,8 @@ class Entrant:
         env: Environment of its run folder, if it has one.
         set_file: Task set of its run folder, if it was written for one.
         saved: What a learned policy records about its training, if anything.
-        source: Source of a program without a file.
+        source: Source of a program, which drives even if its file changes.
+        weights: Content of its weights, if it has any.
         tuned: Whether its constants were tuned for the problem; None if it has none.
     """
 
@@ -77,6 +80,7 @@ class Entrant:
     set_file: Path | None = None
     saved: SavedPolicy | None = None
     source: bytes | None = None
+    weights: bytes | None = None
     tuned: bool | None = None
 
     @property
@@ -197,27 +201,32 @@ def _controller(name: str, file: Path) -> Entrant:
         raise ControllerFileError(f"no controller.py in {name!r}")
     source = read_source(file)
     check_controller(name, source)
-    weights = file.with_suffix(".npz")
-    if not weights.is_file() or file.name == "controller.py":
-        policy = PolicySpec("controller", file.resolve())
-        return Entrant(name, policy, sha256_of(source), "controller")
-    policy = PolicySpec("controller", file.resolve(), weights=weights.resolve())
-    numbers = _weights(name, weights)
-    both = f"{sha256_of(source)} {sha256_of(numbers)}"
-    return Entrant(name, policy, sha256_of(both), "learned")
+    policy = PolicySpec("controller", file.resolve())
+    beside = weights_file(file)
+    if beside is None:
+        return Entrant(name, policy, sha256_of(source), "controller", source=source)
+    numbers = _weights(name, beside)
+    both = sha256_of(f"{sha256_of(source)} {sha256_of(numbers)}")
+    return Entrant(name, policy, both, "learned", source=source, weights=numbers)
 
 
 def _weights(name: str, file: Path) -> bytes:
     """Content of the weights of a learned controller.
 
     Raises:
-        ControllerFileError: They cannot be read.
+        ControllerFileError: They cannot be read, or are no file of numpy.
     """
     try:
-        return read_file(file, WEIGHTS_BYTES)
+        if file.is_symlink():
+            # A file that the controller must not read, perhaps.
+            raise ValueError("it is a link: copy the file")
+        content = read_file(file, WEIGHTS_BYTES)
+        if not content.startswith(_ZIPPED):
+            raise ValueError("expected a file of numpy.savez")
     except (OSError, ValueError) as error:
         reason = one_line_reason(error)
         raise ControllerFileError(f"{name!r}: weights {file}: {reason}") from error
+    return content
 
 
 def _env_of(run_folder: Path) -> str | None:
@@ -255,6 +264,8 @@ def _learned(name: str, file: Path, wrappers: Sequence[str] | None) -> Entrant:
     if not found.complete:
         # The same network with other observations is another policy.
         content += json.dumps(names).encode()
+        if saved is not None and (saved.after or saved.actions != "likely"):
+            content += saved.model_dump_json(include={"after", "actions"}).encode()
     policy = PolicySpec("sb3", file.resolve(), names)
     return Entrant(name, policy, sha256_of(content), "learned", saved=saved)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 from tdac_agent.errors import Fault
@@ -11,7 +10,6 @@ from tdac_agent.evaluation.policies import Entrant
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.problems.part import Part
 from tdac_agent.sandbox import SandboxError
-from tdac_agent.storage.files import write_atomic
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.episode_job import (
@@ -20,6 +18,7 @@ from tdac_agent.verification.judge.episode_job import (
     EpisodeRun,
     drive_number,
 )
+from tdac_agent.verification.judge.policy_spec import written
 from tdac_envs.core.arguments import one_of
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import TaskSet
@@ -47,10 +46,7 @@ def drive_episode(
     own = episodes_of(problem)
     with tempfile.TemporaryDirectory(prefix="tdac-play-") as name:
         folder, child_pool = Path(name), ChildPool(ahead=False)
-        policy = entrant.policy
-        if entrant.source is not None:
-            policy = replace(policy, file=folder / "controller.py")
-            write_atomic(folder / "controller.py", entrant.source)
+        policy = written(entrant.policy, folder, entrant.source, entrant.weights)
         job = EpisodeJob(
             worlds=own.worlds(part, folder, policy),
             policy=policy,

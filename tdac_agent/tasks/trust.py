@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from tdac_agent.storage.hashes import sha256_of, sha256_of_file
 from tdac_agent.tasks.task import Task
@@ -34,6 +35,9 @@ class NotTrustedError(TdacError):
     def __init__(self, lines: Iterable[str]) -> None:
         self.lines = tuple(lines)
         super().__init__("; ".join(self.lines))
+
+    def __reduce__(self) -> Any:
+        return type(self), (self.lines,)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,14 @@ Needs the extra `tdac[sb3]`.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from pydantic import ValidationError
 from stable_baselines3.common.vec_env import (
     DummyVecEnv,
     SubprocVecEnv,
@@ -21,9 +23,10 @@ from stable_baselines3.common.vec_env import (
 )
 from stable_baselines3.common.vec_env.base_vec_env import VecEnv, VecEnvWrapper
 
-from tdac_agent.episodes.after_wrappers import FrameStack, Normalize, Stage
+from tdac_agent.episodes.after_wrappers import LARGEST, FrameStack, Normalize, Stage
 from tdac_agent.episodes.sb3_file import SavedPolicy, write_metadata
 from tdac_agent.errors import RunError
+from tdac_envs.core.errors import first_problem
 from tdac_envs.learning.sb3 import SB3VecEnv
 from tdac_envs.learning.wrapped_vector import WrappedVectorEnv
 from tdac_envs.learning.wrappers import WRAPPERS
@@ -68,9 +71,27 @@ def save_policy(model: Any, file: Path | str, *, noisy: bool = False) -> SavedPo
     envs: VecEnv | None = model.get_env()
     if envs is None:
         raise RunError("the model has no environments: give it some with set_env")
+    try:
+        saved = _saved(model, envs, noisy)
+    except ValidationError as error:
+        raise RunError(f"cannot record the policy: {first_problem(error)}") from None
+    draft = path.with_name(f".{path.name}")
+    try:
+        model.save(draft)
+        write_metadata(draft, saved)
+        os.replace(draft, path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            draft.unlink()
+        raise RunError(f"cannot write {path}: {error.strerror}") from error
+    return saved
+
+
+def _saved(model: Any, envs: VecEnv, noisy: bool) -> SavedPolicy:
+    """What is recorded about a model."""
     after, inner = _after(envs)
     names, plain = _wrappers(inner)
-    saved = SavedPolicy(
+    return SavedPolicy(
         algo=_ALGOS.get(type(model).__name__, type(model).__name__.lower()),
         wrappers=names,
         after=after,
@@ -79,14 +100,6 @@ def save_policy(model: Any, file: Path | str, *, noisy: bool = False) -> SavedPo
         seed=model.seed,
         **_where(plain),
     )
-    draft = path.with_name(f".{path.name}")
-    try:
-        model.save(draft)
-        write_metadata(draft, saved)
-        os.replace(draft, path)
-    except OSError as error:
-        raise RunError(f"cannot write {path}: {error.strerror}") from error
-    return saved
 
 
 def _after(envs: VecEnv) -> tuple[tuple[Stage, ...], VecEnv]:
@@ -111,7 +124,8 @@ def _normalize(envs: VecNormalize) -> Normalize:
         var: Any = {key: _list(own.var) for key, own in found.items()}
     else:
         mean, var = _list(found.mean), _list(found.var)
-    return Normalize(mean=mean, var=var, clip=envs.clip_obs, epsilon=envs.epsilon)
+    clip = min(float(envs.clip_obs), LARGEST)
+    return Normalize(mean=mean, var=var, clip=clip, epsilon=envs.epsilon)
 
 
 def _list(numbers: Any) -> list[float]:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import multiprocessing
-import queue
 from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tdac_agent.errors import RunError
+from tdac_agent.training.checkpoint_marks import check
 from tdac_agent.training.curve import Point
-from tdac_agent.training.plan import TrainingPlan
-from tdac_agent.training.train import train
+from tdac_agent.training.plan import MOST_SEED, TrainingPlan
+from tdac_agent.training.train import prepare, train
+from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.slices import available_cores
 
 SeedWatch = Callable[[int, int, Point | None], None]
@@ -52,59 +52,83 @@ def train_seeds(
         The learning curve of each seed.
 
     Raises:
+        NotTrustedError: As for `train`.
         RunError: As for `train`, or a process was killed.
-        TaskError: As for `train`.
+        TaskError: As for `train`. All other trainings have ended then.
     """
+    plans = [_with_seed(plan, seed) for seed in seeds]
+    for each in plans:
+        own = seed_folder(folder, each.seed)
+        prepare(own, each)
+        check(own, trust=trust)
     # Spawned: torch and compiled code have threads, which a fork does not copy.
     context = multiprocessing.get_context("spawn")
-    with context.Manager() as manager:
-        told: Any = manager.Queue()
-        at_once = min(available_cores(), len(seeds))
-        pool = ProcessPoolExecutor(at_once, context, max_tasks_per_child=1)
-        try:
-            running = {
-                seed: pool.submit(
-                    _train_one,
-                    plan.model_copy(update={"seed": seed}),
-                    seed_folder(folder, seed),
-                    trust,
-                    max(available_cores() // at_once, 1),
-                    told,
-                )
-                for seed in seeds
-            }
-            _follow(list(running.values()), told, watch)
-            return {seed: each.result() for seed, each in running.items()}
-        except BrokenProcessPool as error:
-            raise RunError(
-                f"a training was killed; the same command continues in {folder}"
-            ) from error
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+    told: Any = context.SimpleQueue()
+    stop = context.Event()
+    at_once = min(available_cores(), len(seeds))
+    pool = ProcessPoolExecutor(
+        at_once,
+        context,
+        initializer=_begin,
+        initargs=(told, stop),
+        max_tasks_per_child=1,
+    )
+    threads = max(available_cores() // at_once, 1)
+    try:
+        running = {
+            each.seed: pool.submit(
+                _train_one, each, seed_folder(folder, each.seed), trust, threads
+            )
+            for each in plans
+        }
+        _follow(list(running.values()), told, watch)
+        return {seed: each.result() for seed, each in running.items()}
+    except BrokenProcessPool as error:
+        raise RunError(
+            f"a training was killed; the same command continues in {folder}"
+        ) from error
+    finally:
+        stop.set()
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _with_seed(plan: TrainingPlan, seed: int) -> TrainingPlan:
+    """The plan with another seed.
+
+    Raises:
+        TaskError: The seed is too large.
+    """
+    whole_number("seed", seed, 0, MOST_SEED)
+    return plan.model_copy(update={"seed": seed})
+
+
+_parent: dict[str, Any] = {}
+"""In a process of a training: the queue and the event of the one that started it."""
+
+
+def _begin(told: Any, stop: Any) -> None:
+    """Prepares a process."""
+    _parent.update(told=told, stop=stop)
 
 
 def _train_one(
-    plan: TrainingPlan, folder: Path, trust: bool, threads: int, told: Any
+    plan: TrainingPlan, folder: Path, trust: bool, threads: int
 ) -> list[Point]:
+    told, stop = _parent["told"], _parent["stop"]
+    starter = multiprocessing.parent_process()
+
     def watch(steps: int, point: Point | None, _: Point | None) -> None:
+        if stop.is_set() or starter is None or not starter.is_alive():
+            raise RunError(f"the training in {folder} was interrupted")
         told.put((plan.seed, steps, point))
 
     return train(plan, folder, watch, trust=trust, threads=threads)
 
 
 def _follow(running: list[Future[Any]], told: Any, watch: SeedWatch) -> None:
-    """Passes on what the processes tell, until all have ended or one has failed."""
-    look = partial(told.get, timeout=_OFTEN)
-    while not all(each.done() for each in running):
-        failed = [e for e in running if e.done() and e.exception() is not None]
-        if failed:
-            failed[0].result()
-        try:
-            watch(*look())
-        except queue.Empty:
-            continue
-    while True:
-        try:
-            watch(*told.get_nowait())
-        except queue.Empty:
-            return
+    """Passes on what the processes tell, until all have ended."""
+    left: Any = running
+    while left:
+        left = wait(left, _OFTEN).not_done
+        while not told.empty():
+            watch(*told.get())

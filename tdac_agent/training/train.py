@@ -52,7 +52,7 @@ def train(
     check_extra()
     from tdac_agent.training.learning import learn
 
-    _prepare(folder, plan)
+    prepare(folder, plan)
     with hold(folder / LOCK_FILE) as held:
         if not held:
             raise RunError(f"another process trains in {folder}")
@@ -73,7 +73,12 @@ def check_extra() -> None:
         raise TaskError(needed) from error
 
 
-def _prepare(folder: Path, plan: TrainingPlan) -> None:
+def prepare(folder: Path, plan: TrainingPlan) -> None:
+    """Makes the folder of a training, with its plan.
+
+    Raises:
+        RunError: As for `train`.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         refuse_links(folder, "*")

@@ -5,13 +5,12 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from tdac_agent.problems.part import Episodes, Part, identity_of
 from tdac_agent.sandbox import CONFINING, Limits
 from tdac_agent.sandbox.exposure import exposure
-from tdac_agent.storage.files import write_atomic
 from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.verification.diagnosis.report import Report
@@ -23,7 +22,7 @@ from tdac_agent.verification.episode_report import (
 )
 from tdac_agent.verification.judge.confirming import EndingTest
 from tdac_agent.verification.judge.episode_job import EpisodeJob
-from tdac_agent.verification.judge.policy_spec import PolicySpec
+from tdac_agent.verification.judge.policy_spec import PolicySpec, written
 from tdac_agent.verification.judge.set_checks import CHECKS_FILE, Checks, checks_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.ledger import SEQUENTIAL, HiddenEvaluation, on_record
@@ -54,7 +53,7 @@ class Request:
         sha256: Hash of its file.
         episodes: The task or the task set.
         part: Which of its episodes.
-        source: Source of a controller without a file.
+        source: Source of a controller, instead of its file.
         test: A test that may end them early; then there are no scores.
         lineage: Id of the run that wrote a controller, if one did.
         patience: Time-outs after which the rest is skipped; None for never.
@@ -63,6 +62,7 @@ class Request:
         trajectories: Whether the trajectories of public episodes are kept.
         own_tests: Runs the user's own tests on a set; without a pass, nothing is
             driven.
+        weights: Content of the controller's weights, if it has any.
     """
 
     policy: PolicySpec
@@ -77,6 +77,7 @@ class Request:
     limits: Limits | None = None
     trajectories: bool = False
     own_tests: Callable[[], Report] | None = None
+    weights: bytes | None = None
 
 
 def drive(
@@ -209,9 +210,7 @@ def _driven(
         unfinished(None if request.test else out, about) as kept,
     ):
         folder = Path(name)
-        if request.source is not None:
-            policy = replace(policy, file=folder / "controller.py")
-            write_atomic(folder / "controller.py", request.source)
+        policy = written(policy, folder, request.source, request.weights)
         lasting = (kept or folder).resolve()
         keeps = request.trajectories and told and out is not None
         job = EpisodeJob(

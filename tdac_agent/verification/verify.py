@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -226,6 +227,15 @@ def read_source(controller: str | bytes | Path) -> bytes:
     except OSError as error:
         message = f"cannot read the controller {str(controller)!r}: {error.strerror}"
         raise ControllerFileError(message) from error
+
+
+def weights_file(controller: Path) -> Path | None:
+    """What lies beside a learned controller as its weights, `NAME.npz`, if anything.
+
+    Controllers of runs have none.
+    """
+    file = controller.with_suffix(".npz")
+    return file if file.name != "controller.npz" and os.path.lexists(file) else None
 
 
 def _prepare(job: Job, source: bytes, suites: dict[str, Path]) -> None:

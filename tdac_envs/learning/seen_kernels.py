@@ -45,6 +45,20 @@ MARGIN = RING + 1
 """Cells at the edges of a map where no robot is."""
 
 
+@subkernel
+def inside(at: float, side: int) -> float:
+    """The nearest place within the margins of a map; the middle if it is not known."""
+    if math.isnan(at):
+        return float(side // 2)
+    return min(max(at, float(MARGIN)), float(side - 1 - MARGIN))
+
+
+@subkernel
+def cell_of(at: float, side: int) -> int:
+    """The cell of a place along one axis; -1 outside of the map, or if not known."""
+    return int(at + 0.5) if -0.5 <= at < side - 0.5 else -1
+
+
 @kernel
 def add_scans(
     rows: NDArray[np.int64],
@@ -71,11 +85,12 @@ def add_scans(
         visits: Shape (n, side, side): steps in a cell, at most 255.
     """
     side = walls.shape[1]
-    most = float(side - 1 - MARGIN)
     for i in rows:
-        x, y, heading = poses[i]
-        x = min(max(x, float(MARGIN)), most)
-        y = min(max(y, float(MARGIN)), most)
+        x, y, heading = (
+            inside(poses[i, 0], side),
+            inside(poses[i, 1], side),
+            poses[i, 2],
+        )
         at_y, at_x = int(y + 0.5), int(x + 0.5)
         if visits[i, at_y, at_x] < 255:
             visits[i, at_y, at_x] += 1
@@ -91,8 +106,8 @@ def add_scans(
             dy = sine * rays[ray, 0] + cosine * rays[ray, 1]
             _free(walls[i], costs[i], from_x, from_y, dx, dy, reach - _SHORT)
             if part < 0.9999:
-                cell_x = int(from_x + reach * dx + 0.5)
-                cell_y = int(from_y + reach * dy + 0.5)
+                cell_x = cell_of(from_x + reach * dx, side)
+                cell_y = cell_of(from_y + reach * dy, side)
                 _hit(walls[i], costs[i], cell_x, cell_y)
 
 
@@ -108,9 +123,9 @@ def _free(
 ) -> None:
     """Notes that a ray passed."""
     side = walls.shape[0]
-    last_x, last_y, far = -1, -1, 0.0
+    last_x, last_y, far = -2, -2, 0.0
     while far <= reach:
-        cell_x, cell_y = int(x + far * dx + 0.5), int(y + far * dy + 0.5)
+        cell_x, cell_y = cell_of(x + far * dx, side), cell_of(y + far * dy, side)
         far += 0.9
         if cell_x == last_x and cell_y == last_y:
             continue
@@ -183,16 +198,29 @@ def add_walls(
         costs: Shape (side, side), raised.
     """
     height, width = cells.shape
+    # Cells on each side that belong to the same pixel, if cells are smaller.
+    more = math.ceil(max(scale - 1.0, 0.0) / 2.0)
     for y in range(-1, height + 1):
         for x in range(-1, width + 1):
-            inside = 0 <= x < width and 0 <= y < height
-            to_x, to_y = int(x * scale + shift + 0.5), int(y * scale + shift + 0.5)
-            if inside and not cells[y, x]:
-                if walls[to_y, to_x] == UNKNOWN:
-                    walls[to_y, to_x] = _FREE
-            elif walls[to_y, to_x] <= 0:
-                walls[to_y, to_x] = _SURE
-                raise_costs(costs, to_x, to_y)
+            free = 0 <= x < width and 0 <= y < height and not cells[y, x]
+            at_x, at_y = int(x * scale + shift + 0.5), int(y * scale + shift + 0.5)
+            for to_y in range(at_y - more, at_y + more + 1):
+                for to_x in range(at_x - more, at_x + more + 1):
+                    _give(walls, costs, to_x, to_y, free)
+
+
+@subkernel
+def _give(walls: Bytes, costs: Costs, x: int, y: int, free: bool) -> None:
+    """Notes what a given map says of a cell; of several pixels in it, a wall counts."""
+    side = walls.shape[0]
+    if x < RING or y < RING or x >= side - RING or y >= side - RING:
+        return
+    if free:
+        if walls[y, x] == UNKNOWN:
+            walls[y, x] = _FREE
+    elif walls[y, x] <= 0:
+        walls[y, x] = _SURE
+        raise_costs(costs, x, y)
 
 
 @kernel
@@ -224,9 +252,9 @@ def look_around(
             known, been, wall = 0, 0.0, False
             for p in range(points):
                 ahead, aside = samples[k, p]
-                at_x = int(x + cosine * ahead - sine * aside + 0.5)
-                at_y = int(y + sine * ahead + cosine * aside + 0.5)
-                if at_x < 0 or at_y < 0 or at_x >= side or at_y >= side:
+                at_x = cell_of(x + cosine * ahead - sine * aside, side)
+                at_y = cell_of(y + sine * ahead + cosine * aside, side)
+                if at_x < 0 or at_y < 0:
                     continue
                 held = walls[i, at_y, at_x]
                 if held != UNKNOWN:

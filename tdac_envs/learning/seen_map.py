@@ -31,7 +31,7 @@ from tdac_envs.learning.seen_kernels import (
     add_walls,
     look_around,
 )
-from tdac_envs.learning.seen_ways import MOST_AHEAD, look_along
+from tdac_envs.learning.seen_ways import MOST_AHEAD, MOST_SIDE, look_along
 from tdac_envs.map2d.setup import Map2DSetup
 
 Array = NDArray[np.float64]
@@ -98,7 +98,8 @@ class Seeing:
             own: Its original observation space.
 
         Raises:
-            TaskError: It has no ranges, or neither a pose nor odometry.
+            TaskError: It has no ranges, or neither a pose nor odometry; or its map
+                would be too large.
         """
         keys = own.spaces if isinstance(own, spaces.Dict) else {}
         source = None if "pose" in keys else source_of(own)
@@ -119,6 +120,13 @@ class Seeing:
         goal: Any = keys["goal"]
         low, high = float(np.min(goal.low)), float(np.max(goal.high))
         cell = CELL * task.body_radius * per_px
+        side = int(np.ceil((high - low) / cell)) + 2 * MARGIN + 1
+        if side > MOST_SIDE:
+            raise TaskError(
+                f"the robot's own map would have {side:,} x {side:,} cells of half a "
+                f"body radius (limit {MOST_SIDE:,} x {MOST_SIDE:,}): leave out the "
+                "wrappers seen-map and waypoints"
+            )
         return cls(
             radius=task.body_radius * per_px,
             up=scale is not None,
@@ -126,7 +134,7 @@ class Seeing:
             rays=rays,
             directions=np.stack([np.cos(angles), np.sin(angles)], axis=-1)[rays],
             offset=np.array([ahead, turn * aside]) * per_px / cell,
-            side=int(np.ceil((high - low) / cell)) + 2 * MARGIN + 1,
+            side=side,
             shift=MARGIN - low / cell,
             per_px=per_px,
             source=source,

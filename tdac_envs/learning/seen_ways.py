@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.compiled import kernel, subkernel
-from tdac_envs.learning.seen_kernels import MARGIN, WALL, Array, Costs
+from tdac_envs.learning.seen_kernels import MARGIN, WALL, Array, Costs, inside
 
 MOST_AHEAD = 128
 """Points of a route that are kept."""
@@ -25,6 +25,8 @@ _DY = np.array([0, 0, 1, -1, 1, -1, 1, -1])
 _BACK = np.array([1, 0, 3, 2, 7, 6, 5, 4])
 _STRAIGHT, _DIAGONAL = 5, 7
 _CELL_BITS, _REST_BITS = 20, 13
+MOST_SIDE = 1 << _CELL_BITS // 2
+"""Largest width and height of a map, cells."""
 
 
 @kernel
@@ -56,11 +58,9 @@ def look_along(
     spent = np.zeros(side * side, np.int32)
     ways = np.zeros(side * side, np.int8)
     heap = np.zeros(1 << 12, np.int64)
-    low, high = float(MARGIN), float(side - 1 - MARGIN)
     for i in rows:
-        x, y = min(max(poses[i, 0], low), high), min(max(poses[i, 1], low), high)
-        goal_x = min(max(goals[i, 0], low), high)
-        goal_y = min(max(goals[i, 1], low), high)
+        x, y = inside(poses[i, 0], side), inside(poses[i, 1], side)
+        goal_x, goal_y = inside(goals[i, 0], side), inside(goals[i, 1], side)
         late = steps[i] - routed[i, _SINCE] >= _EVERY
         if late or not _lasts(routes[i], routed[i], costs[i]):
             spent[:] = 0

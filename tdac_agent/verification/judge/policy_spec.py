@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
+
+from tdac_agent.storage.files import write_atomic
 
 Kind = Literal[
     "controller",
@@ -53,3 +55,23 @@ class PolicySpec:
         if "seen-map" in self.wrappers:
             return "+ memory"
         return "nothing" if self.kind == "random" else "sensors"
+
+
+def written(
+    policy: PolicySpec, folder: Path, source: bytes | None, weights: bytes | None
+) -> PolicySpec:
+    """A policy with files of its own, which nobody else changes.
+
+    Args:
+        policy: The policy.
+        folder: Folder in which the files are written.
+        source: Source of a controller; None for the file that the policy has.
+        weights: Content of its weights, if it has any.
+    """
+    if source is not None:
+        policy = replace(policy, file=folder / "controller.py")
+        write_atomic(folder / "controller.py", source)
+    if weights is not None:
+        policy = replace(policy, weights=folder / "controller.npz")
+        write_atomic(folder / "controller.npz", weights)
+    return policy

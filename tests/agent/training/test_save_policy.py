@@ -1,6 +1,7 @@
 """Policies of other trainings: what they were trained with goes with them."""
 
 import json
+import os
 import zipfile
 
 import gymnasium as gym
@@ -12,6 +13,9 @@ from tdac_agent.bench.bench import bench
 from tdac_agent.episodes.sb3_file import read_policy
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
+from tdac_agent.evaluation.policies import entrant_of, fitted
+from tdac_agent.evaluation.replay import drive_episode
+from tdac_agent.problems.part import Part
 from tdac_agent.training.save_policy import save_policy
 from tdac_envs import load_set, wrap_for_rl
 
@@ -145,28 +149,82 @@ def test_what_cannot_be_recorded_is_refused(level, tmp_path):
     assert SubprocVecEnv is not None
 
 
+def changed(file, **parts):
+    """Replaces parts of a policy's file, by functions of their values."""
+    with zipfile.ZipFile(file) as old:
+        held = {name: old.read(name) for name in old.namelist()}
+    for name, change in parts.items():
+        key = {"record": "tdac.json"}.get(name, name)
+        held[key] = json.dumps(change(json.loads(held[key]))).encode()
+    with zipfile.ZipFile(file, "w") as new:
+        for name, content in held.items():
+            new.writestr(name, content)
+
+
+SCALED = {"kind": "normalize", "mean": [0.0] * 77, "var": [1.0] * 77}
+MANY = {str(number): [0.0] for number in range(65)}
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    """A set, and the file of a policy for it."""
+    folder = tmp_path_factory.mktemp("trained")
+    level = write_short_set(folder / "few.yaml", 30, name="few")
+    save_policy(learned(batch(level)), folder / "mine.zip")
+    return level, folder / "mine.zip"
+
+
 @pytest.mark.parametrize(
     ("after", "match"),
     [
-        ([{"kind": "normalize", "mean": [0.0], "var": [1.0]}], "normalises 1 numbers"),
-        ([{"kind": "normalize", "mean": [0.0], "var": [-1.0]}], "var"),
+        ([SCALED | {"mean": [0.0], "var": [1.0]}], "normalises 1 numbers"),
+        ([SCALED | {"var": [-1.0]}], "var"),
+        ([SCALED | {"mean": [1e300]}], "mean"),
+        ([SCALED | {"clip": 1e300}], "clip"),
+        ([SCALED | {"clip": float("inf")}], "finite"),
+        ([SCALED | {"mean": MANY, "var": MANY}], "valid list"),
         ([{"kind": "frames", "count": 1000}], "at most 64"),
+        ([{"kind": "frames", "count": 64}] * 8, "stacks [0-9,]* numbers"),
         ([{"kind": "pickle", "file": "x"}], "expected"),
+        ([{"kind": "frames", "count": 1, "x": "a" * 17_000_000}], "is larger than"),
     ],
 )
-def test_a_record_that_does_not_fit_is_refused(level, tmp_path, after, match):
-    """Before anything is driven."""
-    file = tmp_path / "mine.zip"
-    save_policy(learned(batch(level)), file)
-    with zipfile.ZipFile(file) as old:
-        parts = {name: old.read(name) for name in old.namelist()}
-    record = json.loads(parts.pop("tdac.json"))
-    with zipfile.ZipFile(file, "w") as new:
-        for name, content in parts.items():
-            new.writestr(name, content)
-        new.writestr("tdac.json", json.dumps(record | {"after": after}))
+def test_a_record_that_does_not_fit_is_refused(trained, tmp_path, after, match):
+    """Before anything is driven, and before it takes memory."""
+    level, file = trained
+    own = tmp_path / "own.zip"
+    own.write_bytes(file.read_bytes())
+    changed(own, record=lambda record: record | {"after": after})
     with pytest.raises(ControllerFileError, match=match):
-        evaluate([file], [load_set(level)], 1, split="dev")
+        evaluate([own], [load_set(level)], 1, split="dev")
+
+
+@pytest.mark.parametrize("name", ["CombinedExtractor", "NatureCNN"])
+def test_an_extractor_that_does_not_fit_is_refused(trained, tmp_path, name):
+    """Extractors of pictures or of a Dict, for a row of numbers."""
+    level, file = trained
+    own = tmp_path / "own.zip"
+    own.write_bytes(file.read_bytes())
+    kind = f"<class 'stable_baselines3.common.torch_layers.{name}'>"
+    kwargs = {"features_extractor_class": kind}
+    changed(own, data=lambda data: data | {"policy_kwargs": kwargs})
+    with pytest.raises(ControllerFileError, match="settings do not fit its class"):
+        evaluate([own], [load_set(level)], 1, split="dev")
+
+
+def test_statistics_without_bounds_are_recorded_or_refused(level, tmp_path):
+    """No clipping is clipping at a huge number; what is not a number is refused."""
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    envs = VecNormalize(batch(level), clip_obs=np.inf)
+    model = learned(envs)
+    (stage,) = save_policy(model, tmp_path / "mine.zip").after
+    assert stage.clip == 1e30
+    assert read_policy(tmp_path / "mine.zip").saved.after == (stage,)
+    envs.obs_rms.mean[0] = np.nan
+    with pytest.raises(RunError, match="cannot record the policy"):
+        save_policy(model, tmp_path / "other.zip")
+    assert not list(tmp_path.glob("*other*"))
 
 
 WEIGHTED = """
@@ -199,3 +257,67 @@ def test_another_trainers_policy_has_its_weights_beside_it(level, tmp_path):
     (tmp_path / "mine.npz").write_bytes(bytes(17 << 20))
     with pytest.raises(ControllerFileError, match="weights"):
         evaluate([file], [tasks], 2, split="dev")
+
+
+@pytest.mark.parametrize("odd", ["link", "lost link", "pipe", "folder", "text"])
+def test_odd_weights_are_refused(tmp_path, odd):
+    """Links could show the controller any file; a pipe could wait for ever."""
+    controller, weights = tmp_path / "mine.py", tmp_path / "mine.npz"
+    controller.write_text(WEIGHTED)
+    np.savez(tmp_path / "other.npz", scale=0.5)
+    if odd.endswith("link"):
+        weights.symlink_to(tmp_path / ("other.npz" if odd == "link" else "none.npz"))
+    elif odd == "pipe":
+        os.mkfifo(weights)
+    elif odd == "folder":
+        weights.mkdir()
+    else:
+        weights.write_text("a secret")
+    with pytest.raises(ControllerFileError, match=r"'.*': weights .*mine\.npz: \w+"):
+        entrant_of(str(controller))
+
+
+def test_what_was_hashed_is_what_drives(level, tmp_path):
+    """Files of a controller that change after it was named change nothing."""
+    file = tmp_path / "mine.py"
+    file.write_text(WEIGHTED)
+    np.savez(tmp_path / "mine.npz", scale=0.5)
+    tasks = load_set(level)
+    entrant = fitted(entrant_of(str(file)), tasks)
+    first = drive_episode(entrant, tasks, Part((0,), "dev")).row
+    np.savez(tmp_path / "mine.npz", scale=-0.5)
+    file.write_text("def policy(obs):\n    return 0.0, 0.0\n")
+    again = drive_episode(entrant, tasks, Part((0,), "dev")).row
+    assert (first.steps, first.driven) == (again.steps, again.driven)
+    assert entrant_of(str(file)).sha256 != entrant.sha256
+
+
+@pytest.mark.parametrize("command", ["verify", "play"])
+def test_commands_without_weights_say_so(tmp_path, command, tdac):
+    """Instead of a controller that does not find its file."""
+    (tmp_path / "mine.py").write_text(WEIGHTED)
+    np.savez(tmp_path / "mine.npz", scale=0.5)
+    more = ["--video", tmp_path / "x.gif"] if command == "play" else []
+    code, _, err = tdac(command, tmp_path / "mine.py", "--task", "maze", *more)
+    assert code == 2
+    assert "has weights beside it, mine.npz" in err
+
+
+def test_what_a_policy_observes_is_part_of_its_hash(trained, tmp_path):
+    """A record beside the file, with other frames or noise, makes another policy."""
+    file = tmp_path / "mine.zip"
+    with zipfile.ZipFile(trained[1]) as old, zipfile.ZipFile(file, "w") as new:
+        for name in old.namelist():
+            if name != "tdac.json":
+                new.writestr(name, old.read(name))
+    plain = {"algo": "ppo", "wrappers": ["flatten"]}
+    found = set()
+    for more in (
+        {},
+        {"actions": "noisy"},
+        {"after": [{"kind": "frames", "count": 2}]},
+        {"after": [{"kind": "frames", "count": 3}]},
+    ):
+        file.with_suffix(".json").write_text(json.dumps(plain | more))
+        found.add(entrant_of(str(file)).sha256)
+    assert len(found) == 4

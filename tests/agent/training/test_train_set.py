@@ -2,6 +2,9 @@
 
 import csv
 import json
+import pickle
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -10,13 +13,16 @@ import yaml
 from few_worlds import write_short_set
 
 from tdac_agent.bench.bench import bench
-from tdac_agent.episodes.sb3_file import read_policy
+from tdac_agent.episodes.sb3_file import POLICY, read_policy
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
+from tdac_agent.storage.locks import LOCK_FILE, hold
+from tdac_agent.tasks.trust import NotTrustedError
+from tdac_agent.training.checkpoint_marks import CHECKPOINT
 from tdac_agent.training.curve import read_curve
 from tdac_agent.training.hyperparameters import config_file
-from tdac_agent.training.plan import read_plan
-from tdac_agent.training.seeds import train_seeds
+from tdac_agent.training.plan import read_plan, write_plan
+from tdac_agent.training.seeds import seed_folder, train_seeds
 from tdac_agent.training.set_plan import make_set_plan, make_trials
 from tdac_agent.training.train import train
 from tdac_envs import load_set
@@ -273,3 +279,52 @@ def test_seeds_are_trained_side_by_side(few, config, tmp_path):
     (tmp_path / "s" / "seed-4" / "training.json").unlink()
     with pytest.raises(RunError, match="not empty and contains no training"):
         train_seeds(plan, range(3, 5), tmp_path / "s", lambda *_: None)
+
+
+def test_seeds_end_together_and_are_checked_first(few, config, tmp_path):
+    """A seed that fails stops no other; what is wrong at once is told at once."""
+    plan = make_set_plan(few(), steps=128, episodes=2, config=config())
+    with pytest.raises(TaskError, match="expected seed to be a whole number from 0"):
+        train_seeds(plan, range(2**31, 2**31 + 2), tmp_path / "s", lambda *_: None)
+    assert not (tmp_path / "s" / f"seed-{2**31 + 1}").exists()
+    folder = seed_folder(tmp_path / "s", 1)
+    folder.mkdir(parents=True)
+    with hold(folder / LOCK_FILE), pytest.raises(RunError, match="contains no train"):
+        train_seeds(plan, range(1, 3), tmp_path / "s", lambda *_: None)
+    write_plan(folder, plan.model_copy(update={"seed": 1}))
+    (folder / CHECKPOINT).write_text("somebody else's")
+    with pytest.raises(NotTrustedError, match=CHECKPOINT) as told:
+        train_seeds(plan, range(1, 3), tmp_path / "s", lambda *_: None)
+    assert pickle.loads(pickle.dumps(told.value)).lines == told.value.lines
+    (folder / CHECKPOINT).unlink()
+    with hold(folder / LOCK_FILE), pytest.raises(RunError, match="another process tr"):
+        train_seeds(plan, range(1, 4), tmp_path / "s", lambda *_: None)
+    for seed in (2, 3):
+        assert (seed_folder(tmp_path / "s", seed) / POLICY).is_file()
+
+
+@pytest.mark.slow
+def test_processes_of_a_killed_command_end(few, config, tmp_path):
+    """So that the same command can go on."""
+    level, file = few(), config()
+    code = (
+        "import sys\n"
+        "from tdac_agent.training.seeds import train_seeds\n"
+        "from tdac_agent.training.set_plan import make_set_plan\n"
+        "if __name__ == '__main__':\n"
+        f"    plan = make_set_plan({str(level)!r}, steps=10**8, episodes=2,"
+        f" config={str(file)!r})\n"
+        f"    train_seeds(plan, range(2), __import__('pathlib').Path("
+        f"{str(tmp_path / 's')!r}), lambda *_: print('on', flush=True))\n"
+    )
+    script = tmp_path / "run.py"
+    script.write_text(code)
+    command = [sys.executable, str(script)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "on\n"
+        process.kill()
+        # The processes that it started have this pipe, too: it ends with them.
+        process.stdout.read()
+    with hold(seed_folder(tmp_path / "s", 0) / LOCK_FILE) as held:
+        assert held

@@ -8,7 +8,16 @@ from tdac_envs import wrap_for_rl
 from tdac_envs.core.errors import TaskError
 from tdac_envs.grid.grid import body_free
 from tdac_envs.grid.plan import distance_field
+from tdac_envs.learning.seen_kernels import (
+    MARGIN,
+    RING,
+    UNKNOWN,
+    add_scans,
+    add_walls,
+    look_around,
+)
 from tdac_envs.learning.seen_map import AHEAD, BINS, CELL
+from tdac_envs.learning.seen_ways import look_along
 from tdac_envs.learning.wrappers import Frame
 
 LADDER = "TDAC-Ladder-v0"
@@ -132,3 +141,87 @@ def test_a_map_needs_ranges_and_a_pose(made):
         wrap_for_rl(made(LADDER, level="epuck", split="dev"), ["seen-map"])
     with pytest.raises(TaskError, match="expected original observations with"):
         wrap_for_rl(made("TDAC-EPuck-v0"), ["waypoints"])
+
+
+@pytest.mark.parametrize("resolution", [None, 0.05])
+def test_a_given_map_is_the_right_way_up(resolution, tmp_path):
+    """Its walls lie on those of the world, in px and in metres."""
+    scale = resolution or 1.0
+    own = {"radius": 8.0, "axle_length": 11.0, "max_wheel_speed": 30.0}
+    robot = "{" + ", ".join(f"{key}: {size}" for key, size in own.items()) + "}"
+    lines = [
+        "worlds: [{name: mazes}]",
+        *("frame: map", "map: true", f"robot: {robot}"),
+        *([] if resolution is None else [f"resolution: {scale}"]),
+    ]
+    file = tmp_path / "mine.yaml"
+    file.write_text("\n".join(lines))
+    env = gym.make(LADDER, level=str(file), split="dev")
+    env = wrap_for_rl(env, ["seen-map"])
+    env.reset(options={"index": 1})
+    cells = env.unwrapped.task.terrain.grid.cells
+    assert not np.array_equal(cells, cells[::-1])
+    walls = env.maps.walls[0]
+    maps = np.indices(walls.shape)[::-1].reshape(2, -1).T
+    places = np.rint(on_world(env, maps)).astype(int)
+    within = (places >= 2).all(1) & (places < np.array(cells.shape)[::-1] - 2).all(1)
+    (x, y), (to_x, to_y) = places[within].T, maps[within].T
+    near = np.stack([cells[y + dy, x + dx] for dy in (-2, 0, 2) for dx in (-2, 0, 2)])
+    held = walls[to_y, to_x] > 0
+    assert near.any(axis=0)[held].all()
+    assert not near.all(axis=0)[~held].any()
+
+
+@pytest.mark.parametrize("scale", [0.25, 1.0, 2.5, 40.0])
+def test_a_given_map_has_no_gaps(scale):
+    """However small the cells, walls are solid, and nothing is written outside."""
+    side = int(np.ceil(9 * scale)) + 2 * MARGIN + 1
+    walls = np.full((side, side), UNKNOWN, np.int8)
+    costs = np.ones((side, side), np.int16)
+    cells = np.zeros((9, 9), np.bool_)
+    cells[4] = True
+    add_walls(cells, scale, MARGIN + 0.5 * scale, walls, costs)
+    middle = walls[round(MARGIN + 4.5 * scale)]
+    assert (middle[MARGIN + 1 : -MARGIN - 1] > 0).all()
+    assert (walls[:RING] == UNKNOWN).all()
+    assert (walls[-RING:] == UNKNOWN).all()
+
+
+ODD = [np.nan, np.inf, -np.inf, 1e300, -1e300, -1.0, 5.0]
+
+
+@pytest.mark.parametrize("size", [11, 31])
+@pytest.mark.parametrize("odd", ODD)
+@pytest.mark.parametrize("reading", [0.0, 0.5, 1.0, np.inf, np.nan, -1.0])
+def test_odd_numbers_stay_on_the_map(size, odd, reading):
+    """Poses, goals and ranges that no robot has: neither memory nor time is lost."""
+    columns = [[odd, 6.0, 0.0], [6.0, odd, 0.0], [6.0, 6.0, odd], [odd, odd, odd]]
+    poses = np.array(columns)
+    count = len(poses)
+    rows = np.arange(count)
+    walls = np.full((count, size, size), UNKNOWN, np.int8)
+    visits = np.zeros((count, size, size), np.uint8)
+    costs = np.ones((count, size, size), np.int16)
+    ranges = np.full((count, 3), reading, np.float32)
+    rays = np.array([[1.0, 0.0], [0.0, 1.0], [odd, 0.0]])
+    far, offset = np.array([8.0, odd, 1e18, np.inf]), np.array([odd, 0.0])
+    add_scans(rows, poses, ranges, far, rays, offset, walls, costs, visits)
+    assert visits.sum() == count
+    inside = visits[:, MARGIN : size - MARGIN, MARGIN : size - MARGIN]
+    assert inside.sum() == count
+    seen = np.zeros((count, 2, 1), np.float32)
+    look_around(rows, poses, np.array([[[odd, 1.0]]]), walls, visits, seen)
+    assert np.isfinite(seen).all()
+    routes, routed = np.zeros((count, 64, 2), np.int32), np.zeros((count, 3), np.int32)
+    found = np.full((count, 2, 2), np.nan)
+    own = poses, poses[::-1, :2].copy(), np.array([2.0, 4.0]), np.zeros(count)
+    look_along(rows, *own, costs, routes, routed, found)
+    assert ((found >= MARGIN) & (found <= size - MARGIN)).all()
+
+
+def test_an_own_map_has_a_largest_size():
+    """A robot that is tiny in its world gets one clear line, not all memory."""
+    own = {"start": (60, 200, 0.5), "goal": (340, 280), "robot_radius": 0.1}
+    env = gym.make("TDAC-Map2D-v0", map=np.zeros((400, 400), np.bool_), **own)
+    with pytest.raises(TaskError, match="8,011 x 8,011 cells of half a body radius"):
+        wrap_for_rl(env, ["waypoints"])
