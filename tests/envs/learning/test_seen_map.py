@@ -190,7 +190,7 @@ def test_a_given_map_has_no_gaps(scale):
 ODD = [np.nan, np.inf, -np.inf, 1e300, -1e300, -1.0, 5.0]
 
 
-@pytest.mark.parametrize("size", [11, 31])
+@pytest.mark.parametrize("size", [2 * MARGIN + 1, 31])
 @pytest.mark.parametrize("odd", ODD)
 @pytest.mark.parametrize("reading", [0.0, 0.5, 1.0, np.inf, np.nan, -1.0])
 def test_odd_numbers_stay_on_the_map(size, odd, reading):
@@ -223,5 +223,5 @@ def test_an_own_map_has_a_largest_size():
     """A robot that is tiny in its world gets one clear line, not all memory."""
     own = {"start": (60, 200, 0.5), "goal": (340, 280), "robot_radius": 0.1}
     env = gym.make("TDAC-Map2D-v0", map=np.zeros((400, 400), np.bool_), **own)
-    with pytest.raises(TaskError, match="8,011 x 8,011 cells of half a body radius"):
+    with pytest.raises(TaskError, match="16,019 x 16,019 cells of 0.25 body radii"):
         wrap_for_rl(env, ["waypoints"])
