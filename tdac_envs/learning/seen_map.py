@@ -123,8 +123,8 @@ class Seeing:
         side = int(np.ceil((high - low) / cell)) + 2 * MARGIN + 1
         if side > MOST_SIDE:
             raise TaskError(
-                f"the robot's own map would have {side:,} x {side:,} cells of "
-                f"{CELL} body radii (limit {MOST_SIDE:,} x {MOST_SIDE:,}): leave out the "
+                f"the robot's own map would have {side:,} x {side:,} cells of {CELL} "
+                f"body radii (limit {MOST_SIDE:,} x {MOST_SIDE:,}): leave out the "
                 "wrappers seen-map and waypoints"
             )
         return cls(

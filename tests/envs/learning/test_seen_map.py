@@ -223,5 +223,5 @@ def test_an_own_map_has_a_largest_size():
     """A robot that is tiny in its world gets one clear line, not all memory."""
     own = {"start": (60, 200, 0.5), "goal": (340, 280), "robot_radius": 0.1}
     env = gym.make("TDAC-Map2D-v0", map=np.zeros((400, 400), np.bool_), **own)
-    with pytest.raises(TaskError, match="16,019 x 16,019 cells of 0.25 body radii"):
+    with pytest.raises(TaskError, match="16,019 x 16,019 cells"):
         wrap_for_rl(env, ["waypoints"])
