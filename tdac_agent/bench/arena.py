@@ -169,8 +169,16 @@ def _about(members: Sequence[Entrant], problem: Problem) -> dict[str, Any]:
         "knows": knows(members[0], problem),
         "tuned": members[0].tuned,
         "steps": None if None in steps else sum(filter(None, steps)),
+        "trained_here": _trained_here(members),
         "files": tuple(BenchFile(sha256=each.sha256) for each in members),
     }
+
+
+def _trained_here(members: Sequence[Entrant]) -> bool | None:
+    """Whether all files record their set, which is then this one."""
+    if members[0].kind != "learned":
+        return None
+    return all(each.saved and each.saved.set_sha256 for each in members)
 
 
 def _note(arena: Arena, entry: Entry, found: Driven, rows: Rows) -> None:

@@ -80,6 +80,10 @@ class BenchRow(StrictRecord):
     steps: int | None = Field(
         None, description="Training steps, up to what was saved, of all its seeds."
     )
+    trained_here: bool | None = Field(
+        None,
+        description="Whether a learned policy records that it was trained on this set.",
+    )
     files: tuple[BenchFile, ...] = ()
     problem: str | None = Field(None, description="Why it did not drive.")
     worlds: int = 0

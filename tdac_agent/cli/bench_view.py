@@ -108,6 +108,8 @@ def _notes(row: BenchRow, knows_map: bool) -> list[str]:
         notes.append(f"{row.entrant} does not get the map")
     if row.tuned is False:
         notes.append(f"{row.entrant} was not tuned for this set")
+    if row.trained_here is False:
+        notes.append(f"{row.entrant} does not record on which set it was trained")
     if row.kind == "learned" and len(row.files) == 1:
         notes.append(f"{row.entrant}: a single seed")
     if row.clock_dependent is not None:

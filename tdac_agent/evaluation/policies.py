@@ -97,9 +97,8 @@ def entrants_of(
 
     Args:
         policies: `reference`, `builtin`, `random`, `go-to-goal`, `follow-guidance`,
-            `follow-waypoints`,
-            names of planners, controller files, folders of runs and trainings,
-            policies saved by stable-baselines3.
+            `follow-waypoints`, names of planners, controller files, folders of runs
+            and trainings, policies saved by stable-baselines3.
         wrappers: Wrappers of saved policies that do not record their own.
 
     Raises:

@@ -248,6 +248,7 @@ def test_another_trainers_policy_has_its_weights_beside_it(level, tmp_path):
     one = evaluate([file], [tasks], 2, split="dev")
     (row,) = bench([str(file)], [level], "dev", 2, out=tmp_path / "bench").rows
     assert (row.kind, row.worlds) == ("learned", 2)
+    assert row.trained_here is False
     np.savez(tmp_path / "mine.npz", scale=-0.5)
     other = evaluate([file], [tasks], 2, split="dev")
     hashes = {found.rows[0].controller_sha256 for found in (one, other)}

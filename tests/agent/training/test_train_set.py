@@ -131,6 +131,7 @@ def test_a_policy_in_a_bench(trained, few, tmp_path, monkeypatch):
         "learned", "sensors", "controller",
     )  # fmt: skip
     assert 0 < learned.steps <= plan.steps
+    assert (learned.trained_here, program.trained_here) == (True, None)
     hidden = bench(words, [level], "hidden", 3, out=tmp_path / "hidden")
     assert [row.files[0].hidden for row in hidden.rows] == [1, 1]
     ledger = tmp_path / "state" / "tdac" / "hidden-evaluations.jsonl"
