@@ -58,7 +58,7 @@ class Timed(VecEnvWrapper):
         self, envs: Any, clock: Callable[[], float] = time.perf_counter
     ) -> None:
         super().__init__(envs)
-        self.seconds, self._clock = 0.0, clock
+        self.seconds, self.clock = 0.0, clock
 
     def reset(self) -> Any:
         return self._timed(self.venv.reset)
@@ -70,9 +70,9 @@ class Timed(VecEnvWrapper):
         return self._timed(self.venv.step_wait)
 
     def _timed(self, call: Callable[[], Any]) -> Any:
-        began = self._clock()
+        began = self.clock()
         found = call()
-        self.seconds += self._clock() - began
+        self.seconds += self.clock() - began
         return found
 
 
@@ -100,11 +100,16 @@ def speed(case: Case, steps: int) -> Speed:
     ours = model_arguments(make_plan(("maze",)).hyperparameters)
     arguments = ours if case.ours else {"n_steps": ours["n_steps"]}
     model = PPO(case.policy, timed, device="cpu", **arguments)
-    model.learn(model.n_steps * envs.num_envs)
-    before, began = timed.seconds, time.perf_counter()
+    return _measured(model, timed, steps)
+
+
+def _measured(model: Any, timed: Timed, steps: int) -> Speed:
+    """Measures a model after one rollout, by the clock of its environments."""
+    model.learn(model.n_steps * timed.num_envs)
+    before, began = timed.seconds, timed.clock()
     model.learn(steps)
-    took = time.perf_counter() - began
-    envs.close()
+    took = timed.clock() - began
+    timed.close()
     return Speed(model.num_timesteps / took, (timed.seconds - before) / took)
 
 
@@ -125,12 +130,7 @@ def set_speed(level: str, algo: Algo, uses: Uses, steps: int) -> Speed:
     arguments = model_arguments(plan.hyperparameters)
     policy = POLICIES.get(plan.policy, plan.policy)
     model = ALGOS[algo](policy, timed, device="cpu", seed=0, **arguments)
-    model.learn(model.n_steps * plan.n_envs)
-    before, began = timed.seconds, time.process_time()
-    model.learn(steps)
-    took = time.process_time() - began
-    batch.close()
-    return Speed(model.num_timesteps / took, (timed.seconds - before) / took)
+    return _measured(model, timed, steps)
 
 
 def print_sets(steps: int, rounds: int) -> None:

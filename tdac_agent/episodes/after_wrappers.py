@@ -107,11 +107,9 @@ class Stages:
 def _normalizing(stage: Normalize, space: Space[Any]) -> Callable[[Any], Any]:
     numbers: dict[str | None, tuple[Any, Any]] = {}
     for key, own in _parts(space).items():
-        means = (
-            stage.mean.get(key or "") if isinstance(stage.mean, dict) else stage.mean
-        )
-        variances = (
-            stage.var.get(key or "") if isinstance(stage.var, dict) else stage.var
+        means, variances = (
+            each.get(key or "") if isinstance(each, dict) else each
+            for each in (stage.mean, stage.var)
         )
         if means is None or variances is None:
             continue

@@ -204,27 +204,21 @@ class SeenMaps:
         rows = np.flatnonzero((now != self._steps) | (now == 0.0))
         for i in begun.tolist():
             self._begin(i, maps[i])
-        source = self.seeing.source
-        if self._reckoned is not None and source is not None:
-            poses = self._reckoned.follow(seen[source], steps)
-        else:
+        if self._reckoned is None:
             poses = np.asarray(seen["pose"], np.float64)
+        else:
+            poses = self._reckoned.follow(seen[self.seeing.source], steps)
         self._place(poses, seen["goal"])
         self._add(rows, seen["ranges"])
         self._steps = now.copy()
 
     def end(self, rows: NDArray[np.int64], seen: Any) -> None:
         """Adds the last observations of episodes, which others follow."""
-        source = self.seeing.source
-        if self._reckoned is not None and source is not None:
-            poses = self._reckoned.ahead(seen[source])
-        else:
+        if self._reckoned is None:
             poses = np.asarray(seen["pose"], np.float64)
-        before = self._poses.copy(), self._goals.copy()
-        self._place(poses, seen["goal"])
-        others = np.ones(len(poses), np.bool_)
-        others[rows] = False
-        self._poses[others], self._goals[others] = (kept[others] for kept in before)
+        else:
+            poses = self._reckoned.ahead(seen[self.seeing.source])
+        self._place(poses[rows], seen["goal"][rows], rows)
         self._steps[rows] += 1.0
         self._add(rows, seen["ranges"])
 
@@ -287,11 +281,11 @@ class SeenMaps:
                 cells, shift = np.ascontiguousarray(cells[::-1]), shift + 0.5 * scale
             add_walls(cells, scale, shift, self.walls[i], self.costs[i])
 
-    def _place(self, poses: Array, goals: Any) -> None:
+    def _place(self, poses: Array, goals: Any, rows: Any = ...) -> None:
         cell, shift = self.seeing.cell, self.seeing.shift
-        self._poses[:, :2] = poses[:, :2] / cell + shift
-        self._poses[:, 2] = poses[:, 2]
-        self._goals[:] = np.asarray(goals, np.float64) / cell + shift
+        places = poses[:, :2] / cell + shift
+        self._poses[rows] = np.concatenate([places, poses[:, 2:]], axis=-1)
+        self._goals[rows] = np.asarray(goals, np.float64) / cell + shift
 
     def _add(self, rows: NDArray[np.int64], ranges: NDArray[np.float32]) -> None:
         for stale in self._stale.values():
