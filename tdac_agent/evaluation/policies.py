@@ -148,7 +148,8 @@ def entrant_of(
 
 def _follower_sha256() -> str:
     """The hash of the code that follows waypoints."""
-    own = [f"learning/seen_{name}.py" for name in ("map", "kernels", "ways")]
+    files = "seen_map", "seen_kernels", "seen_ways", "body_frame"
+    own = [f"learning/{name}.py" for name in files]
     driver = inspect.getsource(WaypointDriver)
     return sha256_of(code_sha256(*own) + code_of(driver))
 

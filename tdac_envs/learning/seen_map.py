@@ -22,6 +22,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.slices import Slices
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.stepping import STEPS
+from tdac_envs.learning.body_frame import seen_from
 from tdac_envs.learning.dead_reckoning import DeadReckoning, reckoning, source_of
 from tdac_envs.learning.seen_kernels import (
     MARGIN,
@@ -250,12 +251,7 @@ class SeenMaps:
             *(self.costs, self._routes, self._routed, points),
         )
         self._slices.run(lambda part: look_along(part, *own), rows)
-        x, y, heading = (column[:, None] for column in self._poses[rows].T)
-        dx, dy = points[rows, :, 0] - x, points[rows, :, 1] - y
-        cosine, sine = np.cos(heading), np.sin(heading)
-        aside = dy * cosine - dx * sine
-        left = aside if self.seeing.up else -aside
-        seen = np.stack([dx * cosine + dy * sine, left], axis=-1)
+        seen = seen_from(self._poses[rows, None], points[rows], self.seeing.up)
         shares = seen / self._reaches[:, None]
         return np.clip(shares, -1.0, 1.0).astype(np.float32)
 

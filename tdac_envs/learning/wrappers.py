@@ -27,6 +27,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.stepping import STEPS
 from tdac_envs.epuck.infrared import LARGEST
+from tdac_envs.learning.body_frame import seen_from
 from tdac_envs.learning.dead_reckoning import SOURCES, reckoning, source_of
 from tdac_envs.learning.guidance import REACH, GuidedRoute, route_to_goal
 from tdac_envs.learning.map_view import MapView
@@ -93,11 +94,7 @@ class Frame:
             poses: Shape (…, 3): x, y, heading.
             places: Shape (…, 2).
         """
-        pose = np.asarray(poses, np.float64)
-        dx, dy = np.moveaxis(np.asarray(places) - pose[..., :2], -1, 0)
-        cos, sin = np.cos(pose[..., 2]), np.sin(pose[..., 2])
-        left = dy * cos - dx * sin
-        return np.stack([dx * cos + dy * sin, left if self.up else -left], axis=-1)
+        return seen_from(poses, places, self.up)
 
     def goal_relative(self, observation: Observation) -> Observation:
         """Converts an observation, or a batch, as `GoalRelativeObservation` does.
