@@ -14,9 +14,11 @@ learning curves of the finished ones to a folder that is small enough to be kept
 from __future__ import annotations
 
 import argparse
+import itertools
 import multiprocessing
 import shutil
 import sys
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -40,34 +42,29 @@ KINDS: dict[str, tuple[Algo, Uses]] = {
 """Algorithm, and what the policy uses, by name."""
 STEPS = {"2M": 2_000_000, "10M": 10_000_000, "50M": 50_000_000}
 HEADLINE, OTHERS = ("unknown", "floor"), ("lost", "known", "moving", "crowd")
-SEEDS, HEADLINE_SEEDS = range(5), range(10)
+
+
+def _each(
+    steps: str, seeds: range, levels: tuple[str, ...], kinds: Iterable[str]
+) -> list[tuple[str, str, str, int]]:
+    """Trainings of a budget: all of one seed before those of the next."""
+    drawn = itertools.product(seeds, levels, kinds)
+    return [(kind, level, steps, seed) for seed, level, kind in drawn]
+
+
 TRAININGS = [
-    *(
-        (kind, level, steps, seed)
-        for steps in ("10M", "2M")
-        for levels in (HEADLINE, OTHERS)
-        for seed in SEEDS
-        for level in levels
-        for kind in KINDS
-    ),
-    *(
-        (kind, "epuck", steps, seed)
-        for steps in ("10M", "2M")
-        for seed in SEEDS
-        for kind in ("recurrent-ppo", "ppo")
-    ),
-    *(
-        (kind, level, "10M", seed)
-        for seed in HEADLINE_SEEDS[len(SEEDS) :]
-        for level in HEADLINE
-        for kind in KINDS
-    ),
-    *(
-        (kind, level, "50M", seed)
-        for seed in SEEDS
-        for level in HEADLINE
-        for kind in ("ppo", "ppo-planner")
-    ),
+    # Three seeds of everything first, so that each stop leaves something to compare.
+    *_each("2M", range(3), HEADLINE + OTHERS, KINDS),
+    *_each("10M", range(3), HEADLINE, ("ppo", "ppo-planner", "ppo-memory")),
+    *_each("2M", range(3), ("epuck",), ("ppo", "recurrent-ppo")),
+    *_each("2M", range(3, 5), HEADLINE + OTHERS, KINDS),
+    *_each("10M", range(3, 5), HEADLINE, ("ppo", "ppo-planner", "ppo-memory")),
+    *_each("10M", range(5), HEADLINE, ("recurrent-ppo",)),
+    *_each("10M", range(5), OTHERS, KINDS),
+    *_each("2M", range(3, 5), ("epuck",), ("ppo", "recurrent-ppo")),
+    *_each("10M", range(5), ("epuck",), ("ppo", "recurrent-ppo")),
+    *_each("10M", range(5, 10), HEADLINE, KINDS),
+    *_each("50M", range(5), HEADLINE, ("ppo", "ppo-planner")),
 ]
 """Kind, level, steps and seed."""
 NAMES = {"-".join(map(str, each)): each for each in TRAININGS}
