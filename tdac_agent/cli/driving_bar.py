@@ -32,6 +32,7 @@ class DrivingBar:
         is_long: Whether to show the time left, and elsewhere a line now and then.
         cut: What follows if it is interrupted, such as `not verified`. It is printed
             with what was driven.
+        reaching: Whether to show how many reached the goal.
     """
 
     def __init__(
@@ -42,13 +43,15 @@ class DrivingBar:
         *,
         is_long: bool = False,
         cut: str | None = None,
+        reaching: bool = True,
     ) -> None:
         self._console, self._most, self._cut = console, most, cut
+        self._reaching = reaching
         columns = (
             TextColumn("{task.fields[doing]}"),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("{task.fields[successes]} reached"),
+            *([TextColumn("{task.fields[successes]} reached")] if reaching else []),
             *([TimeRemainingColumn()] if is_long else []),
         )
         # Redrawn only on updates: a timer would cost CPU time.
@@ -74,8 +77,8 @@ class DrivingBar:
         if kind is KeyboardInterrupt and self._cut is not None:
             driven, successes = self.counts
             reached = f"{driven} of {self._most} {self._doing}"
-            failed = f"{driven - successes} failed"
-            text = f"interrupted after {reached}, {failed}; {self._cut}"
+            failed = f", {driven - successes} failed" if self._reaching else ""
+            text = f"interrupted after {reached}{failed}; {self._cut}"
             print_plain(self._console, text)
 
     def show(self, episodes: int, successes: int, doing: str | None = None) -> None:
@@ -94,3 +97,12 @@ class DrivingBar:
             self._next = now + SECONDS
             line = f"{self._doing}: the goal reached in {successes} of {episodes} …"
             print(line, file=sys.stderr, flush=True)
+
+    def show_count(self, episodes: int) -> None:
+        """Shows the episodes alone, where success is not what is looked for."""
+        self.counts = episodes, self.counts[1]
+        self._bar.update(self._row, completed=min(episodes, self._most), refresh=True)
+        now = time.monotonic()
+        if self._prints_lines and now >= self._next:
+            self._next = now + SECONDS
+            print(f"{self._doing}: {episodes} …", file=sys.stderr, flush=True)

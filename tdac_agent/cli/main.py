@@ -92,6 +92,7 @@ PARTS = {
     "mcp_flags": ("mcp",),
     "verify_flags": ("verify",),
     "play_flags": ("play",),
+    "falsify_flags": ("falsify",),
     "evaluate_flags": ("evaluate",),
     "bench_flags": ("bench",),
     "train_flags": ("train",),

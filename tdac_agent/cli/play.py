@@ -15,6 +15,7 @@ from tdac_agent.cli.controller_choice import (
     with_own_set,
 )
 from tdac_agent.cli.display import has_display
+from tdac_agent.cli.falsify import part_of, pictures_of
 from tdac_agent.cli.film import film_of
 from tdac_agent.cli.play_flags import PlayOptions
 from tdac_agent.cli.printed import show_printed
@@ -30,6 +31,7 @@ from tdac_agent.evaluation.replay import check_shown, drive_episode
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.problems.part import Part
 from tdac_agent.storage.plain import one_line
+from tdac_agent.tasks.deviation import deviation_of
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.task import Task, write_workdir
@@ -66,6 +68,8 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
     if note := change_note(options.controller, flags):
         print(note)
     source = read_source(file)
+    if options.deviation is not None:
+        return _play_deviated(task, source, options)
     if options.seed is None:
         rollout = drive(task, source, name, options.tier)
     else:
@@ -73,6 +77,17 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
         rollout = drive_disturbed(task, source, *setup).rollout
     frames_of = partial(task.pictures().frames, rollout)
     return show(rollout, frames_of, task.name, options)
+
+
+def _play_deviated(task: Task, source: bytes, options: PlayOptions) -> int:
+    """Plays an episode of `tdac falsify`; returns as `run` does."""
+    assert options.deviation is not None
+    deviation = deviation_of(options.deviation)
+    pictures = pictures_of(task, deviation, None, 0)  # fails early
+    entrant = Entrant("", PolicySpec("controller"), source=source)
+    part = part_of(task, options.seed or 0, None)
+    rollout = drive_episode(entrant, task, part, options.tier, deviation).rollout
+    return show(rollout, partial(pictures.frames, rollout), task.name, options)
 
 
 def _play_world(name: str, options: PlayOptions) -> int:
@@ -84,7 +99,10 @@ def _play_world(name: str, options: PlayOptions) -> int:
     entrant = fitted(entrant_of(options.controller, ours=()), tasks)
     task = tasks.task(split, index)
     part = Part((index,), split)
-    rollout = drive_episode(entrant, tasks, part, options.tier).rollout
+    deviation = None
+    if options.deviation is not None:
+        deviation = deviation_of(options.deviation)
+    rollout = drive_episode(entrant, tasks, part, options.tier, deviation).rollout
     title = f"{tasks.name}, {split} {index}"
     return show(rollout, partial(_frames, task, rollout), title, options)
 

@@ -48,6 +48,12 @@ class PlayOptions:
         least=0,
         scope="task",
     )
+    deviation: str | None = option(
+        None,
+        "Let the robot or world differ from what the controller is told, as `tdac "
+        "falsify` prints it: `delay=3,pose_x=0.1`; lengths in body radii.",
+        metavar="NAME=VALUE,…",
+    )
     tier: str = tier_option()
     index: int = option(0, "Number of the world.", least=0, panel=SETS, scope="set")
     split: str = option(

@@ -214,6 +214,9 @@ class Setting(Protocol):
     def make_env(self, **options: Any) -> JudgedEnv:
         """Constructs the environment; `options` override its constructor arguments."""
 
+    def displaced(self, x: float, y: float) -> dict[str, Any]:
+        """Returns the environment's options with all obstacles shifted, px or m."""
+
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the environment's option for relative distance sensor noise."""
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from tdac_agent.environments.epuck.flat_world import flat_world
+from tdac_agent.environments.epuck.moved_world import Motion
 from tdac_agent.environments.epuck.params import WorldParams, params_of
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.setting import Original, Setting
@@ -117,6 +118,12 @@ class EPuckSetting:
     def make_env(self, **options: Any) -> EPuckEnv:
         """Constructs this task's environment; `options` override its arguments."""
         return EPuckEnv(**{**self.env_kwargs(), **options})
+
+    def displaced(self, x: float, y: float) -> dict[str, Any]:
+        """See `Setting`. Floors and their walls stay where they are."""
+        world, shift = self.nominal.ground.world, Motion(0.0, x, y)
+        moved = tuple(map(shift.obstacle, world.obstacles))
+        return {"world": replace(world, obstacles=moved)}
 
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the option for the published noise, scaled to this mean."""

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tdac_agent.environments.map2d.moving import as_option, check_movers
 from tdac_agent.environments.map2d.task_robot import (
     check_robot_image,
@@ -156,6 +158,18 @@ class Map2DSetting:
     def make_env(self, **options: Any) -> Map2DEnv:
         """Constructs this task's environment; `options` override its arguments."""
         return Map2DEnv(**{**self.env_kwargs(), **options})
+
+    def displaced(self, x: float, y: float) -> dict[str, Any]:
+        """See `Setting`. The map moves by whole pixels; what enters it is occupied."""
+        cells = self.nominal.terrain.grid.cells
+        by = round(y), round(x)
+        moved = np.roll(cells, by, (0, 1))
+        rows, columns = (slice(n) if n > 0 else slice(n, None) for n in by)
+        if by[0]:
+            moved[rows] = True
+        if by[1]:
+            moved[:, columns] = True
+        return {"map": moved}
 
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the option for this relative noise of each range."""

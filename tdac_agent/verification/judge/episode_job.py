@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from tdac_agent.episodes.deviated import plain_env
 from tdac_agent.episodes.episode import Driver, not_driven, run_policy
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.sandbox import Child, ControllerFault, Limits, SandboxError
@@ -23,6 +24,7 @@ from tdac_agent.tasks.setting import JudgedEnv
 from tdac_agent.tasks.task import read_task
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.confirming import EndingTest
+from tdac_agent.verification.judge.deviated import DeviatedEpisodes
 from tdac_agent.verification.judge.episode_row import EpisodeRow, driven_row
 from tdac_agent.verification.judge.in_order import in_order
 from tdac_agent.verification.judge.policy_spec import PolicySpec
@@ -36,6 +38,7 @@ from tdac_agent.verification.judge.set_checks import (
 from tdac_agent.verification.judge.task_world import TaskEpisodes
 from tdac_agent.verification.judge.worlds import (
     FOREVER,
+    DeviatedWorlds,
     Program,
     SetWorlds,
     TaskWorld,
@@ -76,7 +79,7 @@ class EpisodeJob(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     kind: Literal["episodes"] = "episodes"
-    worlds: TaskWorld | SetWorlds = Field(discriminator="kind")
+    worlds: TaskWorld | SetWorlds | DeviatedWorlds = Field(discriminator="kind")
     policy: PolicySpec
     numbers: tuple[int, ...]
     checks: bool = False
@@ -141,7 +144,7 @@ class EpisodeRun:
 
     job: EpisodeJob
     child_pool: ChildPool
-    worlds: TaskEpisodes | SetEpisodes
+    worlds: TaskEpisodes | SetEpisodes | DeviatedEpisodes
     program: Program
 
     @classmethod
@@ -156,8 +159,14 @@ class EpisodeRun:
         return cls(job, child_pool, opened(job.worlds), Program(source, weights))
 
 
-def opened(worlds: TaskWorld | SetWorlds) -> TaskEpisodes | SetEpisodes:
+def opened(
+    worlds: TaskWorld | SetWorlds | DeviatedWorlds,
+) -> TaskEpisodes | SetEpisodes | DeviatedEpisodes:
     """Opens the worlds of a job."""
+    if isinstance(worlds, DeviatedWorlds):
+        within = opened(worlds.within)
+        assert not isinstance(within, DeviatedEpisodes)
+        return DeviatedEpisodes(within, worlds)
     if isinstance(worlds, TaskWorld):
         return TaskEpisodes(read_task(worlds.task), worlds)
     # Task sets need much that a task does not; the server imports it in advance.
@@ -248,7 +257,7 @@ def _checked(run: EpisodeRun) -> tuple[Checks, str]:
     results, job, worlds = static_checks(run.program.source), run.job, run.worlds
     if len(results) == 1:  # it does not parse
         return Checks(results=results), job.tier
-    assert not isinstance(worlds, TaskEpisodes)
+    assert not isinstance(worlds, TaskEpisodes | DeviatedEpisodes)
     # A public world, so that a failure tells nothing of hidden ones.
     own = worlds.worlds
     split = public_split(worlds.tasks) or own.split
@@ -274,7 +283,7 @@ def _work(run: EpisodeRun, number: int, skip: bool) -> EpisodeSummary:
     """Drives or skips an episode, and returns what is kept of it."""
     job = run.job
     if job.policy.kind == "privileged":
-        assert not isinstance(run.worlds, TaskEpisodes)
+        assert not isinstance(run.worlds, TaskEpisodes | DeviatedEpisodes)
         row = run.worlds.planned(number)
         return EpisodeSummary(row, UNSANDBOXED, late=False, is_retryable=False)
     driven = _skipped(run, number) if skip else drive_number(run, number)
@@ -315,7 +324,7 @@ def _drive(
 
         began = time.process_time()
         try:
-            rollout = drive(driver_of(policy, record.env, number))
+            rollout = drive(driver_of(policy, plain_env(record.env), number))
         except ControllerFault as fault:
             rollout = not_driven(record, name, fault)
         return rollout, record.env, time.process_time() - began, UNSANDBOXED

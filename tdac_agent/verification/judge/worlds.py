@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from tdac_agent.episodes.episode import Driver, Record
 from tdac_agent.sandbox import Child
+from tdac_agent.tasks.deviation import Deviation
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.setting import JudgedEnv, Nominal
 from tdac_agent.tasks.units import Units
@@ -106,6 +107,35 @@ class SetWorlds(BaseModel):
     split: str
     salt_file: Path | None = None
     hidden_folder: Path | None = None
+
+
+class Case(BaseModel):
+    """An episode in which something differs from what the controller is told.
+
+    Attributes:
+        number: The episode: a seed of a task, or the number of a world.
+        deviation: What differs.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    number: int
+    deviation: Deviation
+
+
+class DeviatedWorlds(BaseModel):
+    """Cases of a problem, in the order of their numbers in the job.
+
+    Attributes:
+        within: The world, or the worlds, without deviations.
+        cases: The cases; the numbers of the job are their positions here.
+    """
+
+    model_config = ConfigDict(extra="forbid")
+
+    kind: Literal["deviated"] = "deviated"
+    within: TaskWorld | SetWorlds = Field(discriminator="kind")
+    cases: tuple[Case, ...]
 
 
 def public_split(tasks: TaskSet) -> str | None:

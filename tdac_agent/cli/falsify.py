@@ -1,0 +1,174 @@
+"""`tdac falsify`: the smallest deviation with which a policy fails."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.cli.console import Console, print_json
+from tdac_agent.cli.controller_choice import own_folder, with_own_set
+from tdac_agent.cli.driving_bar import DrivingBar
+from tdac_agent.cli.falsify_flags import FalsifyOptions
+from tdac_agent.cli.falsify_view import show_falsification
+from tdac_agent.cli.sentences import print_plain
+from tdac_agent.cli.task_changes import changed_task
+from tdac_agent.cli.task_choice import check_scope, check_tier, chosen_task
+from tdac_agent.cli.task_flags import TaskFlags
+from tdac_agent.cli.typed_options import words_of
+from tdac_agent.environments.epuck.pictures import WorldPictures
+from tdac_agent.environments.map2d.pictures import MapPictures
+from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted
+from tdac_agent.evaluation.replay import drive_episode
+from tdac_agent.falsify.curves import draw_curves
+from tdac_agent.falsify.falsify import SearchPlan, falsify, space_on
+from tdac_agent.problems.part import Part
+from tdac_agent.runs.falsification import Counterexample, Falsification
+from tdac_agent.runs.ownership import load_task
+from tdac_agent.tasks.deviation import Deviation, parsed
+from tdac_agent.tasks.deviation import words_of as deviation_words
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.task import Task
+from tdac_agent.tasks.units import Points
+from tdac_agent.verification.diagnosis.figures import write_png
+from tdac_agent.verification.judge.child_pool import ChildPool
+from tdac_agent.verification.judge.deviated import shifted_env
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_envs.drawing.canvas import Image
+from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.map2d.task import Map2DTask
+
+PICTURE, CURVES = "counterexample.png", "curves.png"
+
+
+def run(flags: TaskFlags, options: FalsifyOptions) -> int:
+    """Searches, and prints what was found; 1 if it fails without a deviation."""
+    check_tier(options.tier)
+    flags = with_own_set(options.policy, flags)
+    check_scope(flags.set_name is not None, flags, options)
+    plan = SearchPlan(
+        episodes=options.episodes,
+        seed=options.seed,
+        space=None if options.space is None else parsed(options.space),
+        split=options.split,
+        worlds=options.worlds,
+        curves=options.curves,
+    )
+    console = Console(stderr=options.as_json)
+    with ChildPool() as child_pool:
+        problem = _problem(flags, options.policy)
+        space_on(problem, plan)  # fails early
+        entrant = fitted(entrant_of(options.policy), problem)
+        cut = "no envelope"
+        if options.out is not None:
+            cut = f"the same command goes on from {options.out}"
+        bar = DrivingBar(
+            console, options.episodes, "driving", is_long=True, cut=cut, reaching=False
+        )
+        with WarmJudge(child_pool) as judge, bar:
+            found = falsify(
+                entrant,
+                problem,
+                plan,
+                tier=options.tier,
+                out=options.out,
+                judge=judge,
+                watch=bar.show_count,
+            )
+    written = [] if options.out is None else ["falsify.json"]
+    if options.out is not None:
+        written += write_pictures(found, entrant, problem, options.out, options.tier)
+    if options.as_json:
+        print_json(found)
+    else:
+        show_falsification(found, console, _replay(found, entrant, flags, options))
+        if options.out is not None:
+            print_plain(console, f"wrote {', '.join(written)} to {options.out}")
+    return 1 if found.fails_plainly else 0
+
+
+def _problem(flags: TaskFlags, policy: str) -> Task | TaskSet:
+    if flags.set_name is not None:
+        return load_set(flags.set_name)
+    folder = own_folder(policy, flags) if Path(policy).exists() else None
+    if folder is None or policy.endswith(".zip"):
+        return chosen_task(flags)
+    return changed_task(load_task(folder), flags)
+
+
+def _replay(
+    found: Falsification, entrant: Entrant, flags: TaskFlags, options: FalsifyOptions
+) -> Sequence[str]:
+    """The command that plays the counterexample; empty if `tdac play` cannot."""
+    failed = found.counterexample
+    if failed is None or (found.split is None and entrant.kind != "controller"):
+        return ()
+    words = ["tdac", "play", options.policy, *words_of(flags)]
+    if found.split is not None:
+        words += ["--index", str(failed.number), "--split", found.split]
+    if failed.deviation.parts():
+        words += ["--deviation", deviation_words(failed.deviation)]
+    return words if options.tier == "auto" else [*words, "--tier", options.tier]
+
+
+def write_pictures(
+    found: Falsification,
+    entrant: Entrant,
+    problem: Task | TaskSet,
+    out: Path,
+    tier: str,
+) -> list[str]:
+    """Draws the counterexample beside the undisturbed drive; returns the files."""
+    written = []
+    failed = found.counterexample
+    if failed is not None and not (isinstance(problem, Task) and not entrant.sha256):
+        write_png(_picture(found, failed, entrant, problem, tier), out / PICTURE)
+        written.append(PICTURE)
+    if found.curves:
+        draw_curves(found, out / CURVES)
+        written.append(CURVES)
+    return written
+
+
+def _picture(
+    found: Falsification,
+    failed: Counterexample,
+    entrant: Entrant,
+    problem: Task | TaskSet,
+    tier: str,
+) -> Image:
+    runs: list[Points] = []
+    outcomes, labels = [], []
+    chosen = [failed.deviation]
+    if failed.deviation.parts():
+        chosen.append(Deviation())
+    for deviation in chosen:
+        part = part_of(problem, failed.number, found.split)
+        rollout = drive_episode(entrant, problem, part, tier, deviation).rollout
+        runs.append(rollout.trajectory.poses)
+        outcomes.append(rollout.outcome)
+        labels.append(found.in_words(deviation).encode("ascii", "replace").decode())
+    pictures = pictures_of(problem, failed.deviation, found.split, failed.number)
+    image: Image = pictures.trajectories(runs, outcomes, labels)
+    return image
+
+
+def part_of(problem: Task | TaskSet, number: int, split: str | None) -> Part:
+    """The episode of a number, undisturbed unless the problem says otherwise."""
+    if not isinstance(problem, Task):
+        return Part((number,), split or "dev")
+    own = problem.own_disturbance() if problem.says_disturbances else Disturbance.none()
+    return Part((number,), disturbance=own, variation="nominal")
+
+
+def pictures_of(
+    problem: Task | TaskSet, deviation: Deviation, split: str | None, number: int
+) -> Any:
+    """The pictures of a world, with its obstacles where the deviation shifts them."""
+    if isinstance(problem, Task):
+        nominal: Any = shifted_env(problem, deviation, Disturbance.none()).nominal
+    else:
+        nominal = problem.task(split or "dev", number)
+    if isinstance(nominal, Map2DTask):
+        return MapPictures(nominal)
+    return WorldPictures(nominal)

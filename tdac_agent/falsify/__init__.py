@@ -1,0 +1,1 @@
+"""The smallest deviation with which a controller fails: `tdac falsify`."""

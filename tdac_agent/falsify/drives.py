@@ -1,0 +1,207 @@
+"""Drives a policy with deviations in the judge; each case at most once."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.evaluation.policies import Entrant
+from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.part import Part, identity_of
+from tdac_agent.tasks.deviation import Deviation
+from tdac_agent.tasks.disturbance import Disturbance
+from tdac_agent.tasks.provenance import versions
+from tdac_agent.tasks.task import Task
+from tdac_agent.verification.judge.deviated import shifted_env, start_of
+from tdac_agent.verification.judge.episode_job import EpisodeJob
+from tdac_agent.verification.judge.episode_row import EpisodeRow
+from tdac_agent.verification.judge.policy_spec import written
+from tdac_agent.verification.judge.warm import WarmJudge
+from tdac_agent.verification.judge.worlds import (
+    Case,
+    DeviatedWorlds,
+    SetWorlds,
+    TaskWorld,
+)
+from tdac_agent.verification.run_episodes import run_episodes
+from tdac_agent.verification.store import ROWS_FILE, mark_rows, unfinished
+from tdac_envs.core.errors import TaskError
+from tdac_envs.core.intake import read_file
+from tdac_envs.ladder.task_sets import TaskSet
+
+JITTER = "jitter"
+_MOST_BYTES = 64 << 20
+Watch = Callable[[int], None]
+
+
+@dataclass(slots=True)
+class Drives:
+    """Episodes with deviations, each driven at most once.
+
+    Attributes:
+        entrant: Who drives.
+        problem: Where.
+        split: Split of a set.
+        budget: Most episodes; beyond them nothing is driven.
+        about: What determines the episodes.
+        tier: Sandbox tier.
+        out: Folder that keeps what an interrupted search has driven; None for none.
+        judge: A warm judge.
+        watch: Called with the number of episodes so far.
+        used: Tier that the sandbox had.
+        count: Episodes so far, those of an interrupted search included.
+    """
+
+    entrant: Entrant
+    problem: Task | TaskSet
+    split: str
+    budget: int
+    about: dict[str, Any]
+    tier: str
+    out: Path | None
+    judge: WarmJudge
+    watch: Watch | None = None
+    used: str = ""
+    count: int = 0
+    _known: dict[str, EpisodeRow] = field(default_factory=dict)
+    _asked: set[str] = field(default_factory=set)
+    _possible: dict[str, bool] = field(default_factory=dict)
+    _stack: ExitStack = field(default_factory=ExitStack)
+    _kept: Path | None = None
+    _folder: Path = Path()
+
+    def __enter__(self) -> Drives:
+        name = self._stack.enter_context(tempfile.TemporaryDirectory())
+        self._folder = Path(name)
+        about = {
+            **self.about,
+            "policy": [self.entrant.policy.kind, self.entrant.sha256],
+            "problem": identity_of(episodes_of(self.problem)),
+            "split": self.split,
+            "tier": self.tier,
+            "versions": dict(versions()),
+        }
+        self._kept = self._stack.enter_context(unfinished(self.out, about))
+        if self._kept is not None and (self._kept / ROWS_FILE).is_file():
+            text = read_file(self._kept / ROWS_FILE, _MOST_BYTES)
+            for line in text.splitlines():
+                kept = json.loads(line)
+                row = EpisodeRow.model_validate(kept["row"])
+                self._known[kept["case"]] = row
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._stack.__exit__(*error)
+
+    @property
+    def left(self) -> int:
+        """Episodes that may still be driven."""
+        return self.budget - self.count
+
+    @property
+    def own_disturbance(self) -> Disturbance:
+        """What disturbs all episodes of a task: only what the task itself names."""
+        assert isinstance(self.problem, Task)
+        if self.problem.says_disturbances:
+            return self.problem.own_disturbance()
+        return Disturbance.none()
+
+    def is_possible(self, deviation: Deviation) -> bool:
+        """Whether an episode can begin with shifted start and obstacles."""
+        if not isinstance(self.problem, Task):
+            return True
+        names = "start_x", "start_y", "heading", "obstacles_x", "obstacles_y"
+        placed = Deviation.of(
+            {n: v for n, v in deviation.parts().items() if n in names}
+        )
+        key = _key(Case(number=0, deviation=placed))
+        if key not in self._possible:
+            self._possible[key] = not placed.parts() or self._begins(placed)
+        return self._possible[key]
+
+    def _begins(self, deviation: Deviation) -> bool:
+        assert isinstance(self.problem, Task)
+        try:
+            env = shifted_env(self.problem, deviation, Disturbance.none())
+            start = start_of(self.problem.nominal, deviation)
+            env.reset(seed=0, options={"start": start})
+        except TaskError:
+            return False
+        return True
+
+    def drive(
+        self,
+        cases: Sequence[Case],
+        variation: str = "nominal",
+        trajectories: Path | None = None,
+    ) -> list[EpisodeRow | None]:
+        """The rows of some cases, which must be possible; None beyond the budget.
+
+        Args:
+            cases: The cases.
+            variation: Variation of the start of a task.
+            trajectories: Folder for `NUMBER.npz`; then all of them are driven.
+        """
+        keys = [f"{variation} {_key(each)}" for each in cases]
+        new = [key for key in dict.fromkeys(keys) if key not in self._asked]
+        granted = set(new[: max(0, self.left)])
+        self._asked |= granted
+        self.count += len(granted)
+        wanted = {
+            key: case
+            for key, case in zip(keys, cases, strict=True)
+            if key in self._asked and (trajectories or key not in self._known)
+        }
+        if wanted:
+            self._run(wanted, variation, trajectories)
+        if self.watch is not None:
+            self.watch(self.count)
+        return [self._known[key] if key in self._asked else None for key in keys]
+
+    def _run(
+        self, wanted: dict[str, Case], variation: str, trajectories: Path | None
+    ) -> None:
+        own, cases = episodes_of(self.problem), tuple(wanted.values())
+        job = EpisodeJob(
+            worlds=DeviatedWorlds(within=self._within(variation), cases=cases),
+            policy=written(
+                self.entrant.policy,
+                self._folder,
+                self.entrant.source,
+                self.entrant.weights,
+            ),
+            numbers=tuple(range(len(cases))),
+            tier=self.tier,
+            limits=own.limits,
+            out=self._folder / f"results-{len(self._known)}-{bool(trajectories)}",
+            trajectories=trajectories,
+        )
+        rows, ending = run_episodes(job, own.longest, self.judge)
+        self.used = ending.tier
+        for key, row in zip(wanted, rows, strict=True):
+            self._known[key] = row
+        if self._kept is not None and trajectories is None:
+            with (self._kept / ROWS_FILE).open("a", encoding="utf-8") as file:
+                for key in wanted:
+                    kept = self._known[key].model_dump(mode="json")
+                    file.write(json.dumps({"case": key, "row": kept}) + "\n")
+            mark_rows(self._kept)
+
+    def _within(self, variation: str) -> TaskWorld | SetWorlds:
+        folder = self._folder / f"world-{variation}"
+        folder.mkdir(exist_ok=True)
+        disturbance = None
+        if isinstance(self.problem, Task):
+            disturbance = self.own_disturbance
+        part = Part((0,), self.split, disturbance=disturbance, variation=variation)
+        return episodes_of(self.problem).worlds(part, folder, self.entrant.policy)
+
+
+def _key(case: Case) -> str:
+    """A case as text, the same on all machines."""
+    return json.dumps([case.number, asdict(case.deviation)])
