@@ -59,22 +59,9 @@ def run(flags: TaskFlags, options: FalsifyOptions) -> int:
         problem = _problem(flags, options.policy)
         space_on(problem, plan)  # fails early
         entrant = fitted(entrant_of(options.policy), problem)
-        cut = "no envelope"
-        if options.out is not None:
-            cut = f"the same command goes on from {options.out}"
-        bar = DrivingBar(
-            console, options.episodes, "driving", is_long=True, cut=cut, reaching=False
-        )
-        with WarmJudge(child_pool) as judge, bar:
-            found = falsify(
-                entrant,
-                problem,
-                plan,
-                tier=options.tier,
-                out=options.out,
-                judge=judge,
-                watch=bar.show_count,
-            )
+        with WarmJudge(child_pool) as judge:
+            where = options.tier, options.out, judge
+            found = search(entrant, problem, plan, console, *where)
     written = [] if options.out is None else ["falsify.json"]
     if options.out is not None:
         written += write_pictures(found, entrant, problem, options.out, options.tier)
@@ -85,6 +72,67 @@ def run(flags: TaskFlags, options: FalsifyOptions) -> int:
         if options.out is not None:
             print_plain(console, f"wrote {', '.join(written)} to {options.out}")
     return 1 if found.fails_plainly else 0
+
+
+def search(
+    entrant: Entrant,
+    problem: Task | TaskSet,
+    plan: SearchPlan,
+    console: Console,
+    tier: str,
+    out: Path | None,
+    judge: WarmJudge | None = None,
+) -> Falsification:
+    """Searches with a progress bar; arguments as for `falsify`."""
+    cut = "no envelope"
+    if out is not None:
+        cut = f"the same command goes on from {out}"
+    bar = DrivingBar(
+        console, plan.episodes, "episodes", is_long=True, cut=cut, reaching=False
+    )
+    with bar:
+        return falsify(
+            entrant,
+            problem,
+            plan,
+            tier=tier,
+            out=out,
+            judge=judge,
+            watch=bar.show_count,
+        )
+
+
+def show_envelope(
+    controller: str,
+    problem: Task | TaskSet,
+    episodes: int,
+    console: Console,
+    tier: str,
+    out: Path | None,
+) -> Falsification:
+    """What follows a verdict with `--envelope`: the search, and what it found.
+
+    Args:
+        controller: Controller file, or run folder.
+        problem: Where it was judged.
+        episodes: Most episodes.
+        console: Console to print to; nothing is printed if it is stderr.
+        tier: Sandbox tier.
+        out: Folder for the record and the picture.
+    """
+    entrant = fitted(entrant_of(controller), problem)
+    plan = SearchPlan(episodes=episodes)
+    found = search(entrant, problem, plan, console, tier, out)
+    if out is not None:
+        write_pictures(found, entrant, problem, out, tier)
+    if not console.stderr:
+        console.print()
+        options = FalsifyOptions(controller, tier=tier)
+        replay = _replay(found, entrant, TaskFlags(), options)
+        # Where the task is another one than the controller's own, flags are missing.
+        own = isinstance(problem, TaskSet) or Path(controller).is_dir()
+        show_falsification(found, console, replay if own else ())
+    return found
 
 
 def _problem(flags: TaskFlags, policy: str) -> Task | TaskSet:

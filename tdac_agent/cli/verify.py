@@ -29,10 +29,12 @@ from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.errors import TaskError
 
 if TYPE_CHECKING:
+    from tdac_agent.cli.console import Console
     from tdac_agent.cli.driving_bar import DrivingBar
     from tdac_agent.cli.shared_options import NoiseFlags
     from tdac_agent.cli.task_flags import TaskFlags
     from tdac_agent.cli.verify_options import VerifyOptions
+    from tdac_agent.runs.falsification import Falsification
     from tdac_agent.tasks.task import Task
     from tdac_agent.verification.diagnosis.report import Report
     from tdac_agent.verification.episode_report import EpisodeReport
@@ -111,7 +113,7 @@ def _verify_on_task(
 
         write_junit(report, options.junit, confirmation)
     if options.as_json:
-        print_json(_record(report, options, robust, confirmation))
+        print_json(_record(report, options, task, robust, confirmation))
     elif robust is not None:
         from tdac_agent.cli.robust_view import show_robust
 
@@ -125,11 +127,32 @@ def _verify_on_task(
         show_confirmation(confirmation, console, play[1:], units)
     elif options.episodes is not None:
         console.print("robustness not measured: the controller failed its tests")
+    if report.passed and not options.as_json:
+        _envelope(task, options, console)
+    return _code(report, robust, confirmation)
+
+
+def _code(
+    report: Report, robust: EpisodeReport | None, confirmation: EpisodeReport | None
+) -> int:
+    """The exit code: 0 for a verdict, or a pass without blind drives."""
     if confirmation is not None:
         from tdac_agent.verification.verdict import is_verified
 
         return 0 if is_verified(confirmation) else 1
     return 0 if report.passed and (robust is None or robust.passed) else 1
+
+
+def _envelope(
+    problem: Task | TaskSet, options: VerifyOptions, console: Console
+) -> Falsification | None:
+    """Searches for the smallest failure, if that is wanted."""
+    if options.envelope is None:
+        return None
+    from tdac_agent.cli.falsify import show_envelope
+
+    where = options.tier, options.out
+    return show_envelope(options.controller, problem, options.envelope, console, *where)
 
 
 def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) -> Report:
@@ -248,6 +271,7 @@ def _driven(
 def _record(
     report: Report,
     options: VerifyOptions,
+    task: Task,
     robust: EpisodeReport | None,
     confirmation: EpisodeReport | None,
 ) -> Any:
@@ -255,7 +279,13 @@ def _record(
     measured = options.episodes is not None
     name, found = ("robust", robust) if measured else ("confirmation", confirmation)
     added = None if found is None else found.model_dump(mode="json")
-    return {**report.model_dump(mode="json"), name: added}
+    whole = {**report.model_dump(mode="json"), name: added}
+    if report.passed and options.envelope is not None:
+        from tdac_agent.cli.console import Console
+
+        envelope = _envelope(task, options, Console(stderr=True))
+        whole["envelope"] = envelope and envelope.model_dump(mode="json")
+    return whole
 
 
 def _replay(flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags) -> list[str]:
@@ -309,6 +339,8 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
     else:
         show_set_report(report, console)
         show_next_steps(report, name, options.controller, options.out, console)
+    if report.passed:
+        _envelope(tasks, options, console)
     return 0 if report.passed else 1
 
 

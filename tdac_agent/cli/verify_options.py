@@ -40,6 +40,13 @@ class VerifyOptions:
         "--confirm/--no-confirm",
         scope="task",
     )
+    envelope: int | None = option(
+        None,
+        "After a pass, search for the smallest deviation with which it fails, with at "
+        "most E episodes; see tdac falsify.",
+        metavar="E",
+        least=16,
+    )
     suite: Path | None = suite_option()
     trust: bool = trust_option()
     tier: str = tier_option()

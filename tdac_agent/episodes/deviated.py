@@ -77,8 +77,16 @@ class DeviatedEnv:
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """See `JudgedEnv`."""
-        seen, info = self.plain.reset(seed=seed, options=options)
+        """See `JudgedEnv`.
+
+        Raises:
+            TaskError: The start is not feasible.
+        """
+        try:
+            seen, info = self.plain.reset(seed=seed, options=options)
+        except TaskError as error:
+            why = str(error).rpartition(": ")[2]
+            raise TaskError(f"no episode begins with this deviation: {why}") from None
         self._random = np.random.default_rng(self._seed)
         self._late = deque([np.zeros(2)] * self._own.delay)
         self._speeds = np.zeros(2)

@@ -306,7 +306,8 @@ def between(safe: float, fails: float, step: float) -> float | None:
     """
     if abs(fails - safe) <= max(1.5 * step, CLOSE * abs(fails)):
         return None
-    return near(0.5 * (safe + fails), step)
+    middle = near(0.5 * (safe + fails), step)
+    return None if middle in (safe, fails) else middle
 
 
 @dataclass(slots=True)

@@ -10,6 +10,7 @@ from typing import Any
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.animation import animations
+from tdac_agent.html_report.envelope import envelope_of
 from tdac_agent.html_report.figures import drawn
 from tdac_agent.html_report.overview import format_seconds
 from tdac_agent.html_report.scene import TaskPicture
@@ -92,6 +93,7 @@ def section_of(
         "commands": list(_commands(history, name)),
         "set_part": set_part_of(history),
         "improvement": read_improvement(run.folder) if run.improve else None,
+        "envelope": envelope_of(run.folder),
         "causes": tuple(Losses().by_cause),
         "asked_text": asked_text,
         "units": None if report is None else UNITS[report.provenance.unit],

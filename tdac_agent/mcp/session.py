@@ -23,6 +23,7 @@ from tdac_agent.mcp.pictures import draw
 from tdac_agent.mcp.submitted import source_of
 from tdac_agent.mcp.watch import Watch
 from tdac_agent.problems.problem import Problem
+from tdac_agent.runs.falsify_text import NO_PROOF, failure_text, summary_of
 from tdac_agent.runs.recorder import Recorder
 from tdac_agent.runs.run_record import JOURNAL, Run, candidate_at
 from tdac_agent.runs.selection_record import HIDDEN_FILE
@@ -148,13 +149,41 @@ class Session:
         self._end_if_hopeless()
         return answer
 
-    def failures(self, number: int) -> str:
-        """What failed in a submission."""
-        result = self.trials.result(self._submission(number))
+    def failures(self, number: int, envelope: int = 0) -> str:
+        """What failed in a submission.
+
+        Args:
+            number: Its number.
+            envelope: Most episodes of a search for the smallest deviation with which
+                it fails; 0 for none.
+
+        Raises:
+            Refused: There is no such submission, or no such search for it.
+        """
+        submission = self._submission(number)
+        result = self.trials.result(submission)
+        if envelope and (self.problem.task is None or not result.passed):
+            raise Refused("envelope: it needs a task, and a submission that passed")
         if not result.passed and result.failure is not None:
             return result.failure.text
-        told = f"nothing failed: {result.summary}"
-        return f"{told}; only choose({number}) can verify it"
+        told = f"nothing failed: {result.summary}; only choose({number}) can verify it"
+        return f"{told}\n{self._envelope(submission, envelope)}" if envelope else told
+
+    def _envelope(self, submission: Candidate, episodes: int) -> str:
+        """The smallest failure that a search finds, in words."""
+        # Only for agents that ask for it: slow to import.
+        from tdac_agent.evaluation.policies import entrant_of
+        from tdac_agent.falsify.falsify import LEAST, SearchPlan, falsify
+
+        if episodes < LEAST:
+            raise Refused(f"envelope: expected 0, or {LEAST} and more, got {episodes}")
+        assert self.problem.task is not None
+        entrant = entrant_of(str(submission.folder / "controller.py"))
+        found = falsify(entrant, self.problem.task, SearchPlan(episodes=episodes))
+        text, failed = summary_of(found), found.counterexample
+        if failed is not None:
+            text += f"\n{failure_text(failed, found)}"
+        return f"{text}\n{NO_PROOF.format(found.episodes)}"
 
     def picture(self, number: int, episode: str) -> bytes:
         """A PNG of an episode of a submission."""

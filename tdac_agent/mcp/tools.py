@@ -41,6 +41,19 @@ class Numbered(_Arguments):
     submission: int = Field(description="Number of the submission, from `submit`.")
 
 
+class FailuresOf(Numbered):
+    """Arguments of `failures`."""
+
+    envelope: int = Field(
+        0,
+        ge=0,
+        le=512,
+        description="On a task, for a submission that passed: also search, with at "
+        "most so many episodes (16 or more; 128 take about a minute), for the smallest "
+        "deviation with which it fails, such as another axle or a late action.",
+    )
+
+
 class PictureOf(Numbered):
     """Arguments of `picture`."""
 
@@ -123,9 +136,9 @@ def _state(line: SubmissionLine) -> str:
     return "verified" if line.verified else "passed" if line.passed else "not verified"
 
 
-def _failures(session: Session, arguments: Numbered, client: str) -> CallToolResult:
+def _failures(session: Session, arguments: FailuresOf, client: str) -> CallToolResult:
     del client
-    return _said(session.failures(arguments.submission))
+    return _said(session.failures(arguments.submission, arguments.envelope))
 
 
 def _picture(session: Session, arguments: PictureOf, client: str) -> CallToolResult:
@@ -181,8 +194,9 @@ TOOLS = (
     ToolSpec(
         "failures",
         "What went wrong in a submission: failed tests, causes with their counts, and "
-        "diagnoses of episodes.",
-        Numbered,
+        "diagnoses of episodes. With `envelope`, also the smallest deviation with "
+        "which it fails.",
+        FailuresOf,
         _failures,
     ),
     ToolSpec(

@@ -4,7 +4,10 @@ import json
 from dataclasses import replace
 
 import pytest
-from margins import (
+from hypothesis import given
+from hypothesis import strategies as st
+
+from benchmarks.margins import (
     BREAKS_WHEN_LATE,
     CAREFUL,
     GAP,
@@ -14,10 +17,10 @@ from margins import (
     TURN,
     write_corridor,
 )
-
 from tdac_agent import load_task
 from tdac_agent.evaluation.policies import entrant_of
 from tdac_agent.falsify.falsify import SearchPlan, falsify
+from tdac_agent.falsify.search import between, near
 from tdac_agent.tasks.deviation import DEVIATIONS, Deviation
 
 PLAN = SearchPlan(episodes=96)
@@ -132,3 +135,17 @@ def test_every_part_does_something(search, corridor):
     found = search(BREAKS_WHEN_LATE.replace("50.0", "60.0"), plan)
     tried = {each.part for each in found.envelopes[0].directions}
     assert tried == set(DEVIATIONS)
+
+
+@given(
+    fails=st.floats(1e-7, 100.0),
+    sign=st.sampled_from((-1.0, 1.0)),
+    step=st.sampled_from((0.0, 1.0, 1.0 / 15)),
+)
+def test_a_bracket_is_halved_until_it_is_narrow(fails, sign, step):
+    safe, fails, count = 0.0, sign * near(fails, step), 0
+    while (middle := between(safe, fails, step)) is not None:
+        assert min(safe, fails) < middle < max(safe, fails)
+        safe, fails = (middle, fails) if count % 2 else (safe, middle)
+        count += 1
+        assert count < 60

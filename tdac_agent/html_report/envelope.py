@@ -1,0 +1,61 @@
+"""What `falsify.json` of a run says, for its report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from tdac_agent.html_report.scene import data_address
+from tdac_agent.runs.falsification import Envelope, Falsification, read_falsification
+from tdac_agent.runs.falsify_text import (
+    NO_PROOF,
+    failure_text,
+    plain_text,
+    range_text,
+    summary_of,
+)
+from tdac_agent.tasks.deviation import DEVIATIONS
+from tdac_envs.core.intake import read_file
+
+PICTURE = "counterexample.png"
+_MOST_BYTES = 16 << 20
+
+
+def envelope_of(folder: Path) -> dict[str, Any] | None:
+    """Values for the template; None if the run has no record of this search."""
+    found = read_falsification(folder)
+    if found is None:
+        return None
+    failed, summary = found.counterexample, summary_of(found)
+    return {
+        "summary": summary[:1].upper() + summary[1:],
+        "failure": "" if failed is None else failure_text(failed, found),
+        "worlds": [_world(each, found) for each in found.envelopes],
+        "is_set": found.split is not None,
+        "note": NO_PROOF.format(found.episodes),
+        "sizes": {p: found.value(p, s).lstrip("+") for p, s in found.space.items()},
+        "picture": _picture(folder),
+    }
+
+
+def _world(envelope: Envelope, found: Falsification) -> dict[str, Any]:
+    rows = []
+    for part in found.space:
+        own = [each for each in envelope.directions if each.part == part]
+        if own:
+            failed = [each for each in own if each.fails is not None]
+            values = [found.value(part, each.fails or 0.0) for each in failed]
+            causes = dict.fromkeys(each.cause or "" for each in failed)
+            words, survived = DEVIATIONS[part].words, range_text(own, found)
+            rows.append((part, words, survived, ", ".join(values), ", ".join(causes)))
+    plain = plain_text(envelope, found)
+    return {"number": envelope.number, "plain": plain, "rows": rows}
+
+
+def _picture(folder: Path) -> str | None:
+    """The picture of the counterexample as a data URL; None if there is none."""
+    try:
+        picture = read_file(folder / PICTURE, _MOST_BYTES)
+    except (OSError, ValueError):
+        return None
+    return data_address(picture, "image/png")
