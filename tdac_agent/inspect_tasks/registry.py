@@ -16,12 +16,14 @@ from inspect_ai import Task, task
 from inspect_ai.dataset import Sample
 from inspect_ai.scorer import Scorer
 
+from tdac_agent.falsify.falsify import LEAST, MOST_EPISODES
 from tdac_agent.inspect_tasks.names import registered
 from tdac_agent.inspect_tasks.scoring import driven, passed
 from tdac_agent.inspect_tasks.solvers import repair, tdac_builtin
 from tdac_agent.synthesis.answers import exam_of, files_of
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.registry import own_environments
+from tdac_envs.core.arguments import whole_number
 from tdac_envs.ladder.set_file import set_names
 
 __all__ = ["driven", "passed", "repair", "tdac_builtin"]
@@ -56,8 +58,12 @@ def _name(name: str) -> str:
 
 def _register_single(inspect_name: str, name: str) -> None:
     @task(name=registered(inspect_name))
-    def bundled() -> Task:
-        return _task(name, {"task": name}, passed())
+    def bundled(envelope: int = 0) -> Task:
+        about: dict[str, Any] = {"task": name}
+        if envelope:
+            whole_number("envelope", envelope, LEAST, MOST_EPISODES)
+            about["envelope"] = envelope
+        return _task(name, about, passed())
 
 
 def _register_level(inspect_name: str, name: str) -> None:

@@ -21,11 +21,17 @@ from inspect_ai.scorer import (
 from inspect_ai.solver import TaskState
 from inspect_ai.util import concurrency
 
+from tdac_agent.evaluation.policies import Entrant
+from tdac_agent.falsify.falsify import SearchPlan, falsify
 from tdac_agent.inspect_tasks.names import registered
 from tdac_agent.problems.problem import Poll
 from tdac_agent.prompting.extract import POLICY, Answer, read_answer
+from tdac_agent.runs.falsification import Falsification
+from tdac_agent.runs.falsify_text import summary_of
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.synthesis.answers import Exam, exam_of, unusable
 from tdac_agent.synthesis.candidates import raw
+from tdac_agent.verification.judge.policy_spec import PolicySpec
 
 T = TypeVar("T")
 JUDGES = 1
@@ -112,9 +118,28 @@ async def _judged(state: TaskState) -> tuple[dict[str, float], dict[str, Any]]:
     if source is None:
         return {}, {"explanation": unusable(problem), "reason": NO_CODE}
     judged = await in_thread(state, lambda exam, poll: exam.judge(raw(source), poll))
-    rest = {
-        "answer": source,
-        "explanation": judged.feedback,
-        "metadata": judged.facts,
-    }
+    told, facts = judged.feedback, judged.facts
+    episodes = (state.metadata or {}).get("envelope", 0)
+    if episodes and judged.scores.get("passed") == 1.0:
+        found = await in_thread(
+            state, lambda exam, poll: _envelope(exam, source, episodes, poll)
+        )
+        told = f"{told}\n{summary_of(found)}".strip()
+        facts = {**facts, "envelope": found.model_dump(mode="json")}
+    rest = {"answer": source, "explanation": told, "metadata": facts}
     return judged.scores, rest
+
+
+def _envelope(exam: Exam, source: str, episodes: int, poll: Poll) -> Falsification:
+    """The smallest deviation with which a controller fails on its task."""
+    assert exam.problem.task is not None
+    content = raw(source)
+    entrant = Entrant(
+        "answer",
+        PolicySpec("controller"),
+        sha256_of(content),
+        "controller",
+        source=content,
+    )
+    plan = SearchPlan(episodes=episodes)
+    return falsify(entrant, exam.problem.task, plan, watch=lambda _count: poll())

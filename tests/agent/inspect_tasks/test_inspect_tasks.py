@@ -103,6 +103,21 @@ def test_a_reference_is_verified_and_others_are_not(tmp_path):
 
 
 @pytest.mark.slow
+def test_an_envelope_is_searched_for_what_passes(tmp_path):
+    """The smallest failure stands in the explanation, the search in the metadata."""
+    log = evaluated(
+        tmp_path,
+        task="tdac_agent/tdac_maze",
+        args={"envelope": 16},
+        answers=[reference(task="maze"), answer(STILL)],
+    )
+    good, still = sorted(scores(log), key=lambda score: -score.value)
+    assert "survives" in good.explanation
+    assert good.metadata["envelope"]["budget"] == 16
+    assert "envelope" not in still.metadata
+
+
+@pytest.mark.slow
 def test_a_level_gives_the_share_of_worlds_and_the_time_score(tmp_path):
     """With their means over the answers, and the standard error over worlds."""
     answers = [reference(level="unknown", worlds=2, split="test"), answer(STILL)]

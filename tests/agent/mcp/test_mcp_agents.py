@@ -48,6 +48,9 @@ def test_from_nothing_to_verified_on_a_bundled_task(tmp_path, good_on_maze, done
         good = await agent.submit(f"```python\n{good_on_maze}```\n")
         assert (good["submission"], good["passed"]) == (3, True)
         assert good["submissions_left"] == 18
+        told = await agent.told("failures", submission=3, envelope=16)
+        assert "survives" in told
+        assert "search of 16 episodes" in told
         for number, episode in ((1, "nominal"), (3, "jitter 1")):
             assert (await agent.picture(number, episode)).startswith(PNG)
         verdict = await agent.choose(3)

@@ -29,6 +29,8 @@ def test_requests_that_cannot_be_answered(serve, small_task, good_source):
         assert "unknown key" in await error("submit", source=STILL, name="x")
         await agent.submit(good_source)
         assert "only submission 1" in await error("failures", submission=2)
+        told = await error("failures", submission=1, envelope=5)
+        assert "expected 0, or 16 and more" in told
         assert "there is no submission 0" in await error("choose", submission=0)
         assert "valid integer" in await error("failures", submission="first")
         told = await error("picture", submission=1, episode="jitter 4")
