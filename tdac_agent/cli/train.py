@@ -22,6 +22,7 @@ from tdac_agent.cli.typed_options import flag_name, typed_fields
 from tdac_agent.episodes.sb3_file import POLICY
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.training.curve import Point
+from tdac_agent.training.first_weights import begun_from
 from tdac_agent.training.plan import (
     EVALUATIONS,
     TrainingPlan,
@@ -226,6 +227,8 @@ def _plan_and_folder(options: TrainOptions) -> tuple[TrainingPlan, Path]:
         check_scope(False, TaskFlags(), options)
         noise = Disturbance(**{name: getattr(options, name) for name in NOISES})
         plan = make_plan(options.tasks or ("maze",), disturbance=noise, **wanted)
+    if options.from_policy is not None:
+        plan = begun_from(plan, options.from_policy)
     return plan, options.out or _next_folder(plan)
 
 

@@ -97,6 +97,14 @@ class TrainOptions:
         panel=TRAINING,
         scope="set",
     )
+    from_policy: Path | None = option(
+        None,
+        "Begin with the weights of this policy, a .zip of stable-baselines3 with the "
+        "same network and wrappers.",
+        "--from",
+        metavar="FILE",
+        panel=TRAINING,
+    )
     n_envs: int | None = option(
         None,
         "Number of robots driven in parallel.  [default: from --config]",

@@ -24,6 +24,7 @@ from tdac_agent.episodes.memory_policy import MemoryPolicy
 from tdac_agent.errors import RunError
 from tdac_agent.training.checkpoint_marks import CHECKPOINT, REPLAY, install_checkpoint
 from tdac_agent.training.curve import Point, read_curve, write_curve
+from tdac_agent.training.first_weights import load_first
 from tdac_agent.training.hyperparameters import model_arguments
 from tdac_agent.training.plan import TrainingPlan, make_batch
 from tdac_agent.training.policy_files import LAST, write_best, write_policy
@@ -201,6 +202,7 @@ def _model(plan: TrainingPlan, folder: Path, envs: VecMonitor) -> Any:
             reason = " ".join(str(error).split())
             raise RunError(f"hyperparameters of {plan.algo}: {reason}") from error
         _act_at_first(model, plan)
+        load_first(model, plan)
         return model
     try:
         model = kind.load(file, envs, device="cpu", tensorboard_log=log)

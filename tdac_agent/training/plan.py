@@ -66,6 +66,10 @@ class TrainingPlan(StrictModel):
     initial_action: float = Field(
         0.0, ge=-1, le=1, description="Mean action before the training, both wheels."
     )
+    from_policy: str | None = Field(
+        None, description="File of the policy whose weights it begins with."
+    )
+    from_sha256: str | None = None
     hyperparameters: dict[str, Any]
     evaluate_every: int = Field(description="Steps between evaluations.")
     episodes: int = Field(EPISODES, description="Episodes of each evaluation.")

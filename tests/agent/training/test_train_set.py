@@ -13,13 +13,14 @@ import yaml
 from few_worlds import write_short_set
 
 from tdac_agent.bench.bench import bench
-from tdac_agent.episodes.sb3_file import POLICY, read_policy
+from tdac_agent.episodes.sb3_file import POLICY, load_weights, read_policy
 from tdac_agent.errors import ControllerFileError, RunError
 from tdac_agent.evaluation.evaluate import evaluate
 from tdac_agent.storage.locks import LOCK_FILE, hold
 from tdac_agent.tasks.trust import NotTrustedError
 from tdac_agent.training.checkpoint_marks import CHECKPOINT
 from tdac_agent.training.curve import read_curve
+from tdac_agent.training.first_weights import begun_from
 from tdac_agent.training.hyperparameters import config_file
 from tdac_agent.training.plan import read_plan, write_plan
 from tdac_agent.training.seeds import seed_folder, train_seeds
@@ -198,6 +199,7 @@ def test_a_policy_of_another_training_is_refused(trained, few):
         (("--set", "unknow"), "did you mean 'unknown'?"),
         (("--wrapper", "guidance"), "leave out the wrapper 'guidance'"),
         (("--episodes", "0"), "--episodes"),
+        (("--from", "nowhere.zip"), "nowhere.zip"),
     ],
 )
 def test_mistakes_are_one_line(refused, words, message):
@@ -262,6 +264,32 @@ def test_a_new_policy_drives_forward(few, config, tmp_path):
     for value in (2.0, "fast"):
         with pytest.raises(TaskError, match="initial_action: expected"):
             make_set_plan(level, config=config(initial_action=value))
+
+
+def test_a_training_begins_with_the_weights_of_a_policy(few, config, tmp_path):
+    """Those of the file; another network, other wrappers, a changed file: one line."""
+    level, first = few(), tmp_path / "first"
+    common = {"steps": 128, "episodes": 2}
+    train(make_set_plan(level, **common, seed=1, config=config()), first)
+    file = first / "policy.zip"
+    still = config(learning_rate=1e-12)
+    plan = begun_from(make_set_plan(level, **common, seed=2, config=still), file)
+    train(plan, tmp_path / "second")
+    before, after = (
+        read_policy(each / "policy.zip") for each in (first, tmp_path / "second")
+    )
+    for name, tensor in load_weights(before.weights).items():
+        assert np.allclose(tensor, load_weights(after.weights)[name], atol=1e-6)
+    wide = config(policy_kwargs={"net_arch": [9]})
+    other = begun_from(make_set_plan(level, **common, config=wide), file)
+    with pytest.raises(RunError, match="its network is another one"):
+        train(other, tmp_path / "third")
+    planner = make_set_plan(level, **common, uses="planner", config=config())
+    with pytest.raises(TaskError, match="it was trained with the wrappers goal-rel"):
+        begun_from(planner, file)
+    file.write_bytes(file.read_bytes() + b" ")
+    with pytest.raises(RunError, match="has changed since this training was planned"):
+        train(plan, tmp_path / "fourth")
 
 
 def test_seeds_are_trained_side_by_side(few, config, tmp_path):
