@@ -28,7 +28,7 @@ from benchmarks.margins import (
     write_corridor,
 )
 from tdac_agent import load_task
-from tdac_agent.evaluation.policies import entrant_of
+from tdac_agent.evaluation.policies import entrant_of, prepared
 from tdac_agent.falsify.falsify import SearchPlan, falsify
 from tdac_agent.verification.judge.warm import WarmJudge
 
@@ -94,7 +94,7 @@ def time_maze(judge: WarmJudge) -> None:
         used = [resource.getrusage(each) for each in who]
         return sum(each.ru_utime + each.ru_stime for each in used)
 
-    entrant = entrant_of("builtin")
+    entrant, _ = prepared(entrant_of("builtin"), task)
     plan = SearchPlan(episodes=256)
     began = cpu()
     found = falsify(entrant, task, plan, judge=judge)

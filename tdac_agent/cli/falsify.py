@@ -18,7 +18,7 @@ from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import words_of
 from tdac_agent.environments.epuck.pictures import WorldPictures
 from tdac_agent.environments.map2d.pictures import MapPictures
-from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted
+from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted, prepared
 from tdac_agent.evaluation.replay import drive_episode
 from tdac_agent.falsify.curves import draw_curves
 from tdac_agent.falsify.falsify import SearchPlan, falsify, space_on
@@ -58,7 +58,7 @@ def run(flags: TaskFlags, options: FalsifyOptions) -> int:
     with ChildPool() as child_pool:
         problem = _problem(flags, options.policy)
         space_on(problem, plan)  # fails early
-        entrant = fitted(entrant_of(options.policy), problem)
+        entrant = _ready(options.policy, problem, options.tier)
         with WarmJudge(child_pool) as judge:
             where = options.tier, options.out, judge
             found = search(entrant, problem, plan, console, *where)
@@ -120,7 +120,7 @@ def show_envelope(
         tier: Sandbox tier.
         out: Folder for the record and the picture.
     """
-    entrant = fitted(entrant_of(controller), problem)
+    entrant = _ready(controller, problem, tier)
     plan = SearchPlan(episodes=episodes)
     found = search(entrant, problem, plan, console, tier, out)
     if out is not None:
@@ -133,6 +133,11 @@ def show_envelope(
         own = isinstance(problem, TaskSet) or Path(controller).is_dir()
         show_falsification(found, console, replay if own else ())
     return found
+
+
+def _ready(policy: str, problem: Task | TaskSet, tier: str) -> Entrant:
+    """The policy as it drives there; on a task, `builtin` is written now."""
+    return prepared(fitted(entrant_of(policy), problem), problem, tier)[0]
 
 
 def _problem(flags: TaskFlags, policy: str) -> Task | TaskSet:
@@ -169,7 +174,7 @@ def write_pictures(
     """Draws the counterexample beside the undisturbed drive; returns the files."""
     written = []
     failed = found.counterexample
-    if failed is not None and not (isinstance(problem, Task) and not entrant.sha256):
+    if failed is not None:
         write_png(_picture(found, failed, entrant, problem, tier), out / PICTURE)
         written.append(PICTURE)
     if found.curves:

@@ -76,7 +76,12 @@ class Drives:
     _folder: Path = Path()
 
     def __enter__(self) -> Drives:
-        name = self._stack.enter_context(tempfile.TemporaryDirectory())
+        name = self._stack.enter_context(
+            # A judge that is interrupted may still be writing there.
+            tempfile.TemporaryDirectory(
+                prefix="tdac-falsify-", ignore_cleanup_errors=True
+            )
+        )
         self._folder = Path(name)
         about = {
             **self.about,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tdac_agent.evaluation.policies import Entrant, fitted, prepared
+from tdac_agent.evaluation.policies import Entrant
 from tdac_agent.falsify.drives import JITTER, Drives
 from tdac_agent.falsify.search import Search, near
 from tdac_agent.runs.falsification import (
@@ -87,7 +87,7 @@ def falsify(
     interrupted search has driven is taken from `out` by the next one.
 
     Args:
-        entrant: The policy.
+        entrant: The policy, from `fitted` and `prepared`.
         problem: A task; or a task set, on whose worlds start and obstacles stay.
         plan: What is searched.
         tier: Sandbox tier.
@@ -104,7 +104,6 @@ def falsify(
     if out is not None:
         refuse_links(out, RECORD_FILE, UNFINISHED)
     space = space_on(problem, plan)
-    own, _ = prepared(fitted(entrant, problem), problem, tier)
     numbers = _numbers(problem, plan)
     steps = steps_on(problem, space)
     points = _points(space, steps) if plan.curves else []
@@ -116,13 +115,15 @@ def falsify(
                 entrant, problem, plan, tier=tier, out=out, judge=own_judge, watch=watch
             )
     split = "" if isinstance(problem, Task) else plan.split
-    with Drives(own, problem, split, whole, about, tier, out, judge, watch) as drives:
+    with Drives(
+        entrant, problem, split, whole, about, tier, out, judge, watch
+    ) as drives:
         envelopes = [
             Search(drives, number, space, steps, plan.seed + place, share).run()
             for place, (number, share) in enumerate(numbers)
         ]
         curves = _curves(drives, points, plan)
-        found = _record(own, problem, plan, space, drives, envelopes, curves)
+        found = _record(entrant, problem, plan, space, drives, envelopes, curves)
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             write_atomic(out / RECORD_FILE, found.model_dump_json(indent=2) + "\n")
