@@ -23,7 +23,7 @@ def part_text(name: str, value: float, units: Units, radius: float) -> str:
 def value_text(name: str, value: float, units: Units, radius: float) -> str:
     """The value of a part with its unit; signs only where they mean something."""
     part = DEVIATIONS[name]
-    sign = "" if not part.signed else "-" if value < 0 else "+"
+    sign = "" if not (part.signed and value) else "-" if value < 0 else "+"
     size = abs(value)
     if part.unit == "radii":
         return sign + gap_figure(size * radius, units)

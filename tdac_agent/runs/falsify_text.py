@@ -35,13 +35,22 @@ def plain_text(envelope: Envelope, found: Falsification) -> str:
 def range_text(own: Sequence[Direction], found: Falsification) -> str:
     """What is survived of one part: `-1.5 px to +2 px`, `2 steps`, `± 15 %`."""
     texts = [
-        found.value(each.part, each.survives)
-        + (" and more" if each.fails is None and not each.impossible else "")
-        for each in sorted(own, key=lambda each: each.sign)
+        _survived_alone(each, found) for each in sorted(own, key=lambda each: each.sign)
     ]
+    if len(set(texts)) == 1:
+        return texts[0]
     if len(own) == 2 and texts[0][1:] == texts[1][1:] and own[0].survives:
         return f"± {texts[1][1:]}"
     return " to ".join(texts)
+
+
+def _survived_alone(own: Direction, found: Falsification) -> str:
+    text = found.value(own.part, own.survives)
+    if own.fails is not None:
+        return text
+    if own.impossible:
+        return f"{text} (no room for more)"
+    return f"{text} and more" if own.survives else "not tried"
 
 
 def summary_of(found: Falsification) -> str:
