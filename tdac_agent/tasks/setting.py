@@ -214,6 +214,10 @@ class Setting(Protocol):
     def make_env(self, **options: Any) -> JudgedEnv:
         """Constructs the environment; `options` override its constructor arguments."""
 
+    @property
+    def has_metres(self) -> bool:
+        """Whether the size of the world in metres is known."""
+
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the environment's option for relative distance sensor noise."""
 

@@ -248,6 +248,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             `ranges`, instead of `n_rays` and `field_of_view`. Default: an even fan.
         physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
             moves the robot (`docs/physics.md`).
+        resolution: Metres per px of a map that does not say it; only MuJoCo uses it.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -318,6 +319,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         frame: FrameName = "pixels",
         ray_angles: Sequence[float] | None = None,
         physics: str = EXACT,
+        resolution: float | None = None,
         render_mode: str | None = None,
     ) -> None:
         units = units_of(map, frame)
@@ -407,7 +409,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 **{n: given[n] or 0 for n in RECEIVED}, message_drop=message_drop
             ),
             physics=physics,
-            pixel_size=params.resolution,
+            pixel_size=params.resolution if resolution is None else resolution,
         )
         notes = with_tolerance_note(params.notes, nominal, units.length)
         self.params = params.model_copy(update={"notes": notes})
@@ -496,8 +498,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         among = self.setup.has_movers
         self.addresses = Addresses([(*arrays, *self.movers) if among else arrays])
         (words,) = self.addresses.words
-        stops = self.on_collision == "terminate"
-        alone = (begin, drive if stops else drive_or_slide)
+        alone = begin, drive if self.on_collision == "terminate" else drive_or_slide
         kernels = (begin_among, drive_among) if among else alone
         calls: list[Callable[[], None]] = [partial(call, words) for call in kernels]
         if self._carried is not None:

@@ -84,6 +84,8 @@ class Map2DSetup(DriveSetup):
     def __post_init__(self) -> None:
         DriveSetup.__post_init__(self)
         engine_named(self.physics)
+        if self.pixel_size is not None:
+            positive("resolution", self.pixel_size)
         noise = non_negative("range_noise", self.range_noise)
         dropout = number_up_to("range_dropout", self.range_dropout, 1.0)
         object.__setattr__(self, "range_noise", noise)

@@ -43,6 +43,11 @@ def mujoco_module() -> Any:
     raise TaskError(f"physics 'mujoco' needs MuJoCo: {install_command('physics')}")
 
 
+def engine_version() -> str:
+    """Name and version, such as `MuJoCo 4.0.0`."""
+    return f"MuJoCo {mujoco_module().__version__}"
+
+
 class MujocoBody:
     """A robot that MuJoCo moves through a scene; implements `moved.Physics`.
 

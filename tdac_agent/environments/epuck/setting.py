@@ -118,6 +118,11 @@ class EPuckSetting:
         """Constructs this task's environment; `options` override its arguments."""
         return EPuckEnv(**{**self.env_kwargs(), **options})
 
+    @property
+    def has_metres(self) -> bool:
+        """True: worlds are in metres."""
+        return True
+
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the option for the published noise, scaled to this mean."""
         return {"sensor_noise": relative / _MEAN_NOISE}

@@ -155,7 +155,14 @@ class Map2DSetting:
 
     def make_env(self, **options: Any) -> Map2DEnv:
         """Constructs this task's environment; `options` override its arguments."""
+        if "physics" in options:
+            options = {"resolution": self.params.resolution, **options}
         return Map2DEnv(**{**self.env_kwargs(), **options})
+
+    @property
+    def has_metres(self) -> bool:
+        """Whether the map has a resolution."""
+        return self.params.resolution is not None
 
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the option for this relative noise of each range."""
