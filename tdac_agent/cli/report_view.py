@@ -23,6 +23,7 @@ from tdac_agent.verification.diagnosis.report import (
     Report,
     in_units,
 )
+from tdac_agent.verification.diagnosis.second_opinion import opinion_text
 from tdac_agent.verification.verdict import COLOURS
 
 MOST_NAMES, SOME_NAMES = 6, 3
@@ -93,6 +94,8 @@ def show_report(
         f"{provenance.profile}{escape(own)}, sandbox {escape(provenance.sandbox)}, "
         f"seed {provenance.seed})"
     )
+    if report.second_opinion is not None:
+        print_sentences(console, opinion_text(report.second_opinion, units))
     if _lacks_names(report):
         console.print(
             "the profile paper needs all these functions and constants; "

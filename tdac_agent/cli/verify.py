@@ -170,6 +170,8 @@ def _report(file: Path, task: Task, options: VerifyOptions, judge: WarmJudge) ->
             out=options.out,
             judge=judge,
             meanwhile=spinner,
+            physics=options.physics,
+            require_physics=options.require_physics,
         )
     if options.junit is not None:  # it is written again after blind drives
         from tdac_agent.cli.junit import write_junit

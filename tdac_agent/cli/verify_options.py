@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from tdac_agent.cli.shared_options import (
     CONTROLLER,
@@ -19,7 +20,7 @@ from tdac_agent.cli.shared_options import (
 from tdac_agent.cli.task_flags import SETS
 from tdac_agent.option_fields import option
 
-ROBUST = "Robustness"
+ROBUST, PHYSICS = "Robustness", "Second opinion"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,21 @@ class VerifyOptions:
         "each failed episode."
     )
     as_json: bool = json_option()
+    physics: Literal["exact", "mujoco"] = option(
+        "exact",
+        "Another physics that drives what arrives again, for a second opinion (extra "
+        "`physics`); exact for none.",
+        metavar="exact|mujoco",
+        panel=PHYSICS,
+        scope="task",
+    )
+    require_physics: bool = option(
+        False,
+        "Make the second opinion a test: all of these episodes must arrive.",
+        panel=PHYSICS,
+        scope="task",
+        needs="--physics mujoco",
+    )
     split: str = option(
         "test", "dev, test or hidden.", metavar="NAME", panel=SETS, scope="set"
     )

@@ -25,6 +25,7 @@ from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.history import RunHistory, gather_run, learner_named, run_folders
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.diagnosis.gap import gap_figure, gap_text, too_close_text
+from tdac_agent.verification.diagnosis.second_opinion import opinion_text
 
 MOST_BYTES = 24 << 20
 """Limit for the details of all runs; further runs are only listed."""
@@ -164,6 +165,7 @@ def _environment() -> jinja2.Environment:
         "duration": format_seconds,
         "gap_figure": gap_figure,
         "gap_text": gap_text,
+        "opinion_text": opinion_text,
         "too_close_text": too_close_text,
         "learner": learner_named,
         "python": highlighted,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from tdac_agent.models.vendors import forms
 from tdac_agent.option_fields import Flag, flag_of, option
@@ -129,6 +129,14 @@ class SynthOptions:
         "run ends at `passed`.",
         "--confirm/--no-confirm",
         scope="task",
+    )
+    physics: Literal["exact", "mujoco"] = option(
+        "exact",
+        "Another physics that drives what arrives again, for a second opinion in the "
+        "report (extra `physics`); exact for none.",
+        metavar="exact|mujoco",
+        scope="task",
+        recorded=False,
     )
     seed: int | None = option(
         None,

@@ -217,6 +217,10 @@ class Setting(Protocol):
     def displaced(self, x: float, y: float) -> dict[str, Any]:
         """Returns the environment's options with all obstacles shifted, px or m."""
 
+    @property
+    def has_metres(self) -> bool:
+        """Whether the size of the world in metres is known."""
+
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the environment's option for relative distance sensor noise."""
 

@@ -30,6 +30,7 @@ from tdac_agent.verification.diagnosis.report import (
     Report,
     in_units,
 )
+from tdac_agent.verification.diagnosis.second_opinion import as_test
 from tdac_agent.verification.judge.jobs import Findings, Job, write_job
 from tdac_agent.verification.judge.report_log import (
     read_findings,
@@ -38,6 +39,7 @@ from tdac_agent.verification.judge.report_log import (
 )
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.core.intake import RECORD_BYTES, parse_json, read_file
+from tdac_envs.physics.moved import EXACT, engine_named
 
 EVERY_TASK = Path(__file__).parent / "suite" / "every_task.py"
 DEADLINE_SECONDS = 900.0
@@ -59,6 +61,8 @@ def verify(
     out: Path | None = None,
     judge: WarmJudge | None = None,
     meanwhile: Callable[[], None] | None = None,
+    physics: str = EXACT,
+    require_physics: bool = False,
 ) -> Report:
     """Tests a controller in the sandbox against everything the task requires.
 
@@ -78,12 +82,16 @@ def verify(
         judge: A warm judge, to be shared by several verifications; a new one by
             default.
         meanwhile: Called repeatedly while the judge works.
+        physics: Another physics, which drives again what reached the goal, for a second
+            opinion: `mujoco`; `exact` for none.
+        require_physics: Whether this is a test: all of these episodes must arrive.
 
     Returns:
         The report; a failing controller gives a report, never an exception.
 
     Raises:
         ControllerFileError: The file cannot be read.
+        TaskError: The other physics is not installed, or cannot drive on this task.
         Fault: The sandbox or the suite is broken; this is neither pass nor fail.
         RunError: A link leads out of `out`, where the results are written.
     """
@@ -91,6 +99,7 @@ def verify(
     if out is not None:
         refuse_links(out, *WRITTEN)
     source = read_source(controller)
+    check_physics(task, physics)
     suites = _suites(task, suite, shipped)
     with contextlib.ExitStack() as stack:
         warm = judge or stack.enter_context(WarmJudge())
@@ -109,9 +118,13 @@ def verify(
             out=folder / "results",
             trajectories=None if out is None else folder / "trajectories",
             metres=task.setting.shown != task.setting.units,
+            physics=physics,
         )
         lay_out(task, job.task)
         findings, tests, failures = judged(job, source, suites, warm, meanwhile)
+        if require_physics and physics != EXACT:
+            test, wrong = as_test(findings.second_opinion, physics)
+            tests, failures = tests | test, [*failures, *wrong]
         report = Report(
             verdict=verdict_of(tests),
             provenance=_provenance(task, source, job, suites, findings),
@@ -120,10 +133,21 @@ def verify(
             episodes=tuple(findings.episodes),
             child_cpu_seconds=findings.child_cpu_seconds,
             seconds=round(time.monotonic() - began, 3),
+            second_opinion=findings.second_opinion,
         )
         if out is not None:
             keep(report, folder / "trajectories", out, task)
     return report
+
+
+def check_physics(task: Task, physics: str) -> None:
+    """Checks before the work begins that another physics can drive on a task.
+
+    Raises:
+        TaskError: It is unknown or not installed, or cannot drive there.
+    """
+    if engine_named(physics) != EXACT:
+        task.make_env(physics=physics)
 
 
 def judged(

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.drive import stepping
+from tdac_envs.physics.moved import EXACT
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -112,6 +113,20 @@ def make_envs(
                 raise
             raise TaskError(f"each[{number}]: {error}") from error
     return envs
+
+
+def check_exact(envs: Sequence[Any]) -> None:
+    """Checks that the compiled step moves all robots of a batch.
+
+    Raises:
+        TaskError: Another physics moves one of them.
+    """
+    for env in envs:
+        if env.setup.physics != EXACT:
+            raise TaskError(
+                f"a batch computes the exact step; expected physics={EXACT!r} or "
+                f"vectorization_mode='sync', got physics={env.setup.physics!r}"
+            )
 
 
 def joint_space(envs: Sequence[Any]) -> gym.spaces.Dict:

@@ -22,6 +22,7 @@ from tdac_envs.drive.batching import (
     Array,
     Flags,
     autoreset_mode_of,
+    check_exact,
     ends_of,
     infos_of,
     joint_space,
@@ -86,6 +87,7 @@ class DrivenVectorEnv(VectorEnv[Observations, Actions, Any]):
     ) -> None:
         num_envs = whole_number("num_envs", num_envs, 1)
         envs = make_envs(self.make, each, options, num_envs)
+        check_exact(envs)
         self._adopt(envs, num_envs)
         self._most_steps = time_limit_of(max_episode_steps)
         self.num_envs = num_envs

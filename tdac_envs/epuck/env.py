@@ -20,8 +20,8 @@ from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import info_of, place
 from tdac_envs.epuck import kernels, observed
+from tdac_envs.epuck.carried import movables_of
 from tdac_envs.epuck.ground import Ground
-from tdac_envs.epuck.movables import Movables
 from tdac_envs.epuck.robot import EPuckArrays
 from tdac_envs.epuck.robot_options import (
     RobotSource,
@@ -33,6 +33,7 @@ from tdac_envs.epuck.setup import EPuckSetup
 from tdac_envs.epuck.smallest_gap import note_gap
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
+from tdac_envs.physics.moved import EXACT
 
 if TYPE_CHECKING:
     from tdac_envs.epuck.picture import EPuckScene
@@ -172,6 +173,8 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             says otherwise.
         stopping_distance: From full speed to standstill, m. It changes no motion, but
             the gap to obstacles that the robot should keep (`required_gap`).
+        physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
+            moves the robot and the objects that have a mass (`docs/physics.md`).
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -222,6 +225,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         robot: RobotSource = None,
         disturbed: bool = False,
         stopping_distance: float | None = None,
+        physics: str = EXACT,
         render_mode: str | None = None,
     ) -> None:
         one_of("reflectance", reflectance, ("ideal", "webots"))
@@ -268,6 +272,8 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             webots=reflectance == "webots",
             goal_visible=bool(goal_visible),
             stopping_distance=sizes["stopping_distance"],
+            physics=physics,
+            body=None,
         )
         asked = (ground_sensors, gps, compass, encoders)
         further = tuple(itertools.compress(observed.INSTRUMENTS, asked))
@@ -309,7 +315,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             space = with_odometry(space, self._limits)
         self._has_more = bool(self.further or self.disturbances.odometry)
         self.observation_space = space  # type: ignore[assignment]
-        self._movables = Movables(setup, setup.nominal)
+        self._movables = movables_of(setup, setup.nominal)
         self.robot = EPuckArrays.blank(self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
@@ -328,11 +334,11 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         before = self.task
         task = self._draw(options or {})
         if task.ground is not before.ground:
-            self._movables = Movables(self.setup, task)
+            self._movables = movables_of(self.setup, task)
             self.setup.enter(self.robot.constants, task)
         if task.field is not before.field:
             self._bind()
-        self._movables.reset()
+        self._movables.reset(task.start)
         place(self.robot, task)
         self._hide()
         self._goal[:] = task.goal
@@ -365,7 +371,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         stops = self.on_collision == "terminate"
         drive = kernels.drive if stops else kernels.drive_or_slide
         self._call_drive = partial(drive, words)
-        if self.setup.pushes:
+        if things.moves:
             self._call_drive = partial(things.step, words, self.robot, self._call_drive)
 
     def _observation(self) -> Observation:
@@ -404,7 +410,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
 
         task, robot = self.task, self.robot
         if self._scene is None:
-            self._scene = EPuckScene(task, movable=self.setup.pushes)
+            self._scene = EPuckScene(task, movable=self._movables.moves)
         gap = math.dist(self._trail[-1], task.goal)
         status = Status(self._steps, task.horizon, gap, self._status)
         return self._scene.frame(
@@ -412,6 +418,6 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             readings=robot.readings,
             reaches=robot.hits[:, 0],
             trail=self._trail,
-            solid=self._movables.solid if self.setup.pushes else task.ground.solid,
+            solid=self._movables.solid if self._movables.moves else task.ground.solid,
             status=status,
         )

@@ -139,7 +139,7 @@ def _ground(world: World) -> Ground:
         for thing in things
         for part in at_body_height(thing.solid, floor)
     ]
-    owned += [Owned(Part(wall, floor, floor + 1.0)) for wall in _fence(bounds)]
+    owned += [Owned(Part(wall, floor, floor + 1.0)) for wall in fence(bounds)]
     solid = Prisms.of(owned)
     spacing, clear = _clearances(solid, bounds)
     for array in (solid.points, solid.extent, clear):
@@ -190,7 +190,8 @@ def _bounds(world: World, things: tuple[Obstacle, ...]) -> Bounds:
     return left, low, right, high
 
 
-def _fence(bounds: Bounds) -> list[Any]:
+def fence(bounds: Bounds) -> list[Any]:
+    """Footprints of the four walls around a world, which no sensor sees."""
     left, low, right, high = bounds
     inside = Rectangle(
         (left + right) / 2, (low + high) / 2, 0.0, right - left, high - low

@@ -13,6 +13,7 @@ from tdac_envs.epuck import kernels
 from tdac_envs.epuck.robot import EPuckArrays
 from tdac_envs.epuck.setup import EPuckSetup
 from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.physics.moved import Pose
 
 
 class Movables:
@@ -27,6 +28,7 @@ class Movables:
         seen: Visible parts at their current positions.
         things: Shape (k, 6): x, y (m), angle (rad) of each object, and their
             velocities.
+        moves: Whether steps are run by `step`.
     """
 
     def __init__(self, setup: EPuckSetup, task: EPuckTask) -> None:
@@ -34,16 +36,16 @@ class Movables:
         ground = task.ground
         # `ground.solid` and `visible` keep the initial positions.
         self.solid, self.seen = ground.solid, self._visible
-        self._pushes = setup.pushes
+        self.moves = setup.pushes
         if setup.pushes:
             self.solid, self.seen = self.solid.copy(), self.seen.copy()
         self.things: NDArray[np.float64] = np.zeros((len(ground.masses), 6))
         self._speed = np.zeros(3)
         self.things[:, :2] = ground.centres
 
-    def reset(self) -> None:
+    def reset(self, start: Pose) -> None:  # noqa: ARG002 - of the robot
         """Puts all objects where they are in the world file, at rest."""
-        if not self._pushes:
+        if not self.moves:
             return
         self._speed[:] = 0.0
         self.things[:] = 0.0

@@ -19,6 +19,8 @@ from tdac_envs.epuck.nearby import NearbyParts, surroundings
 from tdac_envs.epuck.paths import widest_body
 from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.task import EPuckTask
+from tdac_envs.physics.body import BodySpec
+from tdac_envs.physics.moved import EXACT, engine_named
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
@@ -30,17 +32,22 @@ class EPuckSetup(DriveSetup):
         webots: Whether the sensors see Webots' reflectances; see `Ground.visible`.
         goal_visible: Whether the sensors see the file's goal marker.
         stopping_distance: Of the robot, from full speed, m.
+        physics: `"exact"` or `"mujoco"`.
+        body: The robot's body for MuJoCo; None for that of the world's e-puck.
     """
 
     nominal: EPuckTask
     webots: bool
     goal_visible: bool
     stopping_distance: float = 0.0
+    physics: str = EXACT
+    body: BodySpec | None = None
 
     def __post_init__(self) -> None:
         DriveSetup.__post_init__(self)
         least = non_negative("stopping_distance", self.stopping_distance)
         object.__setattr__(self, "stopping_distance", least)
+        engine_named(self.physics)
 
     def required_gap(self, task: EPuckTask) -> float:
         """See `DriveSetup.required_gap`."""
@@ -49,7 +56,9 @@ class EPuckSetup(DriveSetup):
 
     @property
     def pushes(self) -> bool:
-        """Whether the robot can push objects."""
+        """Whether the robot can push objects without another physics."""
+        if self.physics != EXACT:
+            return False
         return self.on_collision == "block" and len(self.nominal.ground.masses) > 0
 
     def around(self, task: EPuckTask) -> NearbyParts:

@@ -22,6 +22,7 @@ from tdac_envs.drive.stepping import STEPS, place
 from tdac_envs.drive.task import Pose, with_tolerance_note
 from tdac_envs.grid.map_units import MapUnits
 from tdac_envs.map2d.among import begin_among, drive_among
+from tdac_envs.map2d.carried import carried_by
 from tdac_envs.map2d.kernels import begin, drive, drive_or_slide
 from tdac_envs.map2d.metric_input import in_pixels, options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
@@ -32,12 +33,13 @@ from tdac_envs.map2d.robot import Map2DArrays
 from tdac_envs.map2d.robot_options import RobotSource, with_robot
 from tdac_envs.map2d.setup import OVERRIDDEN, Map2DSetup, override
 from tdac_envs.map2d.smallest_gap import note_gap, note_gap_among
-from tdac_envs.map2d.sonar import NOISE
+from tdac_envs.map2d.sonar import noise_of
 from tdac_envs.map2d.source import MapSource, metric_units, prepare, units_of
 from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
 from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
 from tdac_envs.movers.spec import MoversOption, read_specs
 from tdac_envs.movers.state import Movers
+from tdac_envs.physics.moved import EXACT
 
 MOST_GHOSTS = 200
 """Frames show where the movers were in the last second, in at most 200 steps."""
@@ -244,6 +246,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         frame: `"pixels"` or `"metres"`; see In metres.
         ray_angles: Directions of the rays from the heading, rad, in the order of
             `ranges`, instead of `n_rays` and `field_of_view`. Default: an even fan.
+        physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
+            moves the robot (`docs/physics.md`).
+        resolution: Metres per px of a map that does not say it; only MuJoCo uses it.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -313,6 +318,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         movers: MoversOption = None,
         frame: FrameName = "pixels",
         ray_angles: Sequence[float] | None = None,
+        physics: str = EXACT,
+        resolution: float | None = None,
         render_mode: str | None = None,
     ) -> None:
         units = units_of(map, frame)
@@ -393,7 +400,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             ),
             weights=weights_of(reward_weights),
             source=None,
-            range_noise=_noise_of(sensor, given["range_noise"]),
+            range_noise=noise_of(sensor, given["range_noise"]),
             range_dropout=range_dropout,
             movers=given["movers"],
             metric=units.frame,
@@ -401,6 +408,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             reception=Reception(
                 **{n: given[n] or 0 for n in RECEIVED}, message_drop=message_drop
             ),
+            physics=physics,
+            pixel_size=params.resolution if resolution is None else resolution,
         )
         notes = with_tolerance_note(params.notes, nominal, units.length)
         self.params = params.model_copy(update={"notes": notes})
@@ -427,13 +436,14 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self._view = None if setup.metric is None else MetricView(setup.metric)
         if self._view is not None:
             space = self._view.space(space)
-            self.info_of = partial(_metric_info, self._view)
+            self.info_of = self._view.info_of
         self.observation_space = space  # type: ignore[assignment]
         self.robot = Map2DArrays.blank(setup.nominal.robot.n_rays, self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
         self.movers = movers_of(self.nominal)
         self._ghosts: deque[NDArray[np.float64]] = deque(maxlen=1)
+        self._carried = carried_by(setup, setup.nominal)
         self._bind()
         self._scene: MapScene | None = None
 
@@ -453,6 +463,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         if self.task.field is not before.field or self.setup.has_movers:
             self._bind()
         task, robot = self.task, self.robot
+        if self._carried is not None:
+            self._carried.reset(task.start)
         place(robot, task)
         self._hide()
         self._goal[:] = task.goal
@@ -486,10 +498,11 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         among = self.setup.has_movers
         self.addresses = Addresses([(*arrays, *self.movers) if among else arrays])
         (words,) = self.addresses.words
-        stops = self.on_collision == "terminate"
-        alone = (begin, drive if stops else drive_or_slide)
+        alone = begin, drive if self.on_collision == "terminate" else drive_or_slide
         kernels = (begin_among, drive_among) if among else alone
         calls: list[Callable[[], None]] = [partial(call, words) for call in kernels]
+        if self._carried is not None:
+            calls[1] = partial(self._carried.step, words, self.robot, self.task)
         if self.setup.sonar is not None:
             calls = [partial(self._then_listen, call) for call in calls]
         self._call_begin, self._call_drive = calls
@@ -555,18 +568,6 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         return self._scene.frame(
             robot.state[:3].tolist(), robot.ranges, self._trail, status, self._ghosts
         )
-
-
-def _metric_info(view: MetricView, outcome: list[float]) -> dict[str, Any]:
-    """The `info` of a step in metres."""
-    return view.info(info_of(outcome))
-
-
-def _noise_of(sensor: str, given: float | None) -> float:
-    """The relative noise of ranges that a user asks for."""
-    if given is not None:
-        return given
-    return NOISE if sensor == "sonar" else 0.0
 
 
 def movers_of(task: Map2DTask) -> Movers:

@@ -14,6 +14,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tdac_envs.grid.map_units import MapFrame
+from tdac_envs.map2d.observed import info_of
 
 Array = NDArray[np.float64]
 Seen = dict[str, NDArray[np.float32]]
@@ -67,6 +68,10 @@ class MetricView:
         lengths = {key: whole[key] * self._resolution for key in LENGTHS}
         own = {**whole, **lengths}
         return own if self._resolution.ndim else {**own, **_floats(lengths)}
+
+    def info_of(self, outcome: list[float]) -> dict[str, Any]:
+        """The `info` of a step in metres, from its `outcome` as a list."""
+        return self.info(info_of(outcome))
 
     def space(self, whole: spaces.Dict) -> spaces.Dict:
         """The observation space of a robot, converted from px."""

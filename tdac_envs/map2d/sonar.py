@@ -127,3 +127,15 @@ def _facing(clear: FloatGrid, x: float, y: float, dx: float, dy: float) -> float
             out_y += (j - row) * clear[j, i]
     length = math.hypot(out_x, out_y)
     return -(out_x * dx + out_y * dy) / length if length > 0.0 else 0.0
+
+
+def noise_of(sensor: str, given: float | None) -> float:
+    """The relative noise of ranges that a user asks for.
+
+    Args:
+        sensor: `"rays"` or `"sonar"`.
+        given: As given; None for the default of the sensor.
+    """
+    if given is not None:
+        return given
+    return NOISE if sensor == "sonar" else 0.0

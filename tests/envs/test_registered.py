@@ -68,6 +68,14 @@ VARIANTS = [
     ),
     ("TDAC-EPuck-v0", {"world": "maze", "variation": "random"}),
     ("TDAC-EPuck-v0", {"world": "maze", "variation": "mixed"}),
+    (
+        "TDAC-EPuck-v0",
+        {"world": "crates", "variation": "jitter", "physics": "mujoco", "delay": 1},
+    ),
+    (
+        "TDAC-Map2D-v0",
+        {"map": "office", "variation": "jitter", "physics": "mujoco", "odometry": True},
+    ),
     ("TDAC-Ladder-v0", {"level": "known", "split": "test"}),
     ("TDAC-Ladder-v0", {"level": "lost", "split": "dev"}),
     ("TDAC-Ladder-v0", {"level": "crowd", "split": "dev"}),

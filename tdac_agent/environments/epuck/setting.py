@@ -125,6 +125,11 @@ class EPuckSetting:
         moved = tuple(map(shift.obstacle, world.obstacles))
         return {"world": replace(world, obstacles=moved)}
 
+    @property
+    def has_metres(self) -> bool:
+        """True: worlds are in metres."""
+        return True
+
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the option for the published noise, scaled to this mean."""
         return {"sensor_noise": relative / _MEAN_NOISE}

@@ -157,6 +157,8 @@ class Map2DSetting:
 
     def make_env(self, **options: Any) -> Map2DEnv:
         """Constructs this task's environment; `options` override its arguments."""
+        if "physics" in options:
+            options = {"resolution": self.params.resolution, **options}
         return Map2DEnv(**{**self.env_kwargs(), **options})
 
     def displaced(self, x: float, y: float) -> dict[str, Any]:
@@ -170,6 +172,11 @@ class Map2DSetting:
         if by[1]:
             moved[:, columns] = True
         return {"map": moved}
+
+    @property
+    def has_metres(self) -> bool:
+        """Whether the map has a resolution."""
+        return self.params.resolution is not None
 
     def noise(self, relative: float) -> dict[str, float]:
         """Returns the option for this relative noise of each range."""

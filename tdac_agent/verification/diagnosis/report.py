@@ -107,6 +107,44 @@ class Episode(StrictRecord):
         return reached and found is not None and found.too_close
 
 
+class OtherEpisode(StrictRecord):
+    """One episode that another physics drove again; lengths in px or m."""
+
+    name: str
+    outcome: str
+    steps: int
+    gap: float | None = Field(None, description="Smallest gap with this physics.")
+    exact_gap: float | None = Field(None, description="Smallest gap of the judge's.")
+
+    @property
+    def arrives(self) -> bool:
+        """Whether it reached the goal without a contact."""
+        return self.outcome == "reached"
+
+
+class SecondOpinion(StrictRecord):
+    """The episodes that reached the goal, driven again with another physics.
+
+    It informs: only `verify --require-physics` makes a test of it.
+    """
+
+    engine: str = Field(description="Name and version, such as `MuJoCo 4.0.0`.")
+    scaled: bool = Field(
+        False, description="Whether a map without metres got a body radius of 0.1 m."
+    )
+    episodes: tuple[OtherEpisode, ...]
+
+    @property
+    def arrivals(self) -> int:
+        """Number of episodes that reach the goal."""
+        return sum(each.arrives for each in self.episodes)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether all of them reach the goal."""
+        return self.arrivals == len(self.episodes)
+
+
 class Provenance(StrictRecord):
     """What was verified, and under which conditions."""
 
@@ -160,6 +198,9 @@ class Report(StrictRecord):
     episodes: tuple[Episode, ...]
     child_cpu_seconds: float
     seconds: float
+    second_opinion: SecondOpinion | None = Field(
+        None, description="None if no other physics was asked for, or drove."
+    )
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:

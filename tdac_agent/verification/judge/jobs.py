@@ -11,7 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from tdac_agent.sandbox import Limits
 from tdac_agent.storage.printable_record import PrintableRecord
 from tdac_agent.tasks.task_file import Profile
-from tdac_agent.verification.diagnosis.report import Episode
+from tdac_agent.verification.diagnosis.report import Episode, SecondOpinion
+from tdac_envs.physics.moved import EXACT
 
 SUITE: Final = "suite"
 """The kind of a `Job`."""
@@ -40,6 +41,9 @@ class Job(BaseModel):
     metres: bool = Field(False, description="Whether the user reads metres of the map.")
     set_file: Path | None = None
     split: str = ""
+    physics: str = Field(
+        EXACT, description="What drives again what reached the goal; `exact`: nothing."
+    )
 
 
 def write_job(job: BaseModel, path: Path) -> None:
@@ -65,3 +69,4 @@ class Findings(PrintableRecord):
         default_factory=dict,
         description="Static and contract tests on a set: why each failed, or None.",
     )
+    second_opinion: SecondOpinion | None = None

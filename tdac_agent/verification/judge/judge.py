@@ -40,6 +40,7 @@ from tdac_agent.verification.judge.turns import Turns
 from tdac_agent.verification.judge.worker_pool import SIZE, WorkerPool
 from tdac_agent.verification.suite.starts import JITTERS, episode_seed, spread_starts
 from tdac_envs.drive.task import Pose
+from tdac_envs.physics.moved import EXACT
 
 NAMES = ("nominal", *(f"jitter {number}" for number in range(1, JITTERS + 1)))
 # Number of episodes in a suite: nominal, jittered, and three of `run_episode`.
@@ -77,6 +78,7 @@ class Judge:
         at_a_time: Maximum number of concurrent episodes.
         wall_seconds: Time limit of the whole verification, s.
         level: The task set; None for a task.
+        physics: What moves the robot in episodes.
 
     Attributes:
         tier: Name of the tier that was used.
@@ -99,6 +101,7 @@ class Judge:
         at_a_time: int = min(SIZE, EPISODES),
         wall_seconds: float = WALL_SECONDS,
         level: Level | None = None,
+        physics: str = EXACT,
     ) -> None:
         self.task = task
         self.source = source
@@ -114,7 +117,7 @@ class Judge:
         self._deadline = time.monotonic() + wall_seconds
         self._too_long = f"the verification took longer than {wall_seconds:g} s"
         self._settings = VerificationSettings(
-            source, workdir, tier, self._limits, self._deadline, level
+            source, workdir, tier, self._limits, self._deadline, level, physics
         )
         self._own = ExitStack()
         if child_pool is None:
@@ -136,6 +139,25 @@ class Judge:
         self._wanted: set[Key] = set()
         self._unit: Unit | None = None
         self._import_fault: ControllerFault | None = None
+
+    def twin(self, physics: str) -> Judge:
+        """A judge of the same controller, with limits of its own and another physics.
+
+        It uses the pools of this one, which must stay open.
+        """
+        return Judge(
+            self.task,
+            self.source,
+            self._settings.workdir,
+            tier=self._settings.tier,
+            seed=self.seed,
+            limits=self._limits,
+            child_pool=self._child_pool,
+            worker_pool=self._worker_pool,
+            at_a_time=self._at_a_time,
+            wall_seconds=self._wall_seconds,
+            physics=physics,
+        )
 
     def unit(self) -> Unit:
         """The imported controller, whose functions can be called.

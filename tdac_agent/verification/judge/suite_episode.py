@@ -24,6 +24,7 @@ from tdac_agent.verification.judge.cpu_budget import Budgeted
 from tdac_agent.verification.judge.level import Level
 from tdac_agent.verification.judge.worker_pool import WorkerPool
 from tdac_envs.drive.task import Pose
+from tdac_envs.physics.moved import EXACT
 
 if TYPE_CHECKING:
     from tdac_agent.verification.judge.first_world import FirstWorld
@@ -44,6 +45,7 @@ class VerificationSettings:
         limits: Limits of each child.
         deadline: Latest end, by `time.monotonic`.
         level: The task set; None for a task.
+        physics: What moves the robot.
     """
 
     source: bytes
@@ -52,6 +54,7 @@ class VerificationSettings:
     limits: Limits
     deadline: float
     level: Level | None = None
+    physics: str = EXACT
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +138,7 @@ def drive(
     """
     began = time.process_time()
     limit = request.steps if request.steps is not None else task.nominal.horizon
-    record = _record(task, request, limit)
+    record = _record(task, request, limit, settings.physics)
     record.seen = task.seen
     if request.drive == "truncated run_episode":
         record.truncates, record.collisions_before = True, 2
@@ -168,8 +171,15 @@ def drive(
     return SuiteResult(rollout, usage, time.process_time() - began, child.tier)
 
 
-def _record(task: SuiteTask, request: EpisodeRequest, most: int) -> Record:
-    env, options = task.make_env(), request.options
+def _record(
+    task: SuiteTask, request: EpisodeRequest, most: int, physics: str = EXACT
+) -> Record:
+    options = request.options
+    if physics == EXACT:
+        env = task.make_env()
+    else:
+        assert isinstance(task, Task)
+        env = task.make_env(physics=physics)
     return Record(env, request.start, most, seed=request.seed, options=options)
 
 

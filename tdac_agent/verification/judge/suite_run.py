@@ -13,6 +13,7 @@ from tdac_agent.verification.judge.jobs import Job
 from tdac_agent.verification.judge.judge import Judge
 from tdac_agent.verification.judge.level import Level
 from tdac_agent.verification.judge.suite_episode import SuitePool, task_of
+from tdac_envs.physics.moved import EXACT
 
 
 def judge_suite(
@@ -61,8 +62,15 @@ def judge_suite(
         if job.metres:
             assert isinstance(task, Task)
             shown = task.setting.in_metres().shown
-        findings = findings_of(judge, plugin.expected, shown, checks).model_dump_json()
-    (job.out / "findings.json").write_text(findings, encoding="utf-8")
+        findings = findings_of(judge, plugin.expected, shown, checks)
+    if job.physics != EXACT and findings.fault is None:
+        from tdac_agent.verification.judge.driven_again import drive_again
+
+        opinion = drive_again(judge, job.physics)
+        changes = {"second_opinion": opinion, "fault": judge.fault}
+        findings = findings.model_copy(update=changes)
+    text = findings.model_dump_json()
+    (job.out / "findings.json").write_text(text, encoding="utf-8")
 
 
 def _level_of(set_file: Path, split: str) -> Level:

@@ -1,0 +1,137 @@
+"""A robot on a map, moved by another physics, in metres and with y up."""
+
+from __future__ import annotations
+
+import math
+
+from tdac_envs.core.addresses import Words
+from tdac_envs.core.compiled import kernel
+from tdac_envs.core.errors import TaskError
+from tdac_envs.drive.stepping import (
+    AXLE,
+    CONTACT,
+    DT,
+    FORWARD,
+    HEADING,
+    REMAINING,
+    TOUCHED,
+    TURN,
+    apply_command,
+    finish_step,
+)
+from tdac_envs.map2d.kernels import arc_of, arrays_at, ground_speeds, observe
+from tdac_envs.map2d.robot import Map2DArrays
+from tdac_envs.map2d.setup import Map2DSetup
+from tdac_envs.map2d.task import Map2DTask
+from tdac_envs.physics.body import BodySpec, disc_body
+from tdac_envs.physics.boxes import scene_on
+from tdac_envs.physics.moved import EXACT, Pose, arc_between, rim_speeds
+
+UNSCALED_RADIUS = 0.1
+"""Body radius of a robot on a map without a resolution, m."""
+_WALLS = 2.0
+"""Height of walls, in heights of the robot."""
+
+
+class Carried:
+    """A robot on a map whose body is moved by MuJoCo.
+
+    The seam is here: pixels become metres, and y, which points down in the picture,
+    points up. So left stays left, and headings change their sign.
+
+    Args:
+        setup: Configuration of the environment.
+        task: A task on the map.
+
+    Raises:
+        TaskError: MuJoCo is not installed, there are movers, or the map needs too many
+            boxes.
+    """
+
+    def __init__(self, setup: Map2DSetup, task: Map2DTask) -> None:
+        from tdac_envs.physics.engine import MujocoBody
+
+        if setup.has_movers:
+            raise TaskError("physics 'mujoco' has no movers; leave them out")
+        self._metres = metres_of(setup, task)
+        body = body_of(task, self._metres) if setup.body is None else setup.body
+        cells = task.terrain.grid.cells
+        self.body = MujocoBody(scene_on(cells, self._metres, _WALLS * body.top), body)
+
+    def reset(self, start: Pose) -> None:
+        """Begins an episode at a pose: px, px, rad."""
+        self.body.reset(self._out(start))
+
+    def step(self, words: Words, robot: Map2DArrays, task: Map2DTask) -> None:
+        """Runs one step.
+
+        Args:
+            words: Addresses of the arrays; see `kernels.begin`.
+            robot: Arrays of the robot.
+            task: The task of the episode.
+        """
+        state, dt = robot.state, task.dt
+        turn_wheels(words)
+        forward, turn = state[FORWARD : TURN + 1].tolist()
+        axle = task.robot.axle_length
+        left, right = rim_speeds(forward, -turn, axle, dt)
+        x, y, heading = state[: HEADING + 1].tolist()
+        moved = self.body.step(left * self._metres, right * self._metres, dt)
+        state[: HEADING + 1] = end = self._back(moved.pose)
+        state[FORWARD], state[TURN] = arc_between((x, y, heading), end)
+        robot.outcome[TOUCHED] = robot.outcome[CONTACT] = moved.touched
+        finish(words)
+
+    def _out(self, pose: Pose) -> Pose:
+        x, y, heading = pose
+        return x * self._metres, -y * self._metres, -heading
+
+    def _back(self, pose: Pose) -> Pose:
+        x, y, heading = pose
+        wrapped = math.pi if heading == -math.pi else -heading
+        return x / self._metres, -y / self._metres, wrapped
+
+
+def carried_by(setup: Map2DSetup, task: Map2DTask) -> Carried | None:
+    """What moves the robot in place of the compiled step; None for the latter."""
+    return None if setup.physics == EXACT else Carried(setup, task)
+
+
+def metres_of(setup: Map2DSetup, task: Map2DTask) -> float:
+    """Size of a pixel for the physics, m.
+
+    That of the map if it has a resolution; otherwise the one with which the body's
+    radius is `UNSCALED_RADIUS`.
+    """
+    if setup.pixel_size is not None:
+        return setup.pixel_size
+    return UNSCALED_RADIUS / task.robot.radius
+
+
+def body_of(task: Map2DTask, metres: float) -> BodySpec:
+    """The body of the robot of a task, of which only radius and axle are known."""
+    robot = task.robot
+    return disc_body(robot.radius * metres, robot.axle_length * metres)
+
+
+@kernel
+def turn_wheels(words: Words) -> None:
+    """Begins a step: sets the wheels' speeds and the arc that they would drive."""
+    own = arrays_at(words)
+    constants, state, queue, wheel_speeds, outcome = (
+        own[4], own[5], own[6], own[8], own[10],
+    )  # fmt: skip
+    apply_command(constants, state, queue, wheel_speeds, outcome)
+    left, right = ground_speeds(constants, state, wheel_speeds)
+    forward, turn = arc_of(left, right, constants[AXLE], constants[DT])
+    state[FORWARD], state[TURN] = forward, turn
+
+
+@kernel
+def finish(words: Words) -> None:
+    """Completes the step after the motion, once `outcome[TOUCHED]` is set."""
+    own = arrays_at(words)
+    constants, state, outcome = own[4], own[5], own[10]
+    before = outcome[REMAINING]
+    observe(own[0], own[1], own[2], own[3], constants, state, own[7], own[9], outcome)
+    finish_step(constants, state, outcome, before)

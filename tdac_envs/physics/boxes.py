@@ -1,0 +1,77 @@
+"""The walls of an occupancy grid as few boxes, in metres."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdac_envs.core.errors import TaskError
+from tdac_envs.physics.scene import Prism, Scene
+from tdac_envs.worlds.footprint import Rectangle
+
+Cells = NDArray[np.bool_]
+MOST_BOXES = 20_000
+"""Largest number of boxes of a map."""
+_FENCE = 1.0
+"""Width of the walls around a map, m."""
+
+
+def rectangles(cells: Cells) -> list[tuple[int, int, int, int]]:
+    """Rectangles that cover the occupied cells of a grid, each cell once.
+
+    Runs of equal columns in successive rows become one rectangle.
+
+    Args:
+        cells: Shape (height, width), True where occupied.
+
+    Returns:
+        First column, first row, last column + 1, last row + 1 of each.
+    """
+    done: list[tuple[int, int, int, int]] = []
+    open_: dict[tuple[int, int], int] = {}
+    for row, line in enumerate(cells):
+        edges = np.flatnonzero(np.diff(line.astype(np.int8), prepend=0, append=0))
+        runs = set(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+        done += [
+            (a, open_.pop((a, b)), b, row) for a, b in [*open_] if (a, b) not in runs
+        ]
+        for run in runs:
+            open_.setdefault(run, row)
+    done += [(a, top, b, len(cells)) for (a, b), top in open_.items()]
+    return sorted(done)
+
+
+def scene_on(cells: Cells, metres: float, height: float) -> Scene:
+    """The scene of a map: x to the right, y up, the centre of pixel (0, 0) at (0, 0).
+
+    Pixel (i, j) is at (i, -j) times `metres`. Everything outside of the map is solid.
+
+    Args:
+        cells: Shape (height, width), True where occupied.
+        metres: Size of a pixel, m.
+        height: Height of the walls, m.
+
+    Raises:
+        TaskError: The map needs too many boxes.
+    """
+    found = rectangles(cells)
+    if len(found) > MOST_BOXES:
+        raise TaskError(
+            f"physics 'mujoco': the obstacles of the map are {len(found)} boxes, more "
+            f"than {MOST_BOXES}; use a coarser map"
+        )
+    rows, columns = cells.shape
+    wide = max(round(_FENCE / metres), 1)
+    found += [
+        (-wide, -wide, columns + wide, 0),
+        (-wide, rows, columns + wide, rows + wide),
+        (-wide, 0, 0, rows),
+        (columns, 0, columns + wide, rows),
+    ]
+    return Scene(tuple(Prism(_box(one, metres), 0.0, height) for one in found))
+
+
+def _box(one: tuple[int, int, int, int], metres: float) -> Rectangle:
+    left, top, right, bottom = (metres * (edge - 0.5) for edge in one)
+    middle = (left + right) / 2, -(top + bottom) / 2
+    return Rectangle(*middle, 0.0, right - left, bottom - top)
