@@ -67,6 +67,7 @@ def run(flags: TaskFlags, options: EvaluateOptions) -> int:
                 seed=options.seed,
                 variation=options.variation,
                 split=options.split,
+                physics=options.physics,
                 wrappers=wrappers,
                 tier=options.tier,
                 out=options.out,

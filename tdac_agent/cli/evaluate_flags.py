@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import typer
 
@@ -13,6 +14,7 @@ from tdac_agent.cli.shared_options import (
     Variation,
     json_option,
     out_option,
+    physics_option,
     tier_option,
     wrappers_option,
 )
@@ -58,6 +60,7 @@ class EvaluateOptions:
         0, "Seed of the episodes, the same for all policies.", least=0, scope="task"
     )
     variation: Variation = option("jitter", VARIATION, scope="task")
+    physics: Literal["exact", "mujoco"] = physics_option()
     wrappers: tuple[str, ...] | None = wrappers_option(
         f"{WRAPPER}  [default: as the .zip file records]", "--wrapper"
     )

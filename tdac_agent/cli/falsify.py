@@ -53,6 +53,7 @@ def run(flags: TaskFlags, options: FalsifyOptions) -> int:
         split=options.split,
         worlds=options.worlds,
         curves=options.curves,
+        physics=options.physics,
     )
     console = Console(stderr=options.as_json)
     with ChildPool() as child_pool:

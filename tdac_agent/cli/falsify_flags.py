@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import typer
 
-from tdac_agent.cli.shared_options import json_option, out_option, tier_option
+from tdac_agent.cli.shared_options import (
+    json_option,
+    out_option,
+    physics_option,
+    tier_option,
+)
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, SETS, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
 from tdac_agent.option_fields import option
@@ -50,6 +56,7 @@ class FalsifyOptions:
     out: Path | None = out_option(
         "Folder for falsify.json, counterexample.png, and curves.png."
     )
+    physics: Literal["exact", "mujoco"] = physics_option()
     tier: str = tier_option()
     as_json: bool = json_option()
     worlds: int = option(

@@ -72,6 +72,13 @@ seed_option = partial(
     "installation]",
     least=0,
 )
+physics_option = partial(
+    option,
+    "exact",
+    "What moves the robot: the exact step, or MuJoCo, a 3D contact solver (extra "
+    "`physics`).",
+    metavar="exact|mujoco",
+)
 profile_option = partial(
     option,
     None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ from tdac_agent.evaluation.policies import (
     knowledge,
     prepared,
 )
-from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.episodes import check_physics, episodes_of
 from tdac_agent.problems.part import Part, identity_of
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.sandbox import Limits
@@ -51,6 +51,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import one_line, parse_json, read_file
 from tdac_envs.drive.task import VARIATIONS
 from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.physics.moved import EXACT
 
 EPISODES = 100
 RESULTS, EPISODE_TABLE, TIMING = "evaluation.json", "episodes.csv", "timing.csv"
@@ -73,6 +74,7 @@ def evaluate(
     seed: int = 0,
     variation: str = "jitter",
     split: str = "test",
+    physics: str = EXACT,
     wrappers: Sequence[str] | None = None,
     tier: str = "auto",
     limits: Limits | None = None,
@@ -97,6 +99,7 @@ def evaluate(
         variation: Variation of a task's starts: `nominal`, `jitter`, `mixed`, or
             `random`, which also varies the goals.
         split: Split of a set: `dev` or `test`.
+        physics: What moves the robot: `exact`, or `mujoco`.
         wrappers: Wrappers of saved policies that do not record their own.
         tier: Sandbox tier; `auto` for the best one on this machine.
         limits: Limits of a controller's process in each episode.
@@ -125,14 +128,20 @@ def evaluate(
     for each in problems:
         _refuse_hidden(each, split)
     parts = [
-        part_of(each, episodes, seed=seed, variation=variation, split=split)
+        replace(
+            part_of(each, episodes, seed=seed, variation=variation, split=split),
+            physics=physics,
+        )
         for each in problems
     ]
+    for each in problems:
+        check_physics(each, physics)
     own = [[fitted(each, problem) for each in entrants] for problem in problems]
     about: dict[str, Any] = {
         "variation": None if all(on_sets) else variation,
         "seed": None if all(on_sets) else seed,
         "episodes": episodes,
+        "physics": physics,
         "tasks": tuple(map(_about_problem, problems, parts)),
         "policies": tuple(map(_about_policy, entrants)),
         "versions": versions(),
@@ -293,6 +302,7 @@ def _kept(
     same = about.model_dump(include={"name", "sha256", "dynamics"})
     wanted: dict[str, Any] = {"controller_sha256": sha256, **same}
     wanted |= {"split": part.split} if part.split else {"variation": part.variation}
+    wanted |= {"physics": part.physics}
     return kept_report(folder, wanted, part.numbers)
 
 

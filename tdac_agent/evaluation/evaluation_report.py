@@ -161,6 +161,7 @@ class Evaluation(StrictRecord):
     variation: str | None = Field(description="Of the starts of tasks.")
     seed: int | None = Field(description="Of the episodes of tasks.")
     episodes: int = Field(description="Episodes of each policy on each problem.")
+    physics: str = Field("exact", description="What moved the robots.")
     tasks: tuple[EvaluatedProblem, ...]
     policies: tuple[EvaluatedPolicy, ...]
     rows: tuple[PolicyRow, ...]

@@ -33,6 +33,7 @@ from tdac_agent.verification.store import ROWS_FILE, mark_rows, unfinished
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import read_file
 from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.physics.moved import EXACT
 
 JITTER = "jitter"
 _MOST_BYTES = 64 << 20
@@ -53,6 +54,7 @@ class Drives:
         out: Folder that keeps what an interrupted search has driven; None for none.
         judge: A warm judge.
         watch: Called with the number of episodes so far.
+        physics: What moves the robot.
         used: Tier that the sandbox had.
         count: Episodes so far, those of an interrupted search included.
     """
@@ -66,6 +68,7 @@ class Drives:
     out: Path | None
     judge: WarmJudge
     watch: Watch | None = None
+    physics: str = EXACT
     used: str = ""
     count: int = 0
     _known: dict[str, EpisodeRow] = field(default_factory=dict)
@@ -89,6 +92,7 @@ class Drives:
             "problem": identity_of(episodes_of(self.problem)),
             "split": self.split,
             "tier": self.tier,
+            "physics": self.physics,
             "versions": dict(versions()),
         }
         self._kept = self._stack.enter_context(unfinished(self.out, about))
@@ -203,7 +207,13 @@ class Drives:
         disturbance = None
         if isinstance(self.problem, Task):
             disturbance = self.own_disturbance
-        part = Part((0,), self.split, disturbance=disturbance, variation=variation)
+        part = Part(
+            (0,),
+            self.split,
+            disturbance=disturbance,
+            variation=variation,
+            physics=self.physics,
+        )
         return episodes_of(self.problem).worlds(part, folder, self.entrant.policy)
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from tdac_agent.evaluation.policies import Entrant
 from tdac_agent.falsify.drives import JITTER, Drives
 from tdac_agent.falsify.search import Search, near
+from tdac_agent.problems.episodes import check_physics
 from tdac_agent.runs.falsification import (
     RECORD_FILE,
     Envelope,
@@ -34,6 +36,7 @@ from tdac_agent.verification.store import UNFINISHED
 from tdac_envs.core.arguments import one_of, whole_number
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.task_sets import TaskSet
+from tdac_envs.physics.moved import EXACT
 
 EPISODES, WORLDS = 256, 4
 LEAST, MOST_EPISODES = 16, 1_000_000
@@ -54,6 +57,7 @@ class SearchPlan:
         worlds: Number of worlds of a set, from the first one; they share the episodes.
         curves: Jittered starts, or worlds, at each point of the curves of success; 0
             for none. These episodes come on top.
+        physics: What moves the robot.
     """
 
     episodes: int = EPISODES
@@ -62,6 +66,7 @@ class SearchPlan:
     split: str = "dev"
     worlds: int = WORLDS
     curves: int = 0
+    physics: str = EXACT
 
     def __post_init__(self) -> None:
         whole_number("episodes", self.episodes, LEAST, MOST_EPISODES)
@@ -108,7 +113,8 @@ def falsify(
     steps = steps_on(problem, space)
     points = _points(space, steps) if plan.curves else []
     whole = plan.episodes + plan.curves * len(points)
-    about = {"seed": plan.seed, "kind": "falsify"}
+    check_physics(problem, plan.physics)
+    about: dict[str, Any] = {"seed": plan.seed, "kind": "falsify"}
     if judge is None:
         with WarmJudge() as own_judge:
             return falsify(
@@ -116,7 +122,7 @@ def falsify(
             )
     split = "" if isinstance(problem, Task) else plan.split
     with Drives(
-        entrant, problem, split, whole, about, tier, out, judge, watch
+        entrant, problem, split, whole, about, tier, out, judge, watch, plan.physics
     ) as drives:
         envelopes = [
             Search(drives, number, space, steps, plan.seed + place, share).run()
@@ -238,6 +244,7 @@ def _record(
         dt=dt,
         space=space,
         seed=plan.seed,
+        physics=plan.physics,
         budget=plan.episodes,
         episodes=drives.count,
         sandbox=drives.used,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,7 @@ from tdac_agent.tasks.units import frame_of
 from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.worlds import TaskWorld
 from tdac_envs.core.errors import TaskError
+from tdac_envs.physics.moved import EXACT, engine_named
 
 if TYPE_CHECKING:
     from tdac_envs.ladder.task_sets import TaskSet
@@ -27,6 +29,27 @@ def episodes_of(problem: Task | TaskSet) -> Episodes:
     from tdac_agent.problems.set_episodes import OfSet
 
     return OfSet(problem)
+
+
+def check_physics(problem: Task | TaskSet, physics: str) -> None:
+    """Checks before the work begins that a physics can drive on a problem.
+
+    Raises:
+        TaskError: It is unknown or not installed, or cannot drive there.
+    """
+    if engine_named(physics) == EXACT:
+        return
+    if isinstance(problem, Task):
+        problem.make_env(physics=physics)
+        return
+    # Task sets need much that a task does not.
+    from tdac_agent.verification.judge.set_files import write_set
+    from tdac_envs.ladder.env import make
+
+    split = next(each for each in ("dev", "test", "train") if problem.count(each) != 0)
+    with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
+        file = write_set(problem, Path(name) / "set.yaml")
+        make(file, split=split, physics=physics)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +111,7 @@ class OfTask:
             task=lay_out(self.task, folder / "work"),
             disturbance=part.disturbance or self.task.own_disturbance(),
             variation=part.variation,
+            physics=part.physics,
         )
 
     def provenance(
@@ -102,4 +126,5 @@ class OfTask:
             "disturbance": part.disturbance or self.task.own_disturbance(),
             "variation": part.variation,
             "first": part.first,
+            "physics": part.physics,
         }

@@ -11,6 +11,7 @@ from tdac_agent.sandbox import Limits
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.verification.judge.policy_spec import PolicySpec
 from tdac_agent.verification.judge.worlds import SetWorlds, TaskWorld
+from tdac_envs.physics.moved import EXACT
 
 if TYPE_CHECKING:
     from tdac_envs.ladder.set_limits import CpuSpec
@@ -26,6 +27,7 @@ class Part:
         salt_file: File with the salt of hidden worlds.
         disturbance: Disturbance of a task.
         variation: Variation of start and goal of a task.
+        physics: What moves the robot: `exact`, or `mujoco`.
     """
 
     numbers: Sequence[int]
@@ -33,6 +35,7 @@ class Part:
     salt_file: Path | None = None
     disturbance: Disturbance | None = None
     variation: str = "jitter"
+    physics: str = EXACT
 
     @property
     def is_hidden(self) -> bool:

@@ -126,6 +126,7 @@ class OfSet:
             split=part.split,
             salt_file=None if salt is None else salt.resolve(),
             hidden_folder=self.hidden_folder if part.is_hidden else None,
+            physics=part.physics,
         )
 
     def provenance(
@@ -139,6 +140,7 @@ class OfSet:
             "split": part.split,
             "salt_sha256": self.secret(part),
             "first": part.first,
+            "physics": part.physics,
             "unit": self.tasks.file.unit,
             "frame": frame_of(printed_units(self.tasks.file)),
             "controller_sha256": sha256,

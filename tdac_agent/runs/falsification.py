@@ -83,6 +83,7 @@ class Falsification(StrictRecord):
     dt: float = Field(description="Duration of a step, s.")
     space: dict[str, float] = Field(description="Parts that were searched, and sizes.")
     seed: int
+    physics: str = Field("exact", description="What moved the robot.")
     budget: int = Field(description="Most episodes of the search.")
     episodes: int = Field(description="Episodes that were driven.")
     sandbox: str

@@ -33,6 +33,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import printable
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose
+from tdac_envs.physics.moved import EXACT
 
 SENSORS_FILE = Path(__file__).parents[2] / "tdac_envs" / "controller_kit" / "sensors.py"
 MIN_PROGRESS_STEPS = 400
@@ -142,11 +143,16 @@ class Task:
         return allows
 
     def disturbed_env(
-        self, disturbance: Disturbance, variation: str = "jitter"
+        self,
+        disturbance: Disturbance,
+        variation: str = "jitter",
+        physics: str = EXACT,
     ) -> JudgedEnv:
         """Constructs this task's environment with a disturbance."""
-        options = self.disturbed_options(disturbance)
-        return self.make_env(**{**options, "variation": variation})
+        options = self.disturbed_options(disturbance) | {"variation": variation}
+        if physics != EXACT:  # environments of others may have no other one
+            options["physics"] = physics
+        return self.make_env(**options)
 
     def disturbed_options(self, disturbance: Disturbance) -> dict[str, Any]:
         """Returns the arguments of this task's environment for a disturbance.

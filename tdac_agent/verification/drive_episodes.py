@@ -39,6 +39,7 @@ from tdac_agent.verification.store import (
 )
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
+from tdac_envs.physics.moved import EXACT
 
 MARKING = 20.0
 """Time between two marks of what has been driven, relative to that of making one."""
@@ -204,6 +205,7 @@ def _driven(
         "secret": own.secret(part),
         "sandbox": [request.tier, asdict(limits), request.patience],
         "versions": dict(versions()),
+        **({} if part.physics == EXACT else {"physics": part.physics}),
     }
     with (
         tempfile.TemporaryDirectory(prefix="tdac-drive-") as name,

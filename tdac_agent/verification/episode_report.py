@@ -80,6 +80,7 @@ class EpisodeProvenance(StrictRecord):
         None, description="Of a task; a set has its own."
     )
     variation: str | None = Field(None, description="Of start and goal of a task.")
+    physics: str = Field("exact", description="What moved the robot.")
     unit: Place = Field("px", description="Unit of positions and lengths.")
     frame: Frame | None = Field(
         None, description="Of a map, where lengths are printed in metres."

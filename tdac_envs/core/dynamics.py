@@ -39,10 +39,10 @@ SAME: dict[str, str] = {
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
     # Another physics can move the body; the exact step is what it was.
-    "98037dd733022805f6d5156e210e8e33f225ac010008efda401a78cf902caf46": (
+    "a354b8022cc12836b9efdcd5d07427174f83d54608204bdf09b5873b56b081c6": (
         "46a5299112cd13c1188f8899f0e1d9ef6aa22ac926b7f3b91c12e6dbe9ef96e7"
     ),
-    "d1e766ada958f3ad480a92660d7269449deb63c1ebbe2c3a380f9d6ec5cdbfeb": (
+    "6b6683280724dc4a69bc5ad155aa78dd74868c73373769d99fb9f4c48c191dbf": (
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
 }

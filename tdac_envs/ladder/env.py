@@ -22,8 +22,10 @@ from tdac_envs.ladder.robots import EPuckRobotParams
 from tdac_envs.ladder.set_file import find_set_file
 from tdac_envs.ladder.source import SetSource
 from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.map2d.carried import carried_by
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.setup import Map2DSetup
+from tdac_envs.physics.moved import EXACT
 
 TRAIN_POOL = 4096
 """Default number of training worlds."""
@@ -163,6 +165,8 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
         reward_weights: Reward weights by name, where they differ from the defaults.
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
         hidden_folder: Folder with the held-out maps of a set whose worlds are files.
+        physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
+            moves the robot (`docs/physics.md`).
         nearer_starts: Probability with which an episode of the split `"train"` begins
             nearer to the goal: the length of its path is drawn uniformly, up to that
             from the world's own start. This makes learning easier.
@@ -183,6 +187,7 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
         render_mode: str | None = None,
         hidden_folder: str | Path | None = None,
         nearer_starts: float = 0.0,
+        physics: str = EXACT,
     ) -> None:
         task_set, source = _opened(
             level, split, train_pool, salt_file, hidden_folder, nearer_starts
@@ -196,9 +201,18 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
             reception=file.disturbances.reception,
             max_acceleration=file.disturbances.max_acceleration,
             resolution=file.resolution,
+            physics=physics,
+            pixel_size=file.resolution,
         )
         self._prepare(setup, render_mode)
         self._look(task_set, bool(privileged))
+
+    def _draw(self, options: dict[str, Any]) -> Any:
+        before = self.task.terrain
+        task = super()._draw(options)
+        if self._carried is not None and task.terrain is not before:
+            self._carried = carried_by(self.setup, task)
+        return task
 
 
 class EPuckLadderEnv(TaskSetEnv, EPuckEnv):
@@ -217,6 +231,7 @@ class EPuckLadderEnv(TaskSetEnv, EPuckEnv):
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
         nearer_starts: float = 0.0,
+        physics: str = EXACT,
     ) -> None:
         task_set, source = _opened(
             level, split, train_pool, salt_file, None, nearer_starts
@@ -224,7 +239,7 @@ class EPuckLadderEnv(TaskSetEnv, EPuckEnv):
         robot, seen = task_set.file.robot, task_set.file.observed
         assert isinstance(robot, EPuckRobotParams)
         shared = _shared(task_set, source, reward_weights)
-        setup = EPuckSetup(**shared, webots=False, goal_visible=False)
+        setup = EPuckSetup(**shared, webots=False, goal_visible=False, physics=physics)
         further = tuple(key for key in ("encoders",) if key in seen)
         EPuckEnv._prepare(self, setup, robot.sensor_noise, further, render_mode)
         self._look(task_set, bool(privileged))

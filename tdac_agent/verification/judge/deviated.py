@@ -16,6 +16,7 @@ from tdac_agent.verification.judge.task_world import TaskEpisodes
 from tdac_agent.verification.judge.worlds import FOREVER, DeviatedWorlds, Program
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose
+from tdac_envs.physics.moved import EXACT
 
 if TYPE_CHECKING:
     from tdac_agent.verification.judge.set_worlds import SetEpisodes
@@ -45,9 +46,8 @@ class DeviatedEpisodes:
         if isinstance(self.plain, TaskEpisodes):
             own = self.plain
             world = own.worlds
-            record.env = shifted_env(
-                own.task, case.deviation, world.disturbance, world.variation
-            )
+            how = world.disturbance, world.variation, world.physics
+            record.env = shifted_env(own.task, case.deviation, *how)
             if world.variation == "nominal":
                 record.start = start_of(own.task.nominal, case.deviation)
         record.env = DeviatedEnv(record.env, case.deviation, case.number)
@@ -81,7 +81,11 @@ class DeviatedEpisodes:
 
 
 def shifted_env(
-    task: Task, deviation: Deviation, disturbance: Any, variation: str = "nominal"
+    task: Task,
+    deviation: Deviation,
+    disturbance: Any,
+    variation: str = "nominal",
+    physics: str = EXACT,
 ) -> JudgedEnv:
     """The environment of a task whose obstacles are shifted.
 
@@ -93,6 +97,8 @@ def shifted_env(
     if x or y:
         radius = task.nominal.body_radius
         options |= task.setting.displaced(x * radius, y * radius)
+    if physics != EXACT:
+        options["physics"] = physics
     return task.make_env(**options)
 
 

@@ -29,6 +29,7 @@ from tdac_envs.ladder.space_time import earliest_arrival
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.movers.state import SPEED
+from tdac_envs.physics.moved import EXACT
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,7 @@ def open_set(worlds: SetWorlds) -> SetEpisodes:
         train_pool=0,
         salt_file=worlds.salt_file,
         privileged=True,
+        **({} if worlds.physics == EXACT else {"physics": worlds.physics}),
         **({} if given is None else {"hidden_folder": given}),
     )
     return SetEpisodes(env, worlds)

@@ -35,7 +35,7 @@ class TaskEpisodes:
     def record(self, number: int, most: int = FOREVER) -> Record:
         """See `Worlds`."""
         own = self.worlds
-        env = self.task.disturbed_env(own.disturbance, own.variation)
+        env = self.task.disturbed_env(own.disturbance, own.variation, own.physics)
         return Record(env, None, most, seed=number)
 
     def name(self, number: int) -> str:

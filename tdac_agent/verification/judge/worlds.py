@@ -14,6 +14,7 @@ from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.setting import JudgedEnv, Nominal
 from tdac_agent.tasks.units import Units
 from tdac_envs.drive.env import Observation
+from tdac_envs.physics.moved import EXACT
 
 if TYPE_CHECKING:
     from tdac_envs.ladder.task_sets import TaskSet
@@ -79,6 +80,7 @@ class TaskWorld(BaseModel):
         disturbance: Disturbance of the environment.
         variation: Variation of start and goal.
         on_level: Whether controllers read the files of a task set.
+        physics: What moves the robot.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -88,6 +90,7 @@ class TaskWorld(BaseModel):
     disturbance: Disturbance
     variation: str = "jitter"
     on_level: bool = False
+    physics: str = EXACT
 
 
 class SetWorlds(BaseModel):
@@ -98,6 +101,7 @@ class SetWorlds(BaseModel):
         split: The split.
         salt_file: File with the salt of hidden worlds.
         hidden_folder: Folder of hidden worlds that are files.
+        physics: What moves the robot.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -107,6 +111,7 @@ class SetWorlds(BaseModel):
     split: str
     salt_file: Path | None = None
     hidden_folder: Path | None = None
+    physics: str = EXACT
 
 
 class Case(BaseModel):
