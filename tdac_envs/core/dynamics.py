@@ -39,10 +39,10 @@ SAME: dict[str, str] = {
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
     # Another physics can move the body; the exact step is what it was.
-    "98037dd733022805f6d5156e210e8e33f225ac010008efda401a78cf902caf46": (
+    "6359954e4d19063dd920e374681aac34e47787846dc41da267e1455e95180eec": (
         "46a5299112cd13c1188f8899f0e1d9ef6aa22ac926b7f3b91c12e6dbe9ef96e7"
     ),
-    "d1e766ada958f3ad480a92660d7269449deb63c1ebbe2c3a380f9d6ec5cdbfeb": (
+    "608bd02b9037c57bd241bd6c288413585c2f42200b3d3886fa8eb9e84cd8ff05": (
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
 }
