@@ -3,12 +3,14 @@
     python -m benchmarks epuck_step
 
 Cases: a single environment through `gym.make` in several situations; a batch on one
-thread and on two; and worlds with more and more solid parts. The cases run in turns, in
+thread and on two; worlds with more and more solid parts; and MuJoCo. The cases run in turns, in
 short bursts.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+from importlib.util import find_spec
 from typing import Any
 
 import gymnasium as gym
@@ -27,8 +29,9 @@ from benchmarks.env_step import (
 )
 from benchmarks.timing import Bench, Effort
 from tdac_envs import World
+from tdac_envs.physics.moved import ENGINES, EXACT
 from tdac_envs.worlds.footprint import Rectangle
-from tdac_envs.worlds.world import EPuck, Obstacle, Part
+from tdac_envs.worlds.world import Arena, EPuck, Obstacle, Part
 
 NAME = "TDAC-EPuck-v0"
 PARTS = (4, 64, 1024)
@@ -99,6 +102,20 @@ def more_things(rounds: int) -> Bench:
     return raced("1024 e-pucks among more things, one thread", bursts, rounds)
 
 
+def physics(rounds: int) -> Bench:
+    """A single environment among 20 posts, with each physics that is installed."""
+    floor = Arena(Rectangle(0.4, 0.4, 0.0, 2.0, 2.0))
+    world = replace(posts(20), arenas=(floor,))
+    there = [n for n in ENGINES if n == EXACT or find_spec(n) is not None]
+    bursts = {
+        f"physics {name}": single_burst(
+            gym.make(NAME, world=world, physics=name), random_driving
+        )
+        for name in there
+    }
+    return raced("A single TDAC-EPuck-v0 among 20 posts", bursts, min(rounds, 5))
+
+
 def batch(count: int, **options: Any) -> Burst:
     """Steps of a batch with jittered starts."""
     options = {"variation": "jitter", **options}
@@ -123,4 +140,4 @@ def posts(count: int) -> World:
 def benches(effort: Effort) -> list[Bench]:
     """One bench per table."""
     rounds = effort.rounds_of(ROUNDS)
-    return [table(rounds) for table in (single, batches, more_things)]
+    return [table(rounds) for table in (single, batches, more_things, physics)]

@@ -17,6 +17,7 @@ from tdac_agent.cli.trials import attempt
 from tdac_agent.models.vendors import VENDORS
 from tdac_agent.sandbox import available_tiers
 from tdac_agent.storage.shipped import shipped, shipped_names
+from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
 
 EXTRAS = {
@@ -27,6 +28,7 @@ EXTRAS = {
     "inspect": "inspect_ai",
     "mcp": "mcp",
     "studio": "nicegui",
+    "physics": "mujoco",
 }
 """The package of each extra, besides those of vendors."""
 TRIALS = (
@@ -119,8 +121,20 @@ def _extras() -> list[Check]:
     for extra, module in {**EXTRAS, **extras}.items():
         is_installed = importlib.util.find_spec(module) is not None
         detail = module if is_installed else f"optional: {install_command(extra)}"
+        if is_installed and extra == "physics":
+            is_installed, detail = _physics()
         checks.append(Check(f"extra {extra}", is_installed, detail))
     return checks
+
+
+def _physics() -> tuple[bool, str]:
+    """Whether MuJoCo can be imported, and its version; or what clashes."""
+    from tdac_envs.physics.engine import engine_version
+
+    try:
+        return True, engine_version()
+    except TaskError as error:
+        return False, str(error)
 
 
 def _keys() -> list[Check]:

@@ -6,6 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.controller_choice import (
@@ -70,12 +71,15 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
     source = read_source(file)
     if options.deviation is not None:
         return _play_deviated(task, source, options)
+    solid = solid_picture(task.nominal) if options.view == "3d" else None
     if options.seed is None:
         rollout = drive(task, source, name, options.tier)
     else:
         setup = options.seed, noise.disturbance(task), options.tier
         rollout = drive_disturbed(task, source, *setup).rollout
     frames_of = partial(task.pictures().frames, rollout)
+    if solid is not None:
+        frames_of = partial(solid_frames, solid, rollout)
     return show(rollout, frames_of, task.name, options)
 
 
@@ -84,10 +88,14 @@ def _play_deviated(task: Task, source: bytes, options: PlayOptions) -> int:
     assert options.deviation is not None
     deviation = deviation_of(options.deviation)
     pictures = pictures_of(task, deviation, None, 0)  # fails early
+    solid = solid_picture(pictures.nominal) if options.view == "3d" else None
     entrant = Entrant("", PolicySpec("controller"), source=source)
     part = part_of(task, options.seed or 0, None)
     rollout = drive_episode(entrant, task, part, options.tier, deviation).rollout
-    return show(rollout, partial(pictures.frames, rollout), task.name, options)
+    frames_of = partial(pictures.frames, rollout)
+    if solid is not None:
+        frames_of = partial(solid_frames, solid, rollout)
+    return show(rollout, frames_of, task.name, options)
 
 
 def _play_world(name: str, options: PlayOptions) -> int:
@@ -98,19 +106,50 @@ def _play_world(name: str, options: PlayOptions) -> int:
     episodes_of(tasks).compile()
     entrant = fitted(entrant_of(options.controller, ours=()), tasks)
     task = tasks.task(split, index)
+    solid = solid_picture(task) if options.view == "3d" else None
     part = Part((index,), split)
     deviation = None
     if options.deviation is not None:
         deviation = deviation_of(options.deviation)
     rollout = drive_episode(entrant, tasks, part, options.tier, deviation).rollout
     title = f"{tasks.name}, {split} {index}"
-    return show(rollout, partial(_frames, task, rollout), title, options)
+    frames_of = partial(_frames, task, rollout)
+    if solid is not None:
+        frames_of = partial(solid_frames, solid, rollout)
+    return show(rollout, frames_of, title, options)
 
 
 def _frames(task: AnyTask, rollout: Rollout, stride: int) -> Iterator[Image]:
     if isinstance(task, Map2DTask):
         return MapPictures(task).frames(rollout, stride)
     return WorldPictures(task).frames(rollout, stride)
+
+
+def solid_picture(task: Any) -> Any:
+    """What draws episodes of a task in three dimensions.
+
+    Raises:
+        TaskError: MuJoCo is not installed, or cannot render here or this task.
+    """
+    if isinstance(task, Map2DTask):
+        from tdac_envs.map2d.solid_picture import SolidPicture as OnMap
+
+        return OnMap(task)
+    from tdac_envs.epuck.solid_picture import SolidPicture as InWorld
+
+    return InWorld(task)
+
+
+def solid_frames(solid: Any, rollout: Rollout, stride: int) -> Iterator[Image]:
+    """Draws the robot in every `stride`-th step and the last one."""
+    trajectory = rollout.trajectory
+    for step in trajectory.every(stride):
+        movers = trajectory.movers
+        yield solid.frame(
+            trajectory.poses[step].tolist(),
+            trajectory.poses[:step, :2].tolist(),
+            discs=None if movers is None else movers[step].astype(float),
+        )
 
 
 def check_video(video: Path | None) -> None:

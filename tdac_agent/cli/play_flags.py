@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import typer
 
@@ -35,6 +36,12 @@ class PlayOptions:
         None, f"{VIDEO} instead of opening a window.", metavar="FILE"
     )
     speed: float | None = speed_option()
+    view: Literal["2d", "3d"] = option(
+        "2d",
+        "3d shows the robot from behind and the whole scene from above, rendered by "
+        "MuJoCo (extra `physics`).",
+        metavar="2d|3d",
+    )
     episode: str | None = option(
         None,
         "Episode of the suite, as `tdac verify` runs it without --seed: `nominal`, "
@@ -63,6 +70,7 @@ class PlayOptions:
 
 @app.command(
     epilog="Examples: `tdac play runs/maze-1 --video maze.mp4`; "
+    "`tdac play runs/epuck-1 --view 3d --video epuck.mp4`; "
     "`tdac play runs/maze-1 --seed 17`; `tdac play runs/maze-1 --goal 178 386`; "
     "`tdac play builtin --set unknown --index 3 --video unknown.gif`"
 )

@@ -54,6 +54,8 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
     task: Any
     nominal: Any
     _scene: Any
+    _solid: Any = None
+    _solid_picture: Callable[[Any], Any]
     _call_drive: Callable[[], None]
     _note_gap: Callable[..., None]
     addresses: Addresses
@@ -111,7 +113,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         if self.render_mode is None:
             gym.logger.warn("render() needs gym.make(..., render_mode='rgb_array')")
             return None
-        frame = self._frame()
+        frame = self._frame() if self.setup.view == "2d" else self._solid_frame()
         if self.render_mode == "rgb_array":
             return frame
         if self._window is None:
@@ -120,6 +122,15 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
             self._window = Window(self.title, self.metadata["render_fps"])
         self._window.show(frame)
         return None
+
+    def _solid_frame(self) -> NDArray[np.uint8]:
+        """The current frame in three dimensions."""
+        if self._solid is None:
+            self._solid = self._solid_picture(self.task)
+        pose = self.robot.state[: HEADING + 1].tolist()
+        shown = self._trail, self.things(), self.discs()
+        frame: NDArray[np.uint8] = self._solid.frame(pose, *shown)
+        return frame
 
     def close(self) -> None:
         """Closes the window, if one is open."""
@@ -138,6 +149,10 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
 
     def discs(self) -> NDArray[np.float64]:
         """Moving obstacles as they are now, shape (n, 3): x, y, radius (px or m)."""
+        return np.zeros((0, 3))
+
+    def things(self) -> NDArray[np.float64]:
+        """Centre and rotation since the reset (rad) of movable objects, (k, 3)."""
         return np.zeros((0, 3))
 
     def watch_gap(
@@ -198,7 +213,7 @@ class DrivenEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._steps = 0
         self._trail = [self.task.start[:2]]
         self._status = ""
-        self._scene = None
+        self._scene = self._solid = None
 
     def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
         """Adds a step to the picture of the episode."""

@@ -31,6 +31,7 @@ from tdac_envs.epuck.robot_options import (
 )
 from tdac_envs.epuck.setup import EPuckSetup
 from tdac_envs.epuck.smallest_gap import note_gap
+from tdac_envs.epuck.solid_picture import SolidPicture
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
 from tdac_envs.physics.moved import EXACT
@@ -175,6 +176,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             the gap to obstacles that the robot should keep (`required_gap`).
         physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
             moves the robot and the objects that have a mass (`docs/physics.md`).
+        view: Of frames: `"2d"`, or `"3d"`, rendered by MuJoCo (extra `tdac[physics]`).
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -192,6 +194,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     }
     readings = "ps"
     _note_gap = staticmethod(note_gap)
+    _solid_picture = SolidPicture
 
     def __init__(
         self,
@@ -226,6 +229,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         disturbed: bool = False,
         stopping_distance: float | None = None,
         physics: str = EXACT,
+        view: str = "2d",
         render_mode: str | None = None,
     ) -> None:
         one_of("reflectance", reflectance, ("ideal", "webots"))
@@ -273,7 +277,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             goal_visible=bool(goal_visible),
             stopping_distance=sizes["stopping_distance"],
             physics=physics,
-            body=None,
+            view=view,
         )
         asked = (ground_sensors, gps, compass, encoders)
         further = tuple(itertools.compress(observed.INSTRUMENTS, asked))
@@ -354,8 +358,8 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         return self._movables.things[:, :3].copy()
 
     def __getstate__(self) -> dict[str, Any]:
-        calls = "addresses", "_call_begin", "_call_drive"
-        return {**self.__dict__, **dict.fromkeys(calls), "_scene": None}
+        own = "addresses", "_call_begin", "_call_drive", "_scene", "_solid"
+        return {**self.__dict__, **dict.fromkeys(own)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_envs.core.arguments import non_negative
+from tdac_envs.core.arguments import non_negative, one_of
 from tdac_envs.drive.setup import DriveSetup
 from tdac_envs.drive.smallest_gap import required_gap
 from tdac_envs.drive.stepping import AXLE, FRICTION
@@ -33,6 +33,7 @@ class EPuckSetup(DriveSetup):
         goal_visible: Whether the sensors see the file's goal marker.
         stopping_distance: Of the robot, from full speed, m.
         physics: `"exact"` or `"mujoco"`.
+        view: `"2d"` or `"3d"`, of frames.
         body: The robot's body for MuJoCo; None for that of the world's e-puck.
     """
 
@@ -41,6 +42,7 @@ class EPuckSetup(DriveSetup):
     goal_visible: bool
     stopping_distance: float = 0.0
     physics: str = EXACT
+    view: str = "2d"
     body: BodySpec | None = None
 
     def __post_init__(self) -> None:
@@ -48,6 +50,7 @@ class EPuckSetup(DriveSetup):
         least = non_negative("stopping_distance", self.stopping_distance)
         object.__setattr__(self, "stopping_distance", least)
         engine_named(self.physics)
+        one_of("view", self.view, ("2d", "3d"))
 
     def required_gap(self, task: EPuckTask) -> float:
         """See `DriveSetup.required_gap`."""

@@ -33,9 +33,10 @@ from tdac_envs.map2d.robot import Map2DArrays
 from tdac_envs.map2d.robot_options import RobotSource, with_robot
 from tdac_envs.map2d.setup import OVERRIDDEN, Map2DSetup, override
 from tdac_envs.map2d.smallest_gap import note_gap, note_gap_among
+from tdac_envs.map2d.solid_picture import SolidPicture
 from tdac_envs.map2d.sonar import noise_of
 from tdac_envs.map2d.source import MapSource, metric_units, prepare, units_of
-from tdac_envs.map2d.task import Map2DTask, Terrain, make_task
+from tdac_envs.map2d.task import Terrain, make_task
 from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
 from tdac_envs.movers.spec import MoversOption, read_specs
 from tdac_envs.movers.state import Movers
@@ -249,6 +250,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
             moves the robot (`docs/physics.md`).
         resolution: Metres per px of a map that does not say it; only MuJoCo uses it.
+        view: Of frames: `"2d"`, or `"3d"`, rendered by MuJoCo (extra `tdac[physics]`).
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
     ## Version History
@@ -265,6 +267,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     readings = "ranges"
     """Observation key of the distance sensors."""
     info_of = staticmethod(info_of)
+    _solid_picture = SolidPicture
 
     def __init__(
         self,
@@ -320,6 +323,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         ray_angles: Sequence[float] | None = None,
         physics: str = EXACT,
         resolution: float | None = None,
+        view: str = "2d",
         render_mode: str | None = None,
     ) -> None:
         units = units_of(map, frame)
@@ -409,6 +413,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
                 **{n: given[n] or 0 for n in RECEIVED}, message_drop=message_drop
             ),
             physics=physics,
+            view=view,
             pixel_size=params.resolution if resolution is None else resolution,
         )
         notes = with_tolerance_note(params.notes, nominal, units.length)
@@ -441,8 +446,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self.robot = Map2DArrays.blank(setup.nominal.robot.n_rays, self.delay)
         self.robot.constants[:] = setup.constants()
         self._goal = np.array(self.nominal.goal, np.float32)
-        self.movers = movers_of(self.nominal)
-        self._ghosts: deque[NDArray[np.float64]] = deque(maxlen=1)
+        self.movers: Movers = self.nominal.fresh_movers()
         self._carried = carried_by(setup, setup.nominal)
         self._bind()
         self._scene: MapScene | None = None
@@ -459,7 +463,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         before = self.task
         self._draw(options_in_pixels(options or {}, self._units))
         if self.setup.has_movers:
-            self.movers = movers_of(self.task)
+            self.movers = self.task.fresh_movers()
         if self.task.field is not before.field or self.setup.has_movers:
             self._bind()
         task, robot = self.task, self.robot
@@ -483,10 +487,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         return self.movers.discs()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {
-            **self.__dict__,
-            **dict.fromkeys(("addresses", "_call_begin", "_call_drive", "_copies")),
-        }
+        own = "addresses", "_call_begin", "_call_drive", "_copies", "_solid"
+        return {**self.__dict__, **dict.fromkeys(own)}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -545,7 +547,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
     def _begin_trail(self) -> None:
         super()._begin_trail()
         steps = math.ceil(GHOST_SECONDS / self.task.dt)
-        self._ghosts = deque([self.discs()], min(steps + 1, MOST_GHOSTS))
+        self._ghosts: deque[NDArray[np.float64]] = deque(
+            [self.discs()], min(steps + 1, MOST_GHOSTS)
+        )
 
     def _note(self, reached: bool, collided: bool, truncated: bool) -> None:
         self._ghosts.append(self.discs())
@@ -568,8 +572,3 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         return self._scene.frame(
             robot.state[:3].tolist(), robot.ranges, self._trail, status, self._ghosts
         )
-
-
-def movers_of(task: Map2DTask) -> Movers:
-    """New arrays of the movers of a task at the start of an episode."""
-    return Movers.none() if task.movers is None else task.movers.fresh()

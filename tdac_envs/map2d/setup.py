@@ -57,6 +57,7 @@ class Map2DSetup(DriveSetup):
         max_acceleration: Of a wheel, px/s²; 0 for that of the robot.
         reception: How pose and scan reach the robot.
         physics: `"exact"` or `"mujoco"`.
+        view: `"2d"` or `"3d"`, of frames.
         pixel_size: Metres per px of a map that has a resolution, for MuJoCo.
         body: The robot's body for MuJoCo; None for one that follows from the radius.
         sonar: The sonars; None with rays.
@@ -75,6 +76,7 @@ class Map2DSetup(DriveSetup):
     max_acceleration: float = 0.0
     reception: Reception = EXACT
     physics: str = "exact"
+    view: str = "2d"
     pixel_size: float | None = None
     body: BodySpec | None = None
     sonar: Sonar | None = field(init=False)
@@ -84,6 +86,7 @@ class Map2DSetup(DriveSetup):
     def __post_init__(self) -> None:
         DriveSetup.__post_init__(self)
         engine_named(self.physics)
+        one_of("view", self.view, ("2d", "3d"))
         if self.pixel_size is not None:
             positive("resolution", self.pixel_size)
         noise = non_negative("range_noise", self.range_noise)

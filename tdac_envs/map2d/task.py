@@ -185,6 +185,10 @@ class Map2DTask:
         clear, radius = self.terrain.padded_clear, self.robot.radius + safe
         return taut(path, lambda begin, end: is_line_free(clear, begin, end, radius))
 
+    def fresh_movers(self) -> Movers:
+        """New arrays of the movers at the start of an episode."""
+        return Movers.none() if self.movers is None else self.movers.fresh()
+
     def moved(self, start: Pose, goal: tuple[float, float] | None = None) -> Map2DTask:
         """This task with another start (and goal), but the same horizon and tolerance.
 

@@ -15,7 +15,7 @@ from tdac_envs.drive.stepping import HEADING, STEPS, row_of
 from tdac_envs.drive.vector import Actions, DrivenVectorEnv, Observations, Result
 from tdac_envs.grid.map_units import MapFrame, MapUnits
 from tdac_envs.map2d.among import step_rows_among
-from tdac_envs.map2d.env import Map2DEnv, movers_of
+from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.kernels import step_rows
 from tdac_envs.map2d.metric_input import options_in_pixels
 from tdac_envs.map2d.metric_view import MetricView
@@ -119,7 +119,7 @@ class Map2DVectorEnv(DrivenVectorEnv, VectorEnv[Observations, Actions, Any]):
     def _assign(self, i: int, task: Any) -> None:
         super()._assign(i, task)
         if self._among:
-            self._movers[i] = movers_of(task)
+            self._movers[i] = task.fresh_movers()
             self._addresses.put(i, self._arrays(i))
             if self._frames is not None:
                 self._frames.show(i, movers=self._movers[i])

@@ -41,7 +41,9 @@ def rectangles(cells: Cells) -> list[tuple[int, int, int, int]]:
     return sorted(done)
 
 
-def scene_on(cells: Cells, metres: float, height: float) -> Scene:
+def scene_on(
+    cells: Cells, metres: float, height: float, *, fenced: bool = True
+) -> Scene:
     """The scene of a map: x to the right, y up, the centre of pixel (0, 0) at (0, 0).
 
     Pixel (i, j) is at (i, -j) times `metres`. Everything outside of the map is solid.
@@ -50,6 +52,7 @@ def scene_on(cells: Cells, metres: float, height: float) -> Scene:
         cells: Shape (height, width), True where occupied.
         metres: Size of a pixel, m.
         height: Height of the walls, m.
+        fenced: Whether there are walls around the map.
 
     Raises:
         TaskError: The map needs too many boxes.
@@ -62,12 +65,13 @@ def scene_on(cells: Cells, metres: float, height: float) -> Scene:
         )
     rows, columns = cells.shape
     wide = max(round(_FENCE / metres), 1)
-    found += [
+    fence = [
         (-wide, -wide, columns + wide, 0),
         (-wide, rows, columns + wide, rows + wide),
         (-wide, 0, 0, rows),
         (columns, 0, columns + wide, rows),
     ]
+    found += fence if fenced else []
     return Scene(tuple(Prism(_box(one, metres), 0.0, height) for one in found))
 
 

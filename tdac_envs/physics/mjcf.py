@@ -29,20 +29,25 @@ _BLACK, _GREEN, _DARK = (0.12, 0.12, 0.13), (0.26, 0.52, 0.27), (0.2, 0.2, 0.22)
 
 
 def model_of(scene: Scene, body: BodySpec) -> str:
-    """The model of a scene with a robot, as text in XML.
+    """The model of a scene with a robot, as text in XML; see `model_tree`."""
+    return ET.tostring(model_tree(scene, body), "unicode")
+
+
+def model_tree(scene: Scene, body: BodySpec) -> ET.Element:
+    """The model of a scene with a robot.
 
     The frame of the robot is in the middle of the axle, with x ahead and y to the left.
     """
     root = ET.Element("mujoco", model="tdac")
-    _add(root, "compiler", angle="radian", autolimits="true")
-    _add(
+    add(root, "compiler", angle="radian", autolimits="true")
+    add(
         root, "option", timestep=SUBSTEP, integrator="implicitfast",
         cone="elliptic", impratio=10, gravity=(0, 0, -GRAVITY),
     )  # fmt: skip
-    default = _add(root, "default")
-    _add(default, "geom", condim=3, friction=(1, 0, 0), **_CONTACT)
-    assets, world = _add(root, "asset"), _add(root, "worldbody")
-    _add(
+    default = add(root, "default")
+    add(default, "geom", condim=3, friction=(1, 0, 0), **_CONTACT)
+    assets, world = add(root, "asset"), add(root, "worldbody")
+    add(
         world, "geom", name=GROUND, type="plane", size=(0, 0, 1),
         pos=(0, 0, scene.floor), contype=_GROUND, conaffinity=0,
         friction=(0, 0, 0), rgba=(0.8, 0.8, 0.78, 1), group=SEEN,
@@ -51,7 +56,7 @@ def model_of(scene: Scene, body: BodySpec) -> str:
     for number, thing in enumerate(scene.things):
         _add_thing(assets, world, scene, number, thing)
     _add_robot(root, world, body, scene.floor)
-    return ET.tostring(root, "unicode")
+    return root
 
 
 def name_of(thing: int) -> str:
@@ -59,7 +64,7 @@ def name_of(thing: int) -> str:
     return f"thing{thing}"
 
 
-def _add(parent: ET.Element, tag: str, **attributes: object) -> ET.Element:
+def add(parent: ET.Element, tag: str, **attributes: object) -> ET.Element:
     """Adds an element; numbers and rows of numbers become text."""
     texts = {key: _text(value) for key, value in attributes.items()}
     return ET.SubElement(parent, tag, texts)
@@ -75,10 +80,8 @@ def _add_thing(
     assets: ET.Element, world: ET.Element, scene: Scene, number: int, thing: Thing
 ) -> None:
     """Adds a free body whose frame is on the ground below its centre."""
-    body = _add(
-        world, "body", name=name_of(number), pos=(thing.x, thing.y, scene.floor)
-    )
-    _add(body, "freejoint", name=name_of(number))
+    body = add(world, "body", name=name_of(number), pos=(thing.x, thing.y, scene.floor))
+    add(body, "freejoint", name=name_of(number))
     _add_prisms(assets, body, scene, number, (thing.x, thing.y))
 
 
@@ -93,7 +96,7 @@ def _add_prisms(
     own = [(k, p) for k, p in enumerate(scene.prisms) if p.thing == number]
     volume = sum(_volume(prism) for _, prism in own if prism.solid)
     for index, prism in own:
-        geom = _add(
+        geom = add(
             body, "geom",
             group=SEEN if prism.visible else UNSEEN,
             rgba=(*prism.colour, 1.0 if prism.visible else 0.0),
@@ -146,7 +149,7 @@ def _shape(
     rim = corners - middle
     points = [(*point, level) for level in (-half, half) for point in rim.tolist()]
     name = f"prism{index}"
-    _add(assets, "mesh", name=name, vertex=np.array(points), inertia="shell")
+    add(assets, "mesh", name=name, vertex=np.array(points), inertia="shell")
     x, y = (middle - origin).tolist()
     return {"type": "mesh", "mesh": name, "pos": (x, y, z)}
 
@@ -156,27 +159,27 @@ def _add_robot(
 ) -> None:
     """Adds the robot with its motors; the cylinder alone touches obstacles."""
     axis = body.wheel_radius
-    robot = _add(world, "body", name=ROBOT, pos=(0, 0, floor + axis))
-    _add(robot, "freejoint", name=ROBOT)
+    robot = add(world, "body", name=ROBOT, pos=(0, 0, floor + axis))
+    add(robot, "freejoint", name=ROBOT)
     mass = body.mass - 2 * body.wheel_mass
     half, middle = (body.top - body.bottom) / 2, (body.top + body.bottom) / 2
     across = mass * (3 * body.radius**2 + 4 * half**2) / 12
-    _add(
+    add(
         robot, "inertial", mass=mass, pos=(0, 0, body.centre - axis),
         diaginertia=(across, across, mass * body.radius**2 / 2),
     )  # fmt: skip
-    _add(
+    add(
         robot, "geom", name=HULL, type="cylinder", size=(body.radius, half),
         pos=(0, 0, middle - axis), contype=_HULL, friction=(body.friction, 0, 0),
         conaffinity=_GROUND | _SOLID | _THING, priority=1, group=ROBOTS,
         rgba=(*_GREEN, 1),
     )  # fmt: skip
     _add_casters(robot, body)
-    motors = _add(root, "actuator")
+    motors = add(root, "actuator")
     for name, side in ((LEFT, 0.5), (RIGHT, -0.5)):
         _add_wheel(robot, body, name, side * body.axle_length)
         limit = body.most_torque
-        _add(
+        add(
             motors, "velocity", name=name, joint=name, kv=limit / _RAMP,
             forcerange=(-limit, limit),
         )  # fmt: skip
@@ -186,7 +189,7 @@ def _add_casters(robot: ET.Element, body: BodySpec) -> None:
     """Adds two balls that slide 0.3 % of the radius above the ground."""
     ball, gap = 0.135 * body.radius, 0.0027 * body.radius
     for x in (0.68 * body.radius, -0.68 * body.radius):
-        _add(
+        add(
             robot, "geom", type="sphere", size=ball, contype=0, conaffinity=_GROUND,
             pos=(x, 0, ball + gap - body.wheel_radius), group=ROBOTS, priority=2,
             friction=(body.caster_friction, 0, 0), rgba=(*_DARK, 1),
@@ -194,10 +197,10 @@ def _add_casters(robot: ET.Element, body: BodySpec) -> None:
 
 
 def _add_wheel(robot: ET.Element, body: BodySpec, name: str, y: float) -> None:
-    wheel = _add(robot, "body", name=name, pos=(0, y, 0))
-    _add(wheel, "joint", name=name, type="hinge", axis=(0, 1, 0))
+    wheel = add(robot, "body", name=name, pos=(0, y, 0))
+    add(wheel, "joint", name=name, type="hinge", axis=(0, 1, 0))
     radius = body.wheel_radius
-    _add(
+    add(
         wheel, "geom", type="ellipsoid", size=(radius, _HALF_WIDTH * radius, radius),
         mass=body.wheel_mass, friction=(body.grip, 0, 0), contype=0,
         conaffinity=_GROUND, priority=2, group=ROBOTS, rgba=(*_BLACK, 1),
