@@ -57,9 +57,13 @@ class Bus:
         domain: Number of the domain (`ROS_DOMAIN_ID`).
         network: Whether to reach other machines, as `CYCLONEDDS_URI` says; otherwise
             this machine alone.
+        stamped: Whether commands are `TwistStamped`.
     """
 
-    def __init__(self, domain: int = 0, *, network: bool = False) -> None:
+    def __init__(
+        self, domain: int = 0, *, network: bool = False, stamped: bool = False
+    ) -> None:
+        self.stamped = stamped
         self._domain = None if network else _loopback(domain)
         self._participant = DomainParticipant(domain)
         self._publications = BuiltinDataReader(
@@ -68,6 +72,8 @@ class Bus:
 
     def _topic(self, name: str) -> tuple[Any, Qos]:
         kind, qos = TOPICS[name]
+        if name == "cmd_vel" and self.stamped:
+            kind = msg.TwistStamped
         return Topic(self._participant, f"rt/{name}", kind, qos=qos), qos
 
     def writer(self, name: str) -> Any:

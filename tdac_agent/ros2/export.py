@@ -20,7 +20,9 @@ from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.storage.files import read_inside, write_atomic
 from tdac_agent.storage.hashes import sha256_of
+from tdac_agent.tasks.installation import keyed, lasting_secret
 from tdac_agent.tasks.task import Task, write_workdir
+from tdac_agent.tasks.trust import tree_sha256
 from tdac_agent.verification.confirmation import read_confirmation
 from tdac_agent.verification.verdict import verified_text
 from tdac_envs.core.errors import TaskError
@@ -33,6 +35,7 @@ COPIED = ("core.py", "motion.py", "scans.py", "worker.py", "node.py")
 CONTROLLER = "controller"
 """Folder of the package with what the controller reads."""
 SETTINGS = "settings.json"
+MARK = "tdac.mark"
 NOT_RUN = "The core was driven over DDS; the rclpy wrapper was not run."
 MAINTAINER = {"maintainer": "maintainer", "email": "maintainer@example.com"}
 
@@ -169,18 +172,21 @@ def _core_settings(settings: dict[str, Any]) -> Settings:
     return core_settings(settings, dead_man=PERIODS * settings["dt"])
 
 
-def core_settings(settings: dict[str, Any], **declared: Any) -> Settings:
+def core_settings(
+    settings: dict[str, Any], kind: type[Settings] = Settings, **declared: Any
+) -> Settings:
     """The settings of the core from those of a package.
 
     Args:
         settings: Contents of `settings.json`.
+        kind: Class of the settings, as the package's own core has it.
         **declared: What the user declares: `dead_man`, `max_age`, `any_start`.
 
     Raises:
         ValueError: A value is missing or not valid.
     """
     try:
-        return Settings(
+        return kind(
             dt=settings["dt"],
             horizon=settings["horizon"],
             start=tuple(settings["start"]),
@@ -191,6 +197,17 @@ def core_settings(settings: dict[str, Any], **declared: Any) -> Settings:
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"{SETTINGS}: missing or wrong: {error}") from None
+
+
+def mark_of(folder: Path) -> str:
+    """The mark of a package's controller folder, by which its exporter knows it.
+
+    It is empty if no secret can be kept, or the folder cannot be hashed.
+    """
+    files = tree_sha256(folder / CONTROLLER)
+    if files is None or lasting_secret() is None:
+        return ""
+    return keyed(f"ros2 package|{files}".encode()).hex()
 
 
 def package_name(task: str) -> str:
@@ -262,6 +279,7 @@ def _write(
     for template, file in files.items():
         text = templates.get_template(f"{template}.j2").render(values)
         write_atomic(out / file, text)
+    write_atomic(out / MARK, mark_of(out))
 
 
 def _values(

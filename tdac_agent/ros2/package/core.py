@@ -230,9 +230,8 @@ class Core:
         for name, stamp in (('scan', self._scan_stamp), ('pose', self._pose_stamp)):
             if why := _unfit_stamp(name, now - stamp, oldest):
                 return why
-        apart = abs(self._scan_stamp - self._pose_stamp)
-        if apart > oldest:
-            return f'scan and pose are {apart:.2f} s apart'
+        if abs(self._scan_stamp - self._pose_stamp) > oldest:
+            return f'scan and pose are more than {oldest:g} s apart'
         begins = not self._planned and not self._asked
         return self._wrong_start() if begins and not self.settings.any_start else ''
 
@@ -273,7 +272,7 @@ def _unfit_stamp(name: str, age: float, oldest: float) -> str:
     if age == math.inf:
         return f'no {name} yet'
     if age > oldest:
-        return f'the last {name} is {age:.2f} s old'
+        return f'the last {name} is older than {oldest:g} s'
     if -age > oldest:
-        return f'the {name} is {-age:.2f} s ahead of the clock (use_sim_time?)'
+        return f'the {name} is more than {oldest:g} s ahead of the clock (use_sim_time?)'
     return ''

@@ -23,6 +23,13 @@ def compose(
         wrapped(yaw + second[2]))
 
 
+def inverse(pose: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Pose of A in B, from the pose of B in A."""
+    x, y, yaw = pose
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return -cosine * x - sine * y, sine * x - cosine * y, -yaw
+
+
 def wrapped(angle: float) -> float:
     """Angle in (-pi, pi]."""
     return math.pi - (math.pi - angle) % math.tau
