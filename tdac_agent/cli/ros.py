@@ -16,10 +16,12 @@ from tdac_agent.cli.task_changes import changed_task
 from tdac_agent.cli.task_choice import chosen_single
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import typed_fields
+from tdac_agent.ros2.bag import Bag, check_packages
 from tdac_agent.ros2.export import core_settings, settings_of
 from tdac_agent.ros2.faults import STOPPING, read_fault
 from tdac_agent.ros2.package.core import PERIODS
 from tdac_agent.runs.ownership import load_task
+from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
 
@@ -35,6 +37,8 @@ def sim(options: SimOptions, flags: TaskFlags) -> int:
     settings = settings_of(task)
     dead_man = _dead_man(settings, options.dead_man)
     require_dds()
+    if options.mcap is not None:
+        check_packages(options.mcap)
     from tdac_agent.ros2.dds import Bus
     from tdac_agent.ros2.robot import Robot
     from tdac_agent.ros2.simulator import Simulator
@@ -56,8 +60,14 @@ def sim(options: SimOptions, flags: TaskFlags) -> int:
         f"{task.name}: a robot on domain {options.domain}, {where}, {time} time; it "
         "waits for /cmd_vel",
     )
-    simulator = Simulator(robot, bus, real_time=options.real_time, faults=faults)
+    bag = None if options.mcap is None else Bag()
+    simulator = Simulator(
+        robot, bus, real_time=options.real_time, faults=faults, bag=bag
+    )
     report = simulator.run(options.seconds)
+    if bag is not None and options.mcap is not None:
+        write_atomic(options.mcap, bag.finish())
+        print_plain(console, f"wrote {options.mcap}")
     if options.as_json:
         print_json({"schema_version": 1, "task": task.name, **asdict(report)})
     else:

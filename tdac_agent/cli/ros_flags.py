@@ -66,6 +66,9 @@ class SimOptions:
         False, "The robot has the errors of its file: noise, slip, latency."
     )
     seed: int = option(0, "Seed of these errors and of the start.", least=0)
+    mcap: Path | None = option(
+        None, "Record all topics in a .mcap file.", metavar="FILE"
+    )
     dead_man: float | None = _dead_man()
     domain: int = _domain()
     network: bool = _network()

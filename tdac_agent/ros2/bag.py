@@ -26,17 +26,26 @@ BEGIN = 1.0
 SUFFIX = ".mcap"
 
 
+def check_packages(path: Path) -> None:
+    """Checks before the work begins that a bag can be written.
+
+    Raises:
+        TaskError: It cannot.
+    """
+    if path.suffix != SUFFIX:
+        raise TaskError(f"--mcap must end in {SUFFIX}, got {path.name!r}")
+    if not all(importlib.util.find_spec(name) for name in ("mcap", "rosbags")):
+        raise TaskError(f"--mcap needs mcap and rosbags: {install_command('ros2')}")
+
+
 def check_bag(task: Task, path: Path) -> None:
-    """Checks before the work begins that a task's episodes can be written.
+    """Like `check_packages`, also of the task whose episodes are to be written.
 
     Raises:
         TaskError: They cannot.
     """
-    if path.suffix != SUFFIX:
-        raise TaskError(f"--mcap must end in {SUFFIX}, got {path.name!r}")
+    check_packages(path)
     _units(task)
-    if not all(importlib.util.find_spec(name) for name in ("mcap", "rosbags")):
-        raise TaskError(f"--mcap needs mcap and rosbags: {install_command('ros2')}")
 
 
 def write_bag(path: Path, task: Task, rollout: Rollout) -> None:
@@ -55,7 +64,7 @@ def write_bag(path: Path, task: Task, rollout: Rollout) -> None:
         TaskError: The task has no metres, or a package is missing.
     """
     check_bag(task, path)
-    bag, units = _Bag(), _units(task)
+    bag, units = Bag(), _units(task)
     setting = task.setting
     assert isinstance(setting, Map2DSetting)
     scale, trajectory = units.per_pixel, rollout.trajectory
@@ -121,7 +130,7 @@ def _wheels(setting: Map2DSetting, scale: float, dt: float) -> Wheels:
     return Wheels(own, dt)
 
 
-class _Bag:
+class Bag:
     """An MCAP file in memory; each topic is registered with its first message."""
 
     def __init__(self) -> None:
@@ -146,6 +155,10 @@ class _Bag:
     def write(self, topic: str, time: float, message: Any) -> None:
         """Writes a message."""
         name = message.__msgtype__
+        self.write_data(topic, time, name, self._types.serialize_cdr(message, name))
+
+    def write_data(self, topic: str, time: float, name: str, data: Any) -> None:
+        """Writes a message of a type as CDR."""
         if name not in self._schemas:
             text = self._types.generate_msgdef(name, ros_version=2)[0].encode()
             self._schemas[name] = self._writer.register_schema(name, "ros2msg", text)
@@ -153,9 +166,8 @@ class _Bag:
             self._channels[topic] = self._writer.register_channel(
                 topic, "cdr", self._schemas[name], _profile(topic)
             )
-        data = bytes(self._types.serialize_cdr(message, name))
         when = round(time * 1e9)
-        self._writer.add_message(self._channels[topic], when, data, when)
+        self._writer.add_message(self._channels[topic], when, bytes(data), when)
 
     def finish(self) -> bytes:
         """The file."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.ros2 import messages as msg
+from tdac_agent.ros2.bag import Bag
 from tdac_agent.ros2.dds import Bus, time_of
 from tdac_agent.ros2.faults import LATE, Course, Fault
 from tdac_agent.ros2.package.motion import compose, inverse
@@ -70,6 +71,7 @@ class Simulator:
         faults: What goes wrong.
         patience: Longest wait for a command in simulated time, s.
         watch: Called with the robot after each period.
+        bag: What is published and commanded is written to it.
     """
 
     def __init__(
@@ -81,11 +83,12 @@ class Simulator:
         faults: tuple[Fault, ...] = (),
         patience: float = PATIENCE,
         watch: Callable[[Robot], None] | None = None,
+        bag: Bag | None = None,
     ) -> None:
         self._robot, self._bus, self._real = robot, bus, real_time
         self._courses = [Course(fault) for fault in faults]
         self._active: set[str] = set()
-        self._patience, self._watch = patience, watch
+        self._patience, self._watch, self._bag = patience, watch, bag
         names = ("scan", "odom", "tf", "tf_static", "clock")
         self._out = {name: bus.writer(name) for name in names}
         self._commands = bus.reader("cmd_vel")
@@ -164,6 +167,8 @@ class Simulator:
         taken = self._commands.take()
         if not taken:
             return False
+        for each in taken:
+            self._record("cmd_vel", each)
         twist = taken[-1].twist if self._bus.stamped else taken[-1]
         v, omega = twist.linear.x, twist.angular.z
         self._moves = self._moves or bool(v or omega)
@@ -213,10 +218,20 @@ class Simulator:
             if "old-scans" in self._active and self._last_scan is not None:
                 scan = self._last_scan
             if "no-scans" not in self._active:
-                self._out["scan"].write(scan)
+                self._send("scan", scan)
                 self._last_scan = scan
         if not self._real:
-            self._out["clock"].write(msg.Clock(stamp))
+            self._send("clock", msg.Clock(stamp))
+
+    def _send(self, name: str, message: Any) -> None:
+        self._out[name].write(message)
+        self._record(name, message)
+
+    def _record(self, name: str, message: Any) -> None:
+        if self._bag is not None:
+            now = time.time() if self._real else self._clock
+            kind = msg.ros_name(type(message))
+            self._bag.write_data(f"/{name}", now, kind, message.serialize())
 
     def _scan(self, stamp: Any, ranges: Any) -> Any:
         layout, values = self._robot.layout, ranges.astype(np.float64)
@@ -243,7 +258,8 @@ class Simulator:
         if "pose-jump" in self._active:
             begin = compose(compose(begin, own), compose(JUMP, inverse(own)))
         v, omega = self._robot.twist()
-        self._out["odom"].write(
+        self._send(
+            "odom",
             msg.Odometry(
                 msg.Header(stamp, "odom"),
                 "base_link",
@@ -251,17 +267,17 @@ class Simulator:
                 msg.TwistWithCovariance(
                     msg.Twist(msg.Vector3(v), msg.Vector3(0.0, 0.0, omega))
                 ),
-            )
+            ),
         )
         moving = [_transform(stamp, "map", "odom", begin)]
         moving.append(_transform(stamp, "odom", "base_link", own))
-        self._out["tf"].write(msg.TFMessage(moving))
+        self._send("tf", msg.TFMessage(moving))
 
     def _tell_static(self) -> None:
         offset = self._robot.settings["robot"].get("scanner_offset") or (0.0, 0.0)
         mount = (float(offset[0]), float(offset[1]), 0.0)
         static = _transform(time_of(0.0), "base_link", "base_scan", mount)
-        self._out["tf_static"].write(msg.TFMessage([static]))
+        self._send("tf_static", msg.TFMessage([static]))
 
     def _report(self, outcome: str) -> DriveReport:
         robot = self._robot

@@ -163,6 +163,12 @@ class Core:
         """End the drive, as on SIGTERM."""
         return self.final or self._end('ended', reason)
 
+    def drove(self, v: float, omega: float) -> None:
+        """Take another command than the last one as driven, as in a recorded drive."""
+        self._wheels.last = self._wheels.fractions(v, omega)
+        if self._motion:
+            self._motion[-1] = (self._motion[-1][0], v, omega)
+
     def tick(self, now: float, wait: float) -> Command:
         """
         Return the command of a control period.
