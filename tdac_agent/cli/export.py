@@ -1,4 +1,4 @@
-"""`tdac export`: a controller as a Webots project, a task as a folder of Harbor."""
+"""`tdac export`: a controller for Webots or ROS 2, a task as a folder of Harbor."""
 
 from __future__ import annotations
 
@@ -13,9 +13,14 @@ from tdac_agent.cli.spinner import Spinner
 from tdac_agent.cli.task_choice import check_tier, chosen
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.typed_options import typed_fields
-from tdac_agent.cli.webots_flags import ExportHarborOptions, ExportWebotsOptions
+from tdac_agent.cli.webots_flags import (
+    ExportHarborOptions,
+    ExportRos2Options,
+    ExportWebotsOptions,
+)
 from tdac_agent.environments.epuck.export import SPARE, Project, export_webots
 from tdac_agent.harbor.folder import WORLDS, export_set, export_task
+from tdac_agent.ros2.export import NOT_RUN, export_ros2
 from tdac_agent.webots.report import WebotsReport
 from tdac_agent.webots.run import run_controller
 from tdac_envs.core.errors import TaskError
@@ -36,6 +41,30 @@ def run_webots(options: ExportWebotsOptions) -> int:
     else:
         _show(project, done.report, Console())
     return 0 if done.report.passed else 1
+
+
+def run_ros2(options: ExportRos2Options) -> int:
+    """Writes a ROS 2 package; returns 0."""
+    made = export_ros2(
+        options.run, options.out, name=options.name, unverified=options.unverified
+    )
+    if options.as_json:
+        record = {**asdict(made), "folder": str(made.folder), "run_in_ros": False}
+        print_json({"schema_version": 1, **record})
+        return 0
+    console = Console()
+    print_plain(console, f"wrote {made.folder} (ROS 2 package {made.name})")
+    console.print(escape(made.verdict), soft_wrap=True)
+    if not made.verified:
+        console.print("[bold red]not verified[/]: the package says so")
+    longest = max(made.stops.values())
+    console.print(f"stops within {longest:.3f} m, whatever happens (README.md)")
+    console.print(f"[yellow]{NOT_RUN}[/]", soft_wrap=True)
+    print_plain(
+        console, f"drive it over DDS: tdac ros sim {options.run}, and in another"
+    )
+    print_plain(console, f"shell tdac ros drive {options.out}")
+    return 0
 
 
 def run_harbor(flags: TaskFlags, options: ExportHarborOptions) -> int:

@@ -103,6 +103,7 @@ PARTS = {
     "studio_flags": ("studio",),
     "runs_flags": ("demo", "report", "runs", "rules"),
     "webots_flags": ("webots", "export"),
+    "ros_flags": ("ros",),
     "doctor_flags": ("doctor", "warm"),
 }
 """Modules with the flags of commands, in the order of `tdac --help`, and their names.

@@ -31,6 +31,7 @@ from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted
 from tdac_agent.evaluation.replay import check_shown, drive_episode
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.problems.part import Part
+from tdac_agent.ros2.bag import check_bag, write_bag
 from tdac_agent.storage.plain import one_line
 from tdac_agent.tasks.deviation import deviation_of
 from tdac_agent.tasks.disturbance import Disturbance
@@ -64,8 +65,11 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
     if flags.set_name is not None:
         return _play_world(flags.set_name, options)
     controller_file(options.controller)  # fails early on a wrong name
-    check_video(options.video)
+    if options.mcap is None or options.video is not None:
+        check_video(options.video)
     file, task = controller_and_task(options.controller, flags)
+    if options.mcap is not None:
+        check_bag(task, options.mcap)
     if note := change_note(options.controller, flags):
         print(note)
     source = read_source(file)
@@ -77,6 +81,11 @@ def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
     else:
         setup = options.seed, noise.disturbance(task), options.tier
         rollout = drive_disturbed(task, source, *setup).rollout
+    if options.mcap is not None:
+        write_bag(options.mcap, task, rollout)
+        print(f"wrote {options.mcap}")
+        if options.video is None:
+            return _tell(rollout)
     frames_of = partial(task.pictures().frames, rollout)
     if solid is not None:
         frames_of = partial(solid_frames, solid, rollout)
@@ -195,6 +204,12 @@ def show(
         for frame in frames:
             window.show(frame)
         window.close()
+    return _tell(rollout)
+
+
+def _tell(rollout: Rollout) -> int:
+    """Prints what the controller printed and how the episode ended."""
+    steps = rollout.trajectory.steps
     show_printed(rollout.printed, Console())
     print(f"{rollout.name}: {rollout.outcome} after {steps} steps" + _because(rollout))
     return 0 if rollout.reached else 1

@@ -35,6 +35,13 @@ class PlayOptions:
     video: Path | None = option(
         None, f"{VIDEO} instead of opening a window.", metavar="FILE"
     )
+    mcap: Path | None = option(
+        None,
+        "Write a .mcap file with ROS 2 messages (scan, pose, path, map, contacts) "
+        "instead of opening a window.",
+        metavar="FILE",
+        scope="task",
+    )
     speed: float | None = speed_option()
     view: Literal["2d", "3d"] = option(
         "2d",

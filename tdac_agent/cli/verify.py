@@ -46,6 +46,10 @@ def run(
 ) -> int:
     """Verifies a controller and prints the report; returns the exit code."""
     check_tier(options.tier)
+    if options.recorded is not None:
+        from tdac_agent.cli.recorded import run_recorded
+
+        return run_recorded(flags, options, noise)
     _check_robust(options, noise)
     if options.out is not None:
         check_folder(options.out)

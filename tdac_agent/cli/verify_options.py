@@ -52,6 +52,13 @@ class VerifyOptions:
     trust: bool = trust_option()
     tier: str = tier_option()
     seed: int | None = seed_option()
+    recorded: Path | None = option(
+        None,
+        "Compare a recorded drive, a bag of ROS 2 or an .mcap file, with the "
+        "controller: which commands differ, its gap and its stops. No test is run.",
+        metavar="BAG",
+        scope="task",
+    )
     junit: Path | None = option(None, "Write a JUnit XML report.", metavar="FILE")
     out: Path | None = out_option(
         "Folder for report.json or episodes.json, the trajectories and a picture of "

@@ -22,7 +22,7 @@ webots_app = typer.Typer(
 )
 export_app = typer.Typer(
     no_args_is_help=True,
-    help="Export a controller to Webots, or a task to Harbor.",
+    help="Export a controller to Webots or ROS 2, or a task to Harbor.",
 )
 app = typer.Typer()
 app.add_typer(webots_app, name="webots")
@@ -108,6 +108,33 @@ def export_webots(options: ExportWebotsOptions) -> None:
 
     The controller is unchanged; an adapter supplies its observations. The project is
     then run once by tdac, not by Webots itself.
+    """
+
+
+@dataclass(frozen=True, slots=True)
+class ExportRos2Options:
+    """The flags of `tdac export ros2`."""
+
+    run: Path = option(..., "Run folder with a verified controller.", argument=True)
+    out: Path = option(..., "Package folder, new or empty.", metavar="DIR")
+    name: str | None = option(
+        None, "Name of the package.  [default: `tdac_` and the task]", metavar="NAME"
+    )
+    unverified: bool = option(
+        False, "Export a controller that is not verified; the package says so."
+    )
+    as_json: bool = json_option()
+
+
+@export_app.command(
+    "ros2", epilog="Example: `tdac export ros2 runs/depot-1 --out depot_package`"
+)
+@typed_options("export:run_ros2")
+def export_ros2(options: ExportRos2Options) -> None:
+    """Write a ROS 2 package with a verified controller, for a robot on a map in metres.
+
+    The controller is unchanged; the package adds frames, limits and safe stops. `tdac
+    ros sim` and `tdac ros drive` drive it over DDS, without ROS.
     """
 
 

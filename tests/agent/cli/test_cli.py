@@ -28,6 +28,7 @@ from tdac_envs.mapping.bundled import bundled_map
 COMMANDS = [
     "map", "world", "synth", "verify", "play", "evaluate", "train", "check-suite",
     "demo", "rules", "report", "runs", "webots run", "export webots", "doctor",
+    "export ros2", "ros sim", "ros drive",
 ]  # fmt: skip
 ENDS = ["--start", "30", "30", "--goal", "130", "30", "--robot-radius", "6"]
 

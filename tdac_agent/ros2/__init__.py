@@ -1,0 +1,1 @@
+"""ROS 2: packages with a verified controller, and a simulated robot for them."""

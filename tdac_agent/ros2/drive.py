@@ -1,0 +1,264 @@
+"""Drives an exported package over DDS, without ROS: its core, its controller."""
+
+from __future__ import annotations
+
+import hmac
+import importlib
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from tdac_agent.errors import RunError
+from tdac_agent.ros2 import messages as msg
+from tdac_agent.ros2.dds import Bus, seconds_of, time_of
+from tdac_agent.ros2.export import (
+    CONTROLLER,
+    COPIED,
+    MARK,
+    PACKAGE,
+    SETTINGS,
+    core_settings,
+    mark_of,
+)
+from tdac_agent.storage.files import read_inside
+from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_json
+
+TOGETHER = 0.05
+"""Longest wait for scan and pose of a tick of the clock, s of the wall clock."""
+SHARE = 0.6
+"""Share of a period in which the controller may answer in real time."""
+ANSWER = 1.0
+"""Longest wait for an answer in simulated time, s of the wall clock."""
+ZEROS = 5
+"""Commands of zero at the end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """An exported package, ready to drive.
+
+    Attributes:
+        folder: Its folder.
+        settings: Its settings.
+        core: Its module `core`.
+        motion: Its module `motion`.
+        scans: Its module `scans`.
+        worker: Its module `worker`.
+    """
+
+    folder: Path
+    settings: dict[str, Any]
+    core: ModuleType
+    motion: ModuleType
+    scans: ModuleType
+    worker: ModuleType
+
+
+def open_package(folder: Path, *, trust: bool = False) -> Opened:
+    """Imports the modules of a package, which run with the rights of this process.
+
+    Args:
+        folder: Folder of the package.
+        trust: Whether a package may run that this installation did not export.
+
+    Raises:
+        RunError: It is no such package, it was changed, or it needs trust.
+    """
+    try:
+        text = read_inside(folder, f"{CONTROLLER}/{SETTINGS}", TEXT_BYTES)
+        settings = parse_json(text)
+        name = settings["package"]
+    except FileNotFoundError:
+        raise RunError(
+            f"{folder} is not a package of tdac export ros2: it has no "
+            f"{CONTROLLER}/{SETTINGS}"
+        ) from None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RunError(f"{folder}: {CONTROLLER}/{SETTINGS}: {error}") from None
+    if not trust and not is_own(folder, str(name)):
+        raise RunError(
+            f"{folder} was not exported by this installation, or was changed since: "
+            "its code would run with your rights; read it, then give --trust"
+        )
+    sys.path.insert(0, str(folder.resolve()))
+    try:
+        found = [
+            importlib.import_module(f"{name}.{part}")
+            for part in ("core", "motion", "scans", "worker")
+        ]
+    except ImportError as error:
+        raise RunError(f"{folder}: cannot import its modules: {error}") from None
+    finally:
+        sys.path.pop(0)
+    return Opened(folder, settings, *found)
+
+
+def is_own(folder: Path, name: str) -> bool:
+    """Whether this installation exported a package, and its code is unchanged."""
+    try:
+        mark = read_inside(folder, MARK, 200).decode()
+        for file in COPIED:
+            ours = (PACKAGE / file).read_bytes()  # raw read: shipped
+            if read_inside(folder, f"{name}/{file}", RECORD_BYTES) != ours:
+                return False
+    except (OSError, ValueError):
+        return False
+    wanted = mark_of(folder)
+    return bool(wanted) and hmac.compare_digest(mark, wanted)
+
+
+class Node:
+    """The node without ROS: messages in, one command per control period out.
+
+    Args:
+        package: The package.
+        bus: The topics.
+        dead_man: Time after which the robot stops by itself, s.
+        sim_time: Whether the time is that of /clock; otherwise that of this machine.
+        origin: Pose of the odometry's origin on the map; None for tf.
+        any_start: Whether to begin anywhere.
+        policy: What answers; by default the package's controller in its worker.
+        say: Called with each new state.
+    """
+
+    def __init__(
+        self,
+        package: Opened,
+        bus: Bus,
+        *,
+        dead_man: float,
+        sim_time: bool,
+        origin: tuple[float, float, float] | None = None,
+        any_start: bool = False,
+        policy: Any = None,
+        say: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        try:
+            settings = core_settings(
+                package.settings,
+                kind=package.core.Settings,
+                dead_man=dead_man,
+                any_start=any_start,
+            )
+            if policy is None:
+                policy = package.worker.Worker(
+                    package.folder / CONTROLLER, package.settings["controller_sha256"]
+                )
+        except (OSError, ValueError, KeyError) as error:
+            raise RunError(str(error)) from None
+        self.core = package.core.Core(settings, policy)
+        self.dt = settings.dt
+        self._package, self._bus, self._say = package, bus, say
+        self._sim_time, self._origin = sim_time, origin
+        self._in = {name: bus.reader(name) for name in ("scan", "odom", "tf", "clock")}
+        self._out = bus.writer("cmd_vel")
+        self._frames: dict[str, tuple[str, tuple[float, float, float]]] = {}
+        self._said = ""
+        self._clock = -1.0
+
+    def run(self, seconds: float | None = None) -> Any:
+        """Drives until the goal or a failure; returns the last command.
+
+        Args:
+            seconds: Longest time, s of the wall clock.
+        """
+        end = None if seconds is None else time.monotonic() + seconds
+        self._send(self._package.core.Command(0.0, 0.0, "waiting"))
+        try:
+            while self.core.final is None:
+                self._tick()
+                if end is not None and time.monotonic() > end:
+                    self.core.end("out of time")
+        finally:
+            last = self.core.end("the node was told to end")
+            for _ in range(ZEROS):
+                self._send(last)
+                time.sleep(0.01)
+        return last
+
+    def _tick(self) -> None:
+        if not self._sim_time:
+            due = time.monotonic() + self.dt
+            self._hear()
+            self._decide(time.time(), SHARE * self.dt)
+            while (rest := due - time.monotonic()) > 0.0:
+                time.sleep(min(rest, 0.005))
+                self._hear()
+            return
+        last = self._clock
+        while self._clock < last + self.dt - 1e-6:
+            self._hear()
+            time.sleep(0.0003)
+            if self._clock < last:  # the simulation began again
+                break
+        end = time.monotonic() + TOGETHER
+        while not self.core.has(self._clock) and time.monotonic() < end:
+            self._hear()
+            time.sleep(0.0003)
+        self._decide(self._clock, ANSWER)
+
+    def _decide(self, now: float, wait: float) -> None:
+        self.core.publishers = self._bus.publishers("cmd_vel")
+        command = self.core.tick(now, wait)
+        # What came meanwhile is older than the command, and needs none of its own.
+        self._hear()
+        self._send(command)
+
+    def _hear(self) -> None:
+        """Takes what has arrived."""
+        for clock in self._in["clock"].take():
+            self._clock = seconds_of(clock.clock)
+        for message in self._in["tf"].take():
+            for each in message.transforms:
+                self._place(each)
+        for message in self._in["odom"].take():
+            if self._origin is not None:
+                pose = self._package.motion.compose(
+                    self._origin, self._pose_of(message.pose.pose, "position")
+                )
+                self.core.pose(seconds_of(message.header.stamp), *pose)
+        for message in self._in["scan"].take():
+            layout = self._package.scans.Layout(
+                len(message.ranges),
+                message.angle_min,
+                message.angle_increment,
+                message.range_min,
+                message.range_max,
+            )
+            self.core.scan(seconds_of(message.header.stamp), layout, message.ranges)
+
+    def _place(self, each: Any) -> None:
+        """Takes a transform; the pose is map to odom to base_link."""
+        pose = self._pose_of(each.transform, "translation")
+        self._frames[each.child_frame_id] = each.header.frame_id, pose
+        if each.child_frame_id == "base_link" and self._origin is None:
+            parent, own = self._frames["base_link"]
+            above = self._frames.get(parent)
+            if above is not None and above[0] == "map":
+                whole = self._package.motion.compose(above[1], own)
+                self.core.pose(seconds_of(each.header.stamp), *whole)
+
+    def _pose_of(self, pose: Any, place: str) -> tuple[float, float, float]:
+        at = getattr(pose, place)
+        turn = pose.orientation if place == "position" else pose.rotation
+        yaw = self._package.motion.yaw_of(turn.x, turn.y, turn.z, turn.w)
+        return at.x, at.y, yaw
+
+    def _send(self, command: Any) -> None:
+        twist: Any = msg.Twist(
+            msg.Vector3(command.v), msg.Vector3(0.0, 0.0, command.omega)
+        )
+        if self._bus.stamped:
+            now = self._clock if self._sim_time else time.time()
+            twist = msg.TwistStamped(
+                msg.Header(time_of(max(now, 0.0)), "base_link"), twist
+            )
+        self._out.write(twist)
+        text = f"{command.state}: {command.reason}".rstrip(": ")
+        if text != self._said:
+            self._said = text
+            self._say(text)

@@ -1,0 +1,284 @@
+"""
+Drive a robot with a verified controller: everything but ROS.
+
+Lengths are in metres of the map's frame, angles in radians and counter-clockwise, times in
+seconds of one clock, that of the stamps. The node calls `Core.scan` and `Core.pose` with what
+arrives, and `Core.tick` once per control period; it publishes what `tick` returns.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from itertools import pairwise
+import math
+from typing import Any, Protocol
+
+import numpy as np
+
+from .motion import compose, Wheels, wrapped
+from .scans import Guard, Layout, LayoutError, Scanner
+
+PERIODS = 3
+"""Control periods after which a scan or a pose is too old."""
+
+
+class SettingsError(ValueError):
+    """What the package, the robot or the launch file says cannot be driven with."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """
+    What the controller was verified with, and what the user declares.
+
+    Attributes:
+        dt: Control period.
+        horizon: Commands after which the drive ends without the goal.
+        start: Verified start: x, y, yaw.
+        goal: x, y.
+        goal_tolerance: Distance at which the goal counts as reached.
+        robot: See `settings.json`.
+        dead_man: Time after which the robot stops by itself without a command.
+        max_age: Largest age of a scan and of a pose; 0 for three periods.
+        any_start: Whether to drive from a start that no verified drive had.
+    """
+
+    dt: float
+    horizon: int
+    start: tuple[float, float, float]
+    goal: tuple[float, float]
+    goal_tolerance: float
+    robot: dict[str, Any]
+    dead_man: float
+    max_age: float = 0.0
+    any_start: bool = False
+
+    def __post_init__(self) -> None:
+        limit = PERIODS * self.dt
+        if not 0.0 < self.dead_man <= limit + 1e-9:
+            raise SettingsError(
+                f'dead_man: expected the seconds after which the robot stops by itself without '
+                f'a command, above 0 and at most {limit:g} (three periods), got '
+                f'{self.dead_man:g}; without such a timer the robot must not be driven')
+        if not 0.0 <= self.max_age <= limit + 1e-9:
+            raise SettingsError(
+                f'max_age: expected at most {limit:g} s (three periods), got {self.max_age:g}')
+        for name in ('radius', 'axle_length', 'max_wheel_speed', 'stopping_distance'):
+            value = self.robot.get(name)
+            if not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
+                raise SettingsError(f'robot: expected {name} above 0, got {value!r}')
+
+    @property
+    def oldest(self) -> float:
+        """Largest age of a scan and of a pose."""
+        return self.max_age or PERIODS * self.dt
+
+    @property
+    def full_speed(self) -> float:
+        """Largest speed of the body."""
+        robot = self.robot
+        return float(min(robot['max_wheel_speed'], robot.get('max_speed') or math.inf))
+
+    def stops_within(self) -> dict[str, float]:
+        """Distance to standstill, from full speed, by what happens."""
+        v, own = self.full_speed, float(self.robot['stopping_distance'])
+        return {
+            'a scan or a pose is late, lost or old': v * (self.oldest + self.dt) + own,
+            'the controller is late, raises or is not finite': v * self.dt + own,
+            'something is ahead, the goal, SIGTERM, a second publisher': v * self.dt + own,
+            'the node is killed, frozen or unreachable': v * (self.dead_man + self.dt) + own,
+        }
+
+
+class Policy(Protocol):
+    """A controller that works beside the node, such as `worker.Worker`."""
+
+    def ask(self, observation: dict[str, Any]) -> None:
+        """Begin with an answer; the first one includes planning."""
+
+    def answer(self, wait: float) -> tuple[str, Any] | None:
+        """Return ('action', (left, right)) or ('error', text); None if there is none yet."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """
+    A command, and why it is what it is.
+
+    Attributes:
+        v: Speed, m/s.
+        omega: Turn rate, rad/s.
+        state: waiting, planning, driving, stopped, reached, failed or ended.
+        reason: Why the robot stands; empty when it drives.
+    """
+
+    v: float
+    omega: float
+    state: str
+    reason: str = ''
+
+
+class Core:
+    """The state of a drive: what has arrived, what the controller said, what is safe."""
+
+    def __init__(self, settings: Settings, policy: Policy) -> None:
+        self.settings, self._policy = settings, policy
+        self._wheels = Wheels(settings.robot, settings.dt)
+        self._scanner, self._guard = Scanner(settings.robot), Guard(settings.robot)
+        self._layout: Layout | None = None
+        self._ranges: np.ndarray[Any, Any] | None = None
+        self._scan_stamp = self._pose_stamp = -math.inf
+        self._pose = (0.0, 0.0, 0.0)
+        self._motion: deque[tuple[float, float, float]] = deque(maxlen=100)
+        self._asked = self._planned = False
+        self.publishers = 1
+        self.commands = 0
+        self.final: Command | None = None
+
+    def scan(self, stamp: float, layout: Layout, ranges: Any) -> None:
+        """Take a scan; older ones than the last, and ones without values, do not count."""
+        if self.final is not None or not stamp > self._scan_stamp:
+            return
+        try:
+            self._scanner.use(layout)
+        except LayoutError as error:
+            self._end('failed', str(error))
+            return
+        task, guard = self._scanner.read(ranges)
+        if task is not None:
+            self._ranges, self._scan_stamp, self._layout = task, stamp, layout
+            self._guard.see(guard, layout.angles())
+
+    def pose(self, stamp: float, x: float, y: float, yaw: float) -> None:
+        """Take a pose in the map's frame; older ones than the last do not count."""
+        if stamp > self._pose_stamp and math.isfinite(x + y + yaw):
+            self._pose, self._pose_stamp = (x, y, wrapped(yaw)), stamp
+
+    def has(self, stamp: float) -> bool:
+        """Whether scan and pose of this moment have arrived."""
+        return min(self._scan_stamp, self._pose_stamp) >= stamp - 1e-6
+
+    def end(self, reason: str) -> Command:
+        """End the drive, as on SIGTERM."""
+        return self.final or self._end('ended', reason)
+
+    def drove(self, v: float, omega: float) -> None:
+        """Take another command than the last one as driven, as in a recorded drive."""
+        self._wheels.last = self._wheels.fractions(v, omega)
+        if self._motion:
+            self._motion[-1] = (self._motion[-1][0], v, omega)
+
+    def tick(self, now: float, wait: float) -> Command:
+        """
+        Return the command of a control period.
+
+        Args:
+            now: Time.
+            wait: How long the controller may take for an answer, wall-clock seconds.
+        """
+        command = self._next(now, wait)
+        self._motion.append((now, command.v, command.omega))
+        return command
+
+    def _next(self, now: float, wait: float) -> Command:
+        if self.final is not None:
+            return self.final
+        why = self._unfit(now)
+        if self._asked:
+            answer = self._policy.answer(0.0)
+            if answer is None or self._planned is False or answer[0] == 'error':
+                return self._take(answer, why, now)
+            self._asked = False  # a late answer, to an observation that is old
+        if why:
+            return self._stand('stopped' if self._planned else 'waiting', why)
+        if math.dist(self._pose[:2], self.settings.goal) <= self.settings.goal_tolerance:
+            return self._end('reached', 'the goal')
+        if self.commands >= self.settings.horizon:
+            return self._end('failed', f'not at the goal after {self.commands} commands')
+        self._policy.ask(self.observation())
+        self._asked = True
+        return self._take(self._policy.answer(wait), '', now)
+
+    def _take(self, answer: tuple[str, Any] | None, why: str, now: float) -> Command:
+        """Return the command of an answer; None if there is none yet."""
+        if answer is None:
+            if self._planned:
+                return self._stand('stopped', 'the controller is late')
+            return self._stand('planning', 'the first plan is not ready')
+        self._asked, self._planned = False, True
+        if answer[0] == 'error':
+            return self._end('failed', str(answer[1]))
+        return self._stand('stopped', why) if why else self._drive(answer[1], now)
+
+    def observation(self) -> dict[str, Any]:
+        """Return what the controller observes, as it did when it was verified."""
+        own = {
+            'pose': self._pose, 'goal': self.settings.goal, 'wheel_speeds': self._wheels.last,
+            'ranges': self._ranges}
+        return {name: np.array(value, np.float32) for name, value in own.items()}
+
+    def _drive(self, action: Any, now: float) -> Command:
+        left, right = action
+        self.commands += 1
+        before = self._wheels.last
+        v, omega = self._wheels.twist(*self._wheels.limited(left, right))
+        if self._guard.blocked(v, omega, self.settings.full_speed, self._moved(now)):
+            self._wheels.last = before
+            return self._stand('stopped', 'something is ahead within the stopping distance')
+        return Command(v, omega, 'driving')
+
+    def _unfit(self, now: float) -> str:
+        """Return why no command may move the robot now; an empty text if one may."""
+        if self.publishers > 1:
+            return f'{self.publishers} publishers of the commands: end the others'
+        oldest = self.settings.oldest
+        for name, stamp in (('scan', self._scan_stamp), ('pose', self._pose_stamp)):
+            if why := _unfit_stamp(name, now - stamp, oldest):
+                return why
+        if abs(self._scan_stamp - self._pose_stamp) > oldest:
+            return f'scan and pose are more than {oldest:g} s apart'
+        begins = not self._planned and not self._asked
+        return self._wrong_start() if begins and not self.settings.any_start else ''
+
+    def _wrong_start(self) -> str:
+        x, y, yaw = self.settings.start
+        off, turn = math.dist(self._pose[:2], (x, y)), abs(wrapped(self._pose[2] - yaw))
+        radius = float(self.settings.robot['radius'])
+        if off <= radius and turn <= 0.5:
+            return ''
+        return (
+            f'the robot stands {off:.2f} m and {turn:.2f} rad from the verified start '
+            f'({x:g}, {y:g}, {yaw:g}); at most {radius:g} m and 0.5 rad are covered '
+            f'(any_start)')
+
+    def _moved(self, now: float) -> tuple[float, float, float]:
+        """Return the motion since the scan by the commands, as a pose in the body's frame then."""
+        moved = (0.0, 0.0, 0.0)
+        steps = [*self._motion, (now, 0.0, 0.0)]
+        for (begin, v, omega), (end, _, _) in pairwise(steps):
+            lasted = end - max(begin, self._scan_stamp)
+            if lasted > 0.0:
+                half = 0.5 * omega * lasted
+                chord = v * lasted * float(np.sinc(half / math.pi))
+                step = (chord * math.cos(half), chord * math.sin(half), 2.0 * half)
+                moved = compose(moved, step)
+        return moved
+
+    def _stand(self, state: str, reason: str) -> Command:
+        self._wheels.limited(0.0, 0.0)
+        return Command(0.0, 0.0, state, reason)
+
+    def _end(self, state: str, reason: str) -> Command:
+        self.final = Command(0.0, 0.0, state, reason)
+        return self.final
+
+
+def _unfit_stamp(name: str, age: float, oldest: float) -> str:
+    if age == math.inf:
+        return f'no {name} yet'
+    if age > oldest:
+        return f'the last {name} is older than {oldest:g} s'
+    if -age > oldest:
+        return f'the {name} is more than {oldest:g} s ahead of the clock (use_sim_time?)'
+    return ''

@@ -1,0 +1,202 @@
+"""Drive over ROS 2 with the exported controller: topics, tf and signals for `core`."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+import signal
+from typing import Any
+
+from ament_index_python.packages import get_package_share_directory
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import GetParameters
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
+from rclpy.signals import SignalHandlerOptions
+from rclpy.time import Time
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import String
+from tf2_ros import Buffer, TransformException, TransformListener
+
+from . import core, motion, scans, worker
+
+PACKAGE = __package__ or ''
+DEFAULTS: dict[str, Any] = {
+    'scan_topic': 'scan',
+    'odom_topic': 'odom',
+    'command_topic': 'cmd_vel',
+    'stamped': False,
+    'pose_source': 'tf',
+    'map_frame': 'map',
+    'base_frame': 'base_link',
+    'origin': [0.0, 0.0, 0.0],
+    'dead_man': 0.0,
+    'dead_man_node': '',
+    'dead_man_parameter': 'cmd_vel_timeout',
+    'max_age': 0.0,
+    'any_start': False,
+}
+
+
+class DriveNode(Node):  # type: ignore[misc]
+    """A node that publishes commands at the control rate."""
+
+    def __init__(self) -> None:
+        super().__init__('drive')
+        own = {name: self.declare_parameter(name, value).value for name, value in DEFAULTS.items()}
+        self.own = own
+        folder = Path(get_package_share_directory(PACKAGE)) / 'controller'
+        text = (folder / 'settings.json').read_text(encoding='utf-8')  # raw read: installed
+        written = json.loads(text)
+        settings = core.Settings(
+            dt=written['dt'], horizon=written['horizon'], start=tuple(written['start']),
+            goal=tuple(written['goal']), goal_tolerance=written['goal_tolerance'],
+            robot=written['robot'], dead_man=own['dead_man'], max_age=own['max_age'],
+            any_start=own['any_start'])
+        self.core = core.Core(settings, worker.Worker(folder, written['controller_sha256']))
+        self._wait = 0.5 * settings.dt
+        self._mounts: dict[str, float | None] = {}
+        self._said = ''
+        self._buffer = Buffer()
+        self._listener = TransformListener(self._buffer, self)
+        kind = TwistStamped if own['stamped'] else Twist
+        self._out = self.create_publisher(kind, own['command_topic'], 1)
+        self._state = self.create_publisher(String, '~/state', 1)
+        self.create_subscription(
+            LaserScan, own['scan_topic'], self._on_scan, qos_profile_sensor_data)
+        if own['pose_source'] == 'odom':
+            self.create_subscription(
+                Odometry, own['odom_topic'], self._on_odom, qos_profile_sensor_data)
+        self.get_logger().info(f'stops within (m): {settings.stops_within()}')
+        self.publish(core.Command(0.0, 0.0, 'waiting'))
+        self._dead_man = self._ask_dead_man()
+        self.create_timer(settings.dt, self._tick)
+
+    def _ask_dead_man(self) -> Any:
+        """Ask the robot's driver for its timer, where it has a parameter for it."""
+        if not self.own['dead_man_node']:
+            return None
+        client = self.create_client(
+            GetParameters, f'{self.own["dead_man_node"]}/get_parameters')
+        if not client.wait_for_service(timeout_sec=5.0):
+            raise core.SettingsError(f'dead_man_node: no node {self.own["dead_man_node"]}')
+        request = GetParameters.Request(names=[self.own['dead_man_parameter']])
+        return client.call_async(request)
+
+    def _check_dead_man(self) -> bool:
+        """Return whether the timer is as declared, or cannot be read."""
+        if self._dead_man is None:
+            return True
+        if not self._dead_man.done():
+            return False
+        value = self._dead_man.result().values[0]
+        self._dead_man = None
+        limit = core.PERIODS * self.core.settings.dt
+        if value.type != ParameterType.PARAMETER_DOUBLE or not 0 < value.double_value <= limit:
+            self.core.end(
+                f'{self.own["dead_man_parameter"]} of {self.own["dead_man_node"]}: expected '
+                f'above 0 and at most {limit:g} s, got {value.double_value:g}')
+        return True
+
+    def _on_scan(self, message: LaserScan) -> None:
+        mount = self._mount(message.header.frame_id)
+        if mount is not None:
+            layout = scans.Layout(
+                len(message.ranges), message.angle_min, message.angle_increment,
+                message.range_min, message.range_max, mount)
+            self.core.scan(_seconds(message.header.stamp), layout, message.ranges)
+
+    def _mount(self, frame: str) -> float | None:
+        """Return the yaw of the scanner on the robot; None while tf does not know it."""
+        if frame not in self._mounts:
+            try:
+                found = self._buffer.lookup_transform(self.own['base_frame'], frame, Time())
+            except TransformException:
+                return None
+            place, turn = found.transform.translation, found.transform.rotation
+            offset = self.core.settings.robot.get('scanner_offset') or (0.0, 0.0)
+            off = math.dist((place.x, place.y), offset)
+            if off > 0.02:
+                self.core.end(
+                    f'the scanner is at ({place.x:.3f}, {place.y:.3f}) m on the robot, the '
+                    f'robot file has ({offset[0]:g}, {offset[1]:g})')
+            if abs(turn.x) > 0.02 or abs(turn.y) > 0.02:
+                self.core.end('the scanner is tilted or upside down: not supported')
+            self._mounts[frame] = motion.yaw_of(turn.x, turn.y, turn.z, turn.w)
+        return self._mounts[frame]
+
+    def _on_odom(self, message: Odometry) -> None:
+        place, turn = message.pose.pose.position, message.pose.pose.orientation
+        own = (place.x, place.y, motion.yaw_of(turn.x, turn.y, turn.z, turn.w))
+        pose = motion.compose(tuple(self.own['origin']), own)
+        self.core.pose(_seconds(message.header.stamp), *pose)
+
+    def _look_up(self) -> None:
+        try:
+            found = self._buffer.lookup_transform(
+                self.own['map_frame'], self.own['base_frame'], Time())
+        except TransformException:
+            return
+        place, turn = found.transform.translation, found.transform.rotation
+        yaw = motion.yaw_of(turn.x, turn.y, turn.z, turn.w)
+        self.core.pose(_seconds(found.header.stamp), place.x, place.y, yaw)
+
+    def _tick(self) -> None:
+        if not self._check_dead_man():
+            return
+        if self.own['pose_source'] == 'tf':
+            self._look_up()
+        self.core.publishers = self.count_publishers(self.own['command_topic'])
+        now = self.get_clock().now().nanoseconds * 1e-9
+        self.publish(self.core.tick(now, self._wait))
+
+    def publish(self, command: core.Command) -> None:
+        """Publish a command, and say what changed."""
+        message = TwistStamped() if self.own['stamped'] else Twist()
+        twist = message.twist if self.own['stamped'] else message
+        if self.own['stamped']:
+            message.header.stamp = self.get_clock().now().to_msg()
+            message.header.frame_id = self.own['base_frame']
+        twist.linear.x, twist.angular.z = command.v, command.omega
+        self._out.publish(message)
+        text = f'{command.state}: {command.reason}'.rstrip(': ')
+        if text != self._said:
+            self._said = text
+            self._state.publish(String(data=text))
+            self.get_logger().info(text)
+
+
+def _seconds(stamp: Any) -> float:
+    return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
+
+
+def _interrupt(_number: int, _frame: Any) -> None:
+    raise KeyboardInterrupt
+
+
+def main(args: Any = None) -> None:
+    """Drive until the process is told to end; the last command is zero."""
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, _interrupt)
+    node = None
+    try:
+        node = DriveNode()
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        pass
+    except (core.SettingsError, OSError, ValueError) as error:
+        raise SystemExit(f'drive: {error}') from None
+    finally:
+        if node is not None:
+            node.publish(node.core.end('the node was told to end'))
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,206 @@
+"""Scans: what the controller observes of them, and what is in the robot's way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import math
+from typing import Any
+
+import numpy as np
+
+MOST_MISSING = 0.2
+"""Largest share of rays without a value in a scan that counts."""
+MOST_RAYS = 20_000
+_NEAR, _NONE = -1.0, 1e9
+
+
+class LayoutError(ValueError):
+    """A scan is not that of the robot that the controller was verified with."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """
+    Header of a scan: angles of its rays, and the ranges that count.
+
+    Attributes:
+        count: Number of rays.
+        first: Angle of the first ray, from the scanner's own x axis.
+        step: Angle between two rays, counter-clockwise.
+        range_min: Smallest valid range.
+        range_max: Largest one.
+        mount: Yaw of the scanner on the robot.
+    """
+
+    count: int
+    first: float
+    step: float
+    range_min: float
+    range_max: float
+    mount: float = 0.0
+
+    def angles(self) -> np.ndarray[Any, Any]:
+        """Angles from the robot's heading, in order."""
+        return np.asarray(self.mount + self.first + self.step * np.arange(self.count))
+
+
+class Scanner:
+    """
+    The task's rays from the scans of the robot.
+
+    A ray of the task reads the nearest return in its sector, halfway to its neighbours. A
+    task with rays of its own (`is_scanner`) takes scans of this scanner alone.
+    """
+
+    def __init__(self, robot: dict[str, Any]) -> None:
+        self.robot = robot
+        self.angles = np.asarray(robot['ray_angles'], np.float64)
+        self.range_max = float(robot['range_max'])
+        blind = {'range_min': float(robot.get('range_min') or 0.0), 'zero': 0.0}
+        self.blind = blind.get(str(robot.get('below_min')), self.range_max)
+        gaps = np.abs(_turns(np.diff(np.concatenate([self.angles, self.angles[:1]]))))
+        self._gap = float(gaps[:-1].max()) if len(gaps) > 1 else 0.1
+        self._layout: Layout | None = None
+        self._sector = self._own = np.zeros(0, np.int64)
+
+    def use(self, layout: Layout) -> None:
+        """
+        Assign the rays of a scan to those of the task, once per layout.
+
+        Raises LayoutError if the scan is not that of the robot, or does not see enough.
+        """
+        if layout == self._layout:
+            return
+        if not 1 <= layout.count <= MOST_RAYS:
+            raise LayoutError(f'expected a scan of 1 to {MOST_RAYS} rays, got {layout.count}')
+        if not math.isfinite(layout.first + layout.step + layout.mount) or layout.step == 0.0:
+            raise LayoutError('the header of the scan has no valid angles')
+        if self.robot.get('is_scanner'):
+            self._check(layout)
+        if layout.range_max < 0.99 * self.range_max:
+            raise LayoutError(
+                f'the scan reaches {layout.range_max:g} m, the robot file {self.range_max:g} m')
+        apart = np.abs(_turns(layout.angles()[:, None] - self.angles[None, :]))
+        nearest, ray = apart.min(axis=0), apart.argmin(axis=0)
+        if nearest.max() > 0.5 * self._gap + abs(layout.step) + 1e-6:
+            i = int(nearest.argmax())
+            raise LayoutError(
+                f'the scan does not see {math.degrees(self.angles[i]):.0f} degrees from the '
+                f'heading (left is positive), where ray {i} of the task points')
+        sector = apart.argmin(axis=1)
+        inside = apart[np.arange(layout.count), sector] <= 0.5 * self._gap + 1e-6
+        self._sector = np.where(inside, sector, -1)
+        self._own = ray
+        self._layout = layout
+
+    def _check(self, layout: Layout) -> None:
+        own, count = self.angles, len(self.angles)
+        seen = layout.angles()
+        last = float(_turns(seen[-1] - own[-1]))
+        if layout.count != count or max(abs(_turns(seen[0] - own[0])), abs(last)) > self._gap:
+            way = 'counter-clockwise' if layout.step > 0 else 'clockwise'
+            raise LayoutError(
+                f'the scan has {layout.count} rays from {seen[0]:.3g} to {seen[-1]:.3g} rad '
+                f'({way}), the robot file {count} from {own[0]:.3g} to {own[-1]:.3g}: '
+                f'verify with a robot file of this scanner, or check its mounting')
+
+    def read(self, ranges: Any) -> tuple[np.ndarray[Any, Any] | None, np.ndarray[Any, Any]]:
+        """
+        Ranges of the task's rays, float32, and the range of each ray of the scan for the guard.
+
+        The first is None if too many rays have no value. Of the second, NaN is unknown, and inf
+        is free. A range of 0 is one without a return, as many drivers publish it; between 0
+        and the smallest range, something is too near.
+        """
+        assert self._layout is not None
+        raw = np.asarray(ranges, np.float64)
+        if raw.shape != (self._layout.count,):
+            return None, np.full(self._layout.count, np.nan)
+        missing = np.isnan(raw) | (raw == 0.0)
+        near = (raw < self._layout.range_min) & ~missing
+        value = np.where(raw > self.range_max, self.range_max, raw)
+        value = np.where(near, _NEAR, np.where(missing, _NONE, value))
+        found = np.full(len(self.angles), _NONE)
+        inside = self._sector >= 0
+        np.minimum.at(found, self._sector[inside], value[inside])
+        found = np.where(found == _NONE, value[self._own], found)
+        zero = (found == _NONE) & (raw[self._own] == 0.0)
+        if str(self.robot.get('below_min')) == 'zero':
+            found[zero] = 0.0
+        lost = found == _NONE
+        task = None
+        if lost.mean() <= MOST_MISSING:
+            task = np.where(found == _NEAR, self.blind, _filled(found, lost))
+            task = task.astype(np.float32)
+        guard = np.where(near, np.nan, np.where(raw > self.range_max, np.inf, raw))
+        return task, np.where(missing, np.nan, guard)
+
+
+class Guard:
+    """
+    What lies in the robot's way, from scans alone.
+
+    A ray that was near and has no value now keeps what it read, until it reads again: what
+    is too near to be measured is not gone.
+    """
+
+    def __init__(self, robot: dict[str, Any]) -> None:
+        self.radius, self.stop = float(robot['radius']), float(robot['stopping_distance'])
+        self.offset = np.asarray(robot.get('scanner_offset') or (0.0, 0.0), np.float64)
+        self.keep = float(robot.get('range_min') or 0.0) + 2.0 * (self.radius + self.stop)
+        self.points = np.zeros((0, 2))
+        self._kept = np.zeros(0)
+
+    def see(self, ranges: np.ndarray[Any, Any], angles: np.ndarray[Any, Any]) -> None:
+        """Take the ranges of a scan (NaN: unknown, inf: free) at angles from the heading."""
+        if len(self._kept) != len(ranges):
+            self._kept = np.full(len(ranges), np.inf)
+        unknown = np.isnan(ranges)
+        near = np.where(self._kept < self.keep, self._kept, np.inf)
+        self._kept = np.where(unknown, near, ranges)
+        hit = np.isfinite(self._kept)
+        own, turn = self._kept[hit], angles[hit]
+        self.points = self.offset + np.stack([own * np.cos(turn), own * np.sin(turn)], axis=1)
+
+    def blocked(
+        self, v: float, omega: float, full: float, moved: tuple[float, float, float]
+    ) -> bool:
+        """
+        Whether a command leads the body to something within its stopping distance.
+
+        Args:
+            v: Speed.
+            omega: Turn rate.
+            full: Full speed, from which the stopping distance is measured.
+            moved: Motion since the scan, as the pose now in the body's frame then.
+        """
+        if abs(v) < 1e-6 or not len(self.points):
+            return False
+        x, y, yaw = moved
+        cosine, sine = math.cos(yaw), math.sin(yaw)
+        rest = self.points - (x, y)
+        points = rest @ np.array([[cosine, -sine], [sine, cosine]])
+        way = np.linspace(0.0, math.copysign(self.stop * min(abs(v) / full, 1.0), v), 9)
+        turn = way * (omega / v)
+        half = 0.5 * turn
+        chord = way * np.sinc(half / math.pi)
+        centres = np.stack([chord * np.cos(half), chord * np.sin(half)], axis=1)
+        away = np.hypot(*(points[:, None, :] - centres[None, :, :]).transpose(2, 0, 1))
+        touched = (away < self.radius) & (away < away[:, :1] - 1e-4)
+        return bool(touched.any())
+
+
+def _turns(angle: Any) -> Any:
+    """Return angles in (-pi, pi]."""
+    return math.pi - (math.pi - angle) % math.tau
+
+
+def _filled(found: np.ndarray[Any, Any], lost: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Fill lost rays with the nearer one of the next values on both sides."""
+    if not lost.any():
+        return found
+    known, count = np.flatnonzero(~lost), len(found)
+    for i in np.flatnonzero(lost):
+        away = (known - i) % count
+        found[i] = min(found[known[away.argmin()]], found[known[away.argmax()]])
+    return found

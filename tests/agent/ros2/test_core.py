@@ -1,0 +1,389 @@
+"""The core never moves a robot on late, impossible or missing data."""
+
+import dataclasses
+import hashlib
+import math
+
+import numpy as np
+import pytest
+from floor_task import Ready, forward
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tdac_agent.ros2.export import core_settings
+from tdac_agent.ros2.package.core import Core, SettingsError
+from tdac_agent.ros2.package.motion import Wheels, compose, wrapped, yaw_of
+from tdac_agent.ros2.package.scans import Guard, Layout, LayoutError, Scanner
+from tdac_agent.ros2.package.worker import Worker
+from tdac_agent.ros2.robot import Robot
+
+ANGLES = st.floats(-10, 10)
+PLACES = st.floats(-100, 100)
+
+
+def see(core, robot, now, scan=True, pose=True):
+    """Gives the core what the robot's sensors say."""
+    reading = robot.read()
+    if pose:
+        core.pose(now, *reading.pose)
+    if scan:
+        core.scan(now, robot.layout, reading.ranges)
+
+
+def drive(core, robot, seconds, see=see, wait=0.0):
+    """Drives in control periods; returns the commands."""
+    commands = []
+    for _ in range(round(seconds / robot.dt)):
+        now = robot.time
+        see(core, robot, now)
+        commands.append(core.tick(now, wait))
+        robot.obey(commands[-1].v, commands[-1].omega)
+        robot.step()
+    return commands
+
+
+def test_drives_as_verified(package, settings, robot, steps, here):
+    """The exported controller needs as many commands as the verified episode has."""
+    worker = Worker(package / "controller", settings["controller_sha256"])
+    core = Core(core_settings(settings, dead_man=0.3), worker)
+    drive(core, robot, 0.1 * steps, wait=60.0)
+    assert robot.reached
+    assert not robot.contact
+    assert core.commands == steps
+    see(core, robot, robot.time)
+    last = core.tick(robot.time, 1.0)
+    assert (last.v, last.omega, last.state) == (0.0, 0.0, "reached")
+
+
+def test_no_motion_before_the_first_plan(make_core, robot):
+    """Until the first answer is there, every command is zero."""
+    core = make_core()
+    core._policy.waits = True
+    commands = drive(core, robot, 1.0)
+    assert {(c.v, c.omega, c.state) for c in commands} == {(0.0, 0.0, "planning")}
+    core._policy.waits = False
+    assert drive(core, robot, 0.1)[0].state == "driving"
+
+
+@pytest.mark.parametrize("missing", ["scan", "pose"])
+def test_stands_when_data_are_old(make_core, robot, missing):
+    """Without a scan or a pose, it stands within the stated distance."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    before = robot.way
+    drive(core, robot, 1.0, lambda *a: see(*a, **{missing: False}))
+    assert robot.stands
+    assert (
+        robot.way - before
+        <= core.settings.stops_within()["a scan or a pose is late, lost or old"]
+    )
+    last = core.tick(robot.time, 0.0)
+    assert last.state == "stopped"
+    assert missing in last.reason
+    assert drive(core, robot, 0.2)[-1].state == "driving"
+
+
+def test_stands_when_the_controller_is_late(make_core, robot):
+    """A late answer stops the robot; it drives on with the next one, not with it."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    core._policy.waits = True
+    before = robot.way
+    commands = drive(core, robot, 0.5)
+    assert {(c.v, c.reason) for c in commands} == {(0.0, "the controller is late")}
+    assert (
+        robot.way - before
+        <= core.settings.stops_within()[
+            "the controller is late, raises or is not finite"
+        ]
+    )
+    asked = len(core._policy.observations)
+    core._policy.waits = False
+    assert drive(core, robot, 0.1)[0].state == "driving"
+    assert len(core._policy.observations) == asked + 1
+
+
+@pytest.mark.parametrize("why", ["raises", "nan", "inf", "three", "exits"])
+def test_ends_when_the_controller_fails(tmp_path, settings, robot, why, here):
+    """What raises or answers no two finite numbers ends the drive for good."""
+    returns = {
+        "raises": "1 / 0",
+        "nan": "(float('nan'), 0.0)",
+        "inf": "(1.0, float('inf'))",
+        "three": "(1, 1, 1)",
+        "exits": "exit(3)",
+    }
+    file = tmp_path / "controller.py"
+    file.write_text(f"def policy(obs):\n    return {returns[why]}\n")
+    sha256 = hashlib.sha256(file.read_bytes()).hexdigest()
+    own = core_settings(settings, dead_man=0.3)
+    core = Core(own, Worker(tmp_path, sha256))
+    commands = drive(core, robot, 0.5, wait=10.0)
+    assert {(c.v, c.omega) for c in commands} == {(0.0, 0.0)}
+    assert commands[-1].state == "failed"
+    assert "the controller failed" in commands[-1].reason
+    assert robot.way == 0.0
+
+
+def test_a_changed_controller_is_refused(tmp_path):
+    """The hash of the exported file decides, before anything runs."""
+    (tmp_path / "controller.py").write_text("raise SystemExit\n")
+    with pytest.raises(ValueError, match="is not the exported file"):
+        Worker(tmp_path, "0" * 64)
+
+
+def test_stops_before_what_is_ahead(make_core, robot):
+    """Full speed towards a wall ends without a contact, near the wall."""
+    core = make_core(any_start=True)
+    drive(core, robot, 20.0)
+    assert not robot.contact
+    assert robot.stands
+    assert "something is ahead" in core.tick(robot.time, 0.0).reason
+    ahead = min(r for r in (*robot.read().ranges[:8], *robot.read().ranges[-7:]))
+    assert ahead < 0.1 + 0.045 + 0.03 + 0.03
+
+
+def test_turns_away_from_what_is_ahead(make_core, robot):
+    """Only what a command leads to stops it: a turn on the spot is free."""
+    turns = False
+
+    def policy(_):
+        return "action", ((-0.5, 0.5) if turns else (1.0, 1.0))
+
+    core = make_core(policy, any_start=True)
+    drive(core, robot, 20.0)
+    turns = True
+    assert drive(core, robot, 0.5)[-1].state == "driving"
+
+
+def test_a_foot_before_the_scanner_stays(settings):
+    """What was near and cannot be measured any more still stops the robot."""
+    guard, angles = Guard(settings["robot"]), np.array([0.0])
+    args = 0.3, 0.0, 0.3, (0.0, 0.0, 0.0)
+    guard.see(np.array([2.0]), angles)
+    assert not guard.blocked(*args)
+    guard.see(np.array([0.15]), angles)
+    assert guard.blocked(*args)
+    guard.see(np.array([np.nan]), angles)
+    assert guard.blocked(*args)
+    guard.see(np.array([np.inf]), angles)
+    assert not guard.blocked(*args)
+
+
+@given(
+    v=st.floats(-0.3, 0.3),
+    omega=st.floats(-3, 3),
+    x=st.floats(-0.3, 0.3),
+    y=st.floats(-0.3, 0.3),
+)
+def test_the_guard_sees_what_it_would_touch(v, omega, x, y):
+    """Compared with 500 places along the arc: nothing that comes nearer is missed."""
+    robot = {"radius": 0.1, "stopping_distance": 0.045}
+    guard = Guard(robot)
+    angle, away = math.atan2(y, x), math.hypot(x, y)
+    guard.see(np.array([away]), np.array([angle]))
+    pose, least = (0.0, 0.0, 0.0), away
+    way = 0.045 * abs(v) / 0.3
+    for _ in range(500):
+        time = way / 500 / abs(v) if v else 0.0
+        half = 0.5 * omega * time
+        pose = compose(
+            pose, (v * time * math.cos(half), v * time * math.sin(half), 2 * half)
+        )
+        least = min(least, math.dist(pose[:2], (x, y)))
+    touches = least < 0.1 - 1e-3 and least < away - 1e-3
+    free = least > 0.1 + 1e-3 or least >= away - 1e-5
+    blocked = guard.blocked(v, omega, 0.3, (0.0, 0.0, 0.0))
+    assert blocked or not touches
+    assert not (blocked and free)
+
+
+def test_the_goal_ends_the_drive(make_core, settings):
+    """Within the tolerance of the goal, the command is zero, for good."""
+    core = make_core(any_start=True)
+    core.scan(0.0, Layout(60, 0.0, math.tau / 60, 0.1, 3.0), [3.0] * 60)
+    core.pose(0.0, *settings["goal"], 0.0)
+    assert core.tick(0.0, 0.0).state == "reached"
+    core.pose(0.1, 0.0, 0.0, 0.0)
+    assert core.tick(0.1, 0.0).v == 0.0
+
+
+def test_a_signal_ends_the_drive(make_core, robot):
+    """After SIGTERM there is only zero."""
+    core = make_core()
+    drive(core, robot, 0.3)
+    assert core.end("SIGTERM").v == 0.0
+    assert {c.v for c in drive(core, robot, 0.5)} == {0.0}
+
+
+def test_a_second_publisher_stops_it(make_core, robot):
+    """Two publishers of commands: the robot stands until the other one is gone."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    core.publishers = 2
+    assert "2 publishers" in drive(core, robot, 0.3)[-1].reason
+    assert robot.stands
+    core.publishers = 1
+    assert drive(core, robot, 0.1)[0].state == "driving"
+
+
+def test_waits_at_the_start(make_core, robot):
+    """It begins only where verified drives began; `any_start` says otherwise."""
+    far = dataclasses.replace(make_core().settings, start=(1.0, 1.0, 0.0))
+    core = Core(far, Ready(forward))
+    command = drive(core, robot, 0.2)[-1]
+    assert command.state == "waiting"
+    assert "from the verified start" in command.reason
+    core = Core(dataclasses.replace(far, any_start=True), Ready(forward))
+    assert drive(core, robot, 0.2)[-1].state == "driving"
+
+
+def test_a_clock_that_differs_is_named(make_core, robot):
+    """Stamps of another clock move nothing."""
+    core = make_core()
+    see(core, robot, 100.0)
+    assert "ahead of the clock" in core.tick(0.0, 0.0).reason
+
+
+def test_scan_and_pose_must_be_of_one_time(make_core, robot):
+    """Each may be new enough, but not far from the other."""
+    core = make_core(max_age=0.2)
+    see(core, robot, 10.0, pose=False)
+    see(core, robot, 10.35, scan=False)
+    assert "apart" in core.tick(10.17, 0.0).reason
+
+
+def test_the_horizon_ends_the_drive(make_core, robot):
+    """It was verified for so many commands."""
+    core = make_core(lambda _: ("action", (0.1, -0.1)), horizon=5)
+    commands = drive(core, robot, 1.0)
+    assert commands[4].state == "driving"
+    assert commands[5].state == "failed"
+
+
+@pytest.mark.parametrize("dead_man", [0.0, 0.31, math.nan, -1.0])
+def test_the_timer_of_the_robot_is_required(settings, dead_man):
+    """A robot that does not stop by itself within three periods is not driven."""
+    with pytest.raises(SettingsError, match="dead_man: expected"):
+        core_settings(settings, dead_man=dead_man)
+
+
+def test_a_scan_of_another_robot_is_refused(make_core, settings):
+    """The message says what the scan has and what the robot file has."""
+    core = make_core()
+    core.scan(0.0, Layout(720, -math.pi, math.tau / 720, 0.1, 3.0), [3.0] * 720)
+    command = core.tick(0.0, 0.0)
+    assert command.state == "failed"
+    assert "the scan has 720 rays from -3.14" in command.reason
+    assert "the robot file 60 from 0" in command.reason
+
+
+def test_a_short_or_backward_scan_is_refused(settings):
+    """So is one that reaches less far, or turns the other way."""
+    scanner = Scanner(settings["robot"])
+    with pytest.raises(LayoutError, match="the scan reaches 2 m"):
+        scanner.use(Layout(60, 0.0, math.tau / 60, 0.1, 2.0))
+    with pytest.raises(LayoutError, match="clockwise"):
+        scanner.use(Layout(60, 0.0, -math.tau / 60, 0.1, 3.0))
+
+
+def test_the_rays_of_the_simulated_turtlebot_are_taken(settings):
+    """Gazebo's 360 rays from 0 to 6.28 rad are those of the LDS-01."""
+    robot = {
+        "ray_angles": [math.radians(i) for i in range(360)],
+        "is_scanner": True,
+        "range_max": 3.5,
+        "range_min": 0.12,
+        "below_min": "zero",
+    }
+    scanner = Scanner(robot)
+    scanner.use(Layout(360, 0.0, 6.28 / 359, 0.12, 3.5))
+    assert scanner.read([1.0] * 360)[0].tolist() == [1.0] * 360
+
+
+def test_a_fan_reads_the_nearest_return_of_each_sector():
+    """Seven sectors of 10 degrees, from 70 rays of 1 degree."""
+    robot = {
+        "ray_angles": [math.radians(a) for a in range(30, -31, -10)],
+        "range_max": 5.0,
+        "range_min": None,
+    }
+    scanner = Scanner(robot)
+    scanner.use(Layout(360, -math.pi, math.tau / 360, 0.05, 10.0))
+    ranges = np.full(360, 4.0)
+    ranges[180 + 27] = 2.0  # 27 degrees to the left
+    ranges[180 - 14] = 1.0
+    ranges[180] = np.inf
+    ranges[180 + 60] = 0.5  # outside the fan
+    task, guard = scanner.read(ranges)
+    assert task.tolist() == [2.0, 4.0, 4.0, 4.0, 1.0, 4.0, 4.0]
+    assert guard[180 + 60] == 0.5
+    with pytest.raises(LayoutError, match="does not see 30 degrees"):
+        scanner.use(Layout(41, -0.35, 0.0175, 0.05, 10.0))
+
+
+def test_a_mounted_scanner_is_turned_back():
+    """A scanner that looks backwards on the robot gives the same readings."""
+    robot = {"ray_angles": [math.pi / 2, 0.0, -math.pi / 2], "range_max": 9.0}
+    scanner = Scanner(robot)
+    scanner.use(Layout(4, 0.0, math.pi / 2, 0.1, 9.0, mount=math.pi))
+    # From behind, counter-clockwise: behind, right, ahead, left.
+    assert scanner.read([1.0, 2.0, 3.0, 4.0])[0].tolist() == [4.0, 3.0, 2.0]
+
+
+def test_ranges_without_a_value():
+    """inf reads the largest range; NaN the nearer neighbour; most NaN: no scan."""
+    robot = {"ray_angles": [0.3, 0.2, 0.1, 0.0, -0.1, -0.2], "range_max": 5.0}
+    scanner = Scanner(robot)
+    scanner.use(Layout(6, 0.3, -0.1, 0.1, 5.0))
+    nan, inf = math.nan, math.inf
+    assert scanner.read([1, nan, 3, inf, 9, 5])[0].tolist() == [1, 1, 3, 5, 5, 5]
+    assert scanner.read([1, nan, nan, 4, 5, 6])[0] is None
+    assert scanner.read([1, 2])[0] is None
+    assert scanner.read([0.05, 2, 3, -inf, 5, 4])[0].tolist() == [5, 2, 3, 5, 5, 4]
+
+
+@given(yaw=ANGLES)
+def test_yaw_of_a_quaternion(yaw):
+    """The inverse of the quaternion of a yaw."""
+    found = yaw_of(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
+    assert math.isclose(math.cos(found), math.cos(yaw), abs_tol=1e-9)
+    assert math.isclose(math.sin(found), math.sin(yaw), abs_tol=1e-9)
+
+
+@given(a=st.tuples(PLACES, PLACES, ANGLES), b=st.tuples(PLACES, PLACES, ANGLES))
+def test_poses_compose_as_matrices(a, b):
+    """The pose of C in A is the product of two homogeneous matrices."""
+
+    def matrix(x, y, yaw):
+        c, s = math.cos(yaw), math.sin(yaw)
+        return np.array([[c, -s, x], [s, c, y], [0, 0, 1]])
+
+    assert np.allclose(matrix(*compose(a, b)), matrix(*a) @ matrix(*b), atol=1e-8)
+
+
+@given(angle=ANGLES)
+def test_angles_are_wrapped(angle):
+    """Into (-pi, pi], and the same direction."""
+    assert -math.pi < wrapped(angle) <= math.pi
+    assert math.isclose(math.cos(wrapped(angle)), math.cos(angle), abs_tol=1e-9)
+
+
+@given(v=st.floats(-1, 1), omega=st.floats(-5, 5))
+def test_wheels_and_twist_are_inverse(settings, v, omega):
+    """Speeds of the body and of the wheels."""
+    wheels = Wheels(settings["robot"], 0.1)
+    assert np.allclose(wheels.twist(*wheels.fractions(v, omega)), (v, omega))
+
+
+@given(commands=st.lists(st.tuples(st.floats(-2, 2), st.floats(-2, 2)), max_size=20))
+def test_limits_are_those_of_the_environment(task, settings, commands):
+    """The wheels' fractions are those that the environment applies."""
+    robot = Robot(task, settings, dead_man=9.0)
+    wheels = Wheels(settings["robot"], 0.1)
+    for action in np.array(commands, np.float32).reshape(-1, 2):
+        robot._env.step(action)
+        if robot._env._is_over:
+            break
+        own = wheels.limited(*map(float, action))
+        assert np.allclose(robot._env.robot.wheel_speeds, own, atol=1e-6)

@@ -1,0 +1,228 @@
+"""An exported package drives the simulated robot over DDS, whatever goes wrong."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+pytest.importorskip("cyclonedds", reason="no wheel of Cyclone DDS")
+
+from tdac_agent.errors import RunError
+from tdac_agent.ros2.dds import Bus
+from tdac_agent.ros2.drive import Node, open_package
+from tdac_agent.ros2.export import core_settings
+from tdac_agent.ros2.faults import STOPPING, Fault, drawn_faults, read_fault
+from tdac_agent.ros2.robot import Robot
+from tdac_agent.ros2.simulator import Simulator
+from tdac_envs.core.errors import TaskError
+
+DOMAINS = iter(range(20 + os.getpid() % 40, 100))
+
+
+@pytest.fixture
+def domain():
+    """A domain that no other test uses."""
+    return next(DOMAINS)
+
+
+@pytest.fixture
+def stated(settings):
+    """The stated distances to standstill."""
+    return core_settings(settings, dead_man=0.3).stops_within()
+
+
+class NodeProcess:
+    """`tdac ros drive` in a process of its own."""
+
+    def __init__(self, package, domain, *flags):
+        command = [sys.executable, "-m", "tdac_agent", "ros", "drive", str(package)]
+        self.process = subprocess.Popen(
+            [*command, "--domain", str(domain), *flags],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.communicate()
+
+    def output(self):
+        """What it printed, after its end."""
+        return self.process.communicate(timeout=60)[0]
+
+
+def robot_of(task, settings):
+    """The robot at its start."""
+    return Robot(task, settings, dead_man=0.3)
+
+
+def test_as_many_commands_as_verified(task, settings, package, steps, domain):
+    """In simulated time, the drive has the steps of the verified episode."""
+    with NodeProcess(package, domain) as node:
+        simulator = Simulator(robot_of(task, settings), Bus(domain), patience=30.0)
+        report = simulator.run(60.0)
+        printed = node.output()
+    assert (report.outcome, report.steps, report.commands) == ("reached", steps, steps)
+    assert report.stops == 0
+    assert f"reached: the goal\n{steps} commands" in printed
+    assert node.process.returncode == 0
+
+
+def test_the_pose_from_odometry(task, settings, package, steps, domain):
+    """With the declared origin of /odom, and with stamped commands, it is the same."""
+    origin = [str(value) for value in settings["start"]]
+    flags = ["--origin", *origin, "--stamped"]
+    with NodeProcess(package, domain, *flags):
+        bus = Bus(domain, stamped=True)
+        report = Simulator(robot_of(task, settings), bus, patience=30.0).run(60.0)
+    assert (report.outcome, report.steps) == ("reached", steps)
+
+
+def test_in_real_time(task, settings, package, domain):
+    """It reaches the goal without a contact; stops are allowed."""
+    with NodeProcess(package, domain, "--real-time"):
+        report = Simulator(robot_of(task, settings), Bus(domain), real_time=True).run(
+            120.0
+        )
+    assert (report.outcome, report.contact) == ("reached", "")
+
+
+@pytest.mark.parametrize("kind", STOPPING)
+def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, kind):
+    """The robot stands after the stated distance, and goes on after the fault."""
+    fault = Fault(kind, 2.0, 2.0)
+    with NodeProcess(package, domain):
+        simulator = Simulator(
+            robot_of(task, settings), Bus(domain), faults=(fault,), patience=30.0
+        )
+        report = simulator.run(60.0)
+    assert report.outcome == "reached"
+    assert report.faults[0]["stood"]
+    assert report.faults[0]["way"] <= stated["a scan or a pose is late, lost or old"]
+
+
+@pytest.mark.parametrize("kind", ["pose-jump", "some-nan", "second-publisher"])
+def test_no_fault_leads_to_a_contact(task, settings, package, domain, kind):
+    """A wrong pose, missing ranges, a second publisher: the goal without a contact."""
+    with NodeProcess(package, domain):
+        simulator = Simulator(
+            robot_of(task, settings),
+            Bus(domain),
+            faults=(Fault(kind, 2.0, 2.0),),
+            patience=30.0,
+        )
+        report = simulator.run(60.0)
+    assert report.outcome == "reached"
+    assert report.faults[0]["stood"] == (kind == "second-publisher")
+
+
+def signalled(number, process, after):
+    """A watch that signals a process once, after so many seconds of the drive."""
+    state = {"way": None, "stood": None}
+
+    def watch(robot):
+        if state["way"] is None and robot.time >= after:
+            process().send_signal(number)
+            if number == signal.SIGKILL:
+                process().wait()
+            state["way"] = robot.way
+        elif state["way"] is not None and state["stood"] is None and robot.stands:
+            state["stood"] = robot.way - state["way"]
+
+    return state, watch
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM])
+def test_a_node_that_ends_or_freezes(task, settings, package, stated, domain, number):
+    """The robot stands within the stated distance; a new node finishes the drive."""
+    nodes = [NodeProcess(package, domain)]
+    state, watch = signalled(number, lambda: nodes[0].process, 2.0)
+    robot, limit = robot_of(task, settings), 5.0
+    with nodes[0]:
+        simulator = Simulator(robot, Bus(domain), watch=watch, patience=3.0)
+        report = simulator.run(limit)
+    assert report.outcome == "out of time"
+    assert state["stood"] is not None
+    assert state["stood"] <= stated["the node is killed, frozen or unreachable"]
+    with NodeProcess(package, domain, "--any-start"):
+        again = Simulator(robot, Bus(domain), patience=30.0).run(60.0)
+    assert (again.outcome, again.contact) == ("reached", "")
+
+
+def test_a_slow_node(task, settings, package, stated, domain, here):
+    """A controller that needs more than its period stops the robot, and no more."""
+    opened = open_package(package)
+    worker = opened.worker.Worker(package / "controller", settings["controller_sha256"])
+
+    class Slow:
+        """The controller, which is slow for a second."""
+
+        count = 0
+
+        def ask(self, observation):
+            self.count += 1
+            self.after = time.monotonic() + (0.2 if 20 < self.count < 24 else 0.0)
+            worker.ask(observation)
+
+        def answer(self, wait):
+            rest = self.after - time.monotonic()
+            if rest > wait:
+                time.sleep(wait)
+                return None
+            time.sleep(max(rest, 0.0))
+            return worker.answer(max(wait, 0.01))
+
+    node = Node(opened, Bus(domain), dead_man=0.3, sim_time=False, policy=Slow())
+    thread = threading.Thread(target=node.run, args=(100.0,), daemon=True)
+    thread.start()
+    report = Simulator(robot_of(task, settings), Bus(domain), real_time=True).run(100.0)
+    thread.join(30.0)
+    assert report.outcome == "reached"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
+def test_random_faults(task, settings, package, stated, steps, domain, seed):
+    """Four faults in a drive: no contact, each stop within its stated distance."""
+    faults = drawn_faults(seed, 4, 0.1 * steps)
+    with NodeProcess(package, domain):
+        simulator = Simulator(
+            robot_of(task, settings), Bus(domain), faults=faults, patience=30.0
+        )
+        report = simulator.run(120.0)
+    assert report.contact == ""
+    for course in report.faults:
+        if course["kind"] in STOPPING:
+            assert course["way"] <= stated["a scan or a pose is late, lost or old"]
+
+
+def test_a_changed_package_needs_trust(package, tmp_path):
+    """Code that this installation did not export runs only if the user says so."""
+    for place in ("floor/core.py", "controller/sensors.py", "controller/heapq.py"):
+        copy = tmp_path / place.replace("/", "-")
+        shutil.copytree(package, copy)
+        file = copy / place.replace("floor", "tdac_floor")
+        file.write_text((file.read_text() if file.is_file() else "") + "\n")
+        with pytest.raises(RunError, match="give --trust"):
+            open_package(copy)
+    with pytest.raises(RunError, match="is not a package of tdac export ros2"):
+        open_package(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text", ["nan", "nan-scans@1", "nan-scan@1+2", "no-scans@-1+2"]
+)
+def test_faults_that_are_none(text):
+    """One line says how they are written, or which kinds there are."""
+    with pytest.raises(TaskError, match="expected"):
+        read_fault(text)
+    assert str(read_fault("nan-scans@1+2.5")) == "nan-scans@1+2.5"

@@ -1,0 +1,239 @@
+"""An exported package has the layout of ament_python and the file that was verified."""
+
+import configparser
+import hashlib
+import json
+import runpy
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from floor_task import robot_file, write_task
+
+from tdac_agent import load_task
+from tdac_agent.errors import RunError
+from tdac_agent.ros2.export import (
+    COPIED,
+    NOT_RUN,
+    PACKAGE,
+    export_ros2,
+    package_name,
+    settings_of,
+)
+from tdac_envs import preprocess
+from tdac_envs.core.errors import TaskError
+
+# The rules of `ament_flake8`: its file ament_flake8.ini.
+AMENT = """[flake8]
+extend-ignore = B902,C816,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404,I202
+import-order-style = google
+max-line-length = 99
+"""
+
+
+def test_the_controller_is_the_verified_file(run, package, settings):
+    """Byte for byte, with its hash, and beside it what it reads."""
+    source = (run / "controller.py").read_bytes()
+    assert (package / "controller" / "controller.py").read_bytes() == source
+    assert settings["controller_sha256"] == hashlib.sha256(source).hexdigest()
+    for name in ("params.json", "occupancy.npy", "sensors.py"):
+        there = (package / "controller" / name).read_bytes()
+        assert there == (run / name).read_bytes()
+    assert settings["verified"] is True
+    assert "arrives ≥ 95 %" in settings["verdict"]
+
+
+def test_the_modules_are_those_that_are_tested(package):
+    """The package has the files of `tdac_agent.ros2.package`."""
+    for name in COPIED:
+        assert (package / "tdac_floor" / name).read_bytes() == (
+            PACKAGE / name
+        ).read_bytes()
+
+
+def test_the_layout_is_that_of_ament_python(package):
+    """The files that the ROS documentation lists for a Python package."""
+    name = "tdac_floor"
+    for file in ("package.xml", "setup.py", "setup.cfg", f"resource/{name}"):
+        assert (package / file).is_file()
+    root = ET.parse(package / "package.xml").getroot()
+    assert (root.tag, root.get("format")) == ("package", "3")
+    assert root.findtext("name") == name
+    assert root.findtext("export/build_type") == "ament_python"
+    assert root.find("maintainer").get("email")
+    assert NOT_RUN in root.findtext("description")
+    depends = {each.text for each in root.findall("exec_depend")}
+    node = (package / name / "node.py").read_text()
+    used = {
+        line.split()[1].split(".")[0]
+        for line in node.splitlines()
+        if line.startswith(("import ", "from ")) and " . " not in line
+    }
+    ours = {"__future__", "json", "math", "pathlib", "signal", "typing"}
+    assert used - ours <= depends
+    config = configparser.ConfigParser()
+    config.read(package / "setup.cfg")
+    assert config["develop"]["script_dir"] == f"$base/lib/{name}"
+    assert config["install"]["install_scripts"] == f"$base/lib/{name}"
+
+
+def test_setup_installs_each_file(package, monkeypatch):
+    """`setup.py` names the node, and every file that the node reads."""
+    given = {}
+    monkeypatch.setattr("setuptools.setup", given.update)
+    monkeypatch.chdir(package)
+    runpy.run_path("setup.py")
+    assert given["entry_points"] == {
+        "console_scripts": ["drive = tdac_floor.node:main"]
+    }
+    assert given["packages"] == ["tdac_floor"]
+    placed = {file for _, files in given["data_files"] for file in files}
+    expected = {"package.xml", "README.md", "resource/tdac_floor"}
+    for folder in ("launch", "config", "rviz", "maps", "controller"):
+        expected |= {f"{folder}/{each.name}" for each in (package / folder).iterdir()}
+    expected.discard("controller/__pycache__")
+    assert placed == expected
+
+
+def test_the_style_is_that_of_ros(package, tmp_path):
+    """`flake8` with the rules of ament finds nothing outside the controller."""
+    rules = tmp_path / "ament.ini"
+    rules.write_text(AMENT + "application-import-names = tdac_floor\n")
+    command = [sys.executable, "-m", "flake8", "--config", rules]
+    assert _printed(*command, "--exclude", "controller", package) == ""
+    bad = tmp_path / "bad.py"
+    bad.write_text('"""nothing"""\nimport sys\nimport os\nx = "a"\n')
+    assert {"Q000", "I100", "F401", "D400"} <= set(_printed(*command, bad).split())
+
+
+def _printed(*command):
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.stdout + done.stderr
+
+
+def test_no_module_but_the_node_knows_ros(package):
+    """The others import the standard library and numpy alone."""
+    for name in set(COPIED) - {"node.py"}:
+        text = (package / "tdac_floor" / name).read_text()
+        imported = {
+            line.split()[1].partition(".")[0]
+            for line in text.splitlines()
+            if line.startswith(("import ", "from "))
+        }
+        assert imported - set(sys.stdlib_module_names) <= {"numpy", ""}
+
+
+def test_the_map_is_that_of_the_task(package, task):
+    """`map.yaml` is read as the same cells at the same place."""
+    grid, _ = preprocess(package / "maps" / "map.yaml", robot_radius=0.1 / 0.05)
+    own = task.setting.nominal.terrain.grid
+    assert np.array_equal(grid.cells, own.cells)
+    assert (grid.resolution, grid.origin) == (own.resolution, own.origin)
+
+
+def test_the_parameters_are_those_of_the_node(package):
+    """`drive.yaml` has each parameter of the node, and no timer yet."""
+    written = yaml.safe_load((package / "config" / "drive.yaml").read_text())
+    own = written["drive"]["ros__parameters"]
+    scope = {}
+    text = (package / "tdac_floor" / "node.py").read_text()
+    begin = text.index("DEFAULTS:")
+    exec(
+        text[begin : text.index("}", begin) + 1].replace(": dict[str, Any]", ""), scope
+    )
+    assert own == scope["DEFAULTS"]
+    assert own["dead_man"] == 0.0
+
+
+def test_the_readme_says_what_was_not_run(package):
+    """Nobody can take the wrapper for tested."""
+    text = (package / "README.md").read_text()
+    assert NOT_RUN in text
+    assert "| a scan or a pose is late, lost or old | 0.165 |" in text
+
+
+def as_unverified(run, folder):
+    """The same run as one that only passed."""
+    record = json.loads((run / "run.json").read_text())
+    for file in run.iterdir():
+        if file.is_file():
+            (folder / file.name).write_bytes(file.read_bytes())
+    record.update(status="passed", confirm=False, mark="")
+    (folder / "run.json").write_text(json.dumps(record))
+    return folder
+
+
+def test_what_is_not_verified_needs_a_flag(run, tmp_path):
+    """Then the description, the README and the settings say so."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    as_unverified(run, folder)
+    out = tmp_path / "out"
+    with pytest.raises(RunError, match="give --unverified"):
+        export_ros2(folder, out)
+    assert not out.exists()
+    made = export_ros2(folder, out, unverified=True)
+    assert made.verified is False
+    text = ET.parse(out / "package.xml").getroot().findtext("description")
+    assert text.startswith("NOT VERIFIED. ")
+    assert "**Not verified.**" in (out / "README.md").read_text()
+
+
+def test_a_folder_with_files_is_refused(run, tmp_path):
+    """Nothing is written over."""
+    (tmp_path / "mine").write_text("")
+    with pytest.raises(RunError, match="is not an empty folder"):
+        export_ros2(run, tmp_path)
+    with pytest.raises(RunError, match="--name 'Bad__Name': a ROS package"):
+        export_ros2(run, tmp_path / "out", name="Bad__Name")
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"robot": {"radius": 0.1, "max_wheel_speed": 0.3}}, "no stopping distance"),
+        ({"robot": {"file": "robot.yaml", "stopping_distance": 0.01}}, "impossible"),
+    ],
+)
+def test_a_robot_that_cannot_stop_is_refused(tmp_path, changes, why):
+    """One line says what is missing or impossible."""
+    task = load_task(write_task(tmp_path, **changes))
+    with pytest.raises(TaskError, match=why):
+        settings_of(task)
+
+
+def test_tasks_without_metres_are_refused():
+    """A controller in pixels, or of an e-puck, drives no robot over ROS 2."""
+    with pytest.raises(TaskError, match="is a task in pixels"):
+        settings_of(load_task("maze"))
+    with pytest.raises(TaskError, match="tdac export webots"):
+        settings_of(load_task("epuck-crates"))
+
+
+@pytest.mark.parametrize("task", ["Büro 2", "A--b__c", "!!!", "tb3_sandbox"])
+def test_names_of_packages(task):
+    """Lower-case letters, digits and single underscores."""
+    name = package_name(task)
+    assert name.isascii()
+    assert name == name.lower()
+    assert "__" not in name
+    assert name[0].isalpha()
+    assert not name.endswith("_")
+
+
+def test_it_is_written_for_python_3_10(package):
+    """Humble has Python 3.10."""
+    import ast
+
+    for file in Path(package).rglob("*.py"):
+        if file.parent.name != "controller":
+            ast.parse(file.read_text(), feature_version=(3, 10))
+
+
+def test_a_robot_file_is_complete():
+    """The test's own robot file has a source of each figure."""
+    assert robot_file()["sources"]["scanner.rays"] == "assumed"
