@@ -39,10 +39,10 @@ SAME: dict[str, str] = {
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
     # Another physics can move the body; the exact step is what it was.
-    "a354b8022cc12836b9efdcd5d07427174f83d54608204bdf09b5873b56b081c6": (
+    "bd48a7e17d77b211e6e0d2fca78ddb0bf3be44f0895d3853e63308825f7a1d43": (
         "46a5299112cd13c1188f8899f0e1d9ef6aa22ac926b7f3b91c12e6dbe9ef96e7"
     ),
-    "6b6683280724dc4a69bc5ad155aa78dd74868c73373769d99fb9f4c48c191dbf": (
+    "ca69cb7809e3387b6ee4aa1969039c5f47e2428b4bb5c4d37e4b2863aec4969d": (
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
 }
