@@ -32,12 +32,14 @@ LEFT_OUT = {
     "needs another program": re.compile("command:"),
     "needs a person": re.compile("manual:"),
     "needs the results of a clone": re.compile("results/"),
+    "needs a second process": re.compile("tdac ros "),
     "needs a display": re.compile(r"^tdac play (?!.*--video)|studio --open"),
 }
 NEEDS = {
     "stable_baselines3": re.compile(r"tdac train|\.zip"),
     "nicegui": "tdac studio",
     "mcp.server": "tdac mcp",
+    "mcap": "--mcap|--recorded",
 }
 """Extras, and the commands that need them."""
 
@@ -85,6 +87,9 @@ PREPARED = {
     r"maze-1\b(?<!ppo-maze-1)": "tdac synth",
     r"runs( |$)|office-1": "tdac synth --task office",
     "epuck-1": "tdac synth --task epuck",
+    "depot-1": "tdac synth --map depot.yaml --start 0 2 --goal 6 3 "
+    "--robot turtlebot3-burger",
+    r"drive\.mcap": "tdac play runs/depot-1 --mcap drive.mcap",
     "unknown-1": "tdac synth --set unknown --episodes 8",
     "mine theirs": "tdac bench go-to-goal --set unknown -n 2 --out mine",
     "theirs": "tdac bench other.py --set unknown -n 2 --out theirs",

@@ -25,6 +25,7 @@ EXTRAS = {
     "video": "moviepy",
     "sb3": "stable_baselines3",
     "ray": "ray",
+    "ros2": "cyclonedds",
     "inspect": "inspect_ai",
     "mcp": "mcp",
     "studio": "nicegui",

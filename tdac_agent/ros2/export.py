@@ -308,6 +308,7 @@ def _values(
         "full": f"{speed:g}",
         "rate": f"{1 / dt:g}",
         "limit": f"{PERIODS * dt:g}",
+        "timer": f"{2 * dt:g}",
         "start": [f"{value:g}" for value in settings["start"]],
         "goal": [f"{value:g}" for value in settings["goal"]],
         "scanner": f"{way} {_fan_text(robot['ray_angles'])}, up to "

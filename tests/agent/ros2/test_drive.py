@@ -77,6 +77,7 @@ def test_as_many_commands_as_verified(task, settings, package, steps, domain):
     assert node.process.returncode == 0
 
 
+@pytest.mark.slow
 def test_the_pose_from_odometry(task, settings, package, steps, domain):
     """With the declared origin of /odom, and with stamped commands, it is the same."""
     origin = [str(value) for value in settings["start"]]
@@ -87,6 +88,7 @@ def test_the_pose_from_odometry(task, settings, package, steps, domain):
     assert (report.outcome, report.steps) == ("reached", steps)
 
 
+@pytest.mark.slow
 def test_in_real_time(task, settings, package, domain):
     """It reaches the goal without a contact; stops are allowed."""
     with NodeProcess(package, domain, "--real-time"):
@@ -96,6 +98,7 @@ def test_in_real_time(task, settings, package, domain):
     assert (report.outcome, report.contact) == ("reached", "")
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("kind", STOPPING)
 def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, kind):
     """The robot stands after the stated distance, and goes on after the fault."""
@@ -110,6 +113,7 @@ def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, ki
     assert report.faults[0]["way"] <= stated["a scan or a pose is late, lost or old"]
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("kind", ["pose-jump", "some-nan", "second-publisher"])
 def test_no_fault_leads_to_a_contact(task, settings, package, domain, kind):
     """A wrong pose, missing ranges, a second publisher: the goal without a contact."""
@@ -141,6 +145,7 @@ def signalled(number, process, after):
     return state, watch
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM])
 def test_a_node_that_ends_or_freezes(task, settings, package, stated, domain, number):
     """The robot stands within the stated distance; a new node finishes the drive."""
@@ -158,6 +163,7 @@ def test_a_node_that_ends_or_freezes(task, settings, package, stated, domain, nu
     assert (again.outcome, again.contact) == ("reached", "")
 
 
+@pytest.mark.slow
 def test_a_slow_node(task, settings, package, stated, domain, here):
     """A controller that needs more than its period stops the robot, and no more."""
     opened = open_package(package)

@@ -14,7 +14,7 @@ import pytest
 import yaml
 from floor_task import robot_file, write_task
 
-from tdac_agent import load_task
+from tdac_agent import load_task, synthesize
 from tdac_agent.errors import RunError
 from tdac_agent.ros2.export import (
     COPIED,
@@ -35,7 +35,7 @@ max-line-length = 99
 """
 
 
-def test_the_controller_is_the_verified_file(run, package, settings):
+def test_the_controller_is_that_of_the_run(run, package, settings):
     """Byte for byte, with its hash, and beside it what it reads."""
     source = (run / "controller.py").read_bytes()
     assert (package / "controller" / "controller.py").read_bytes() == source
@@ -43,8 +43,19 @@ def test_the_controller_is_the_verified_file(run, package, settings):
     for name in ("params.json", "occupancy.npy", "sensors.py"):
         there = (package / "controller" / name).read_bytes()
         assert there == (run / name).read_bytes()
-    assert settings["verified"] is True
-    assert "arrives ≥ 95 %" in settings["verdict"]
+    assert settings["verified"] is False
+
+
+@pytest.mark.slow
+def test_a_verified_controller(tmp_path):
+    """It needs no flag; the package has its verdict, and what that does not cover."""
+    task = load_task(write_task(tmp_path))
+    assert synthesize(task, learner="builtin", out=tmp_path / "run").verified
+    made = export_ros2(tmp_path / "run", tmp_path / "out")
+    assert made.verified
+    text = ET.parse(tmp_path / "out" / "package.xml").getroot().findtext("description")
+    assert "Verified: arrives ≥ 95 %" in text
+    assert "not covered: other worlds" in (tmp_path / "out" / "README.md").read_text()
 
 
 def test_the_modules_are_those_that_are_tested(package):
@@ -156,40 +167,40 @@ def test_the_readme_says_what_was_not_run(package):
     assert "| a scan or a pose is late, lost or old | 0.165 |" in text
 
 
-def as_unverified(run, folder):
-    """The same run as one that only passed."""
-    record = json.loads((run / "run.json").read_text())
+def test_what_is_not_verified_needs_a_flag(run, package, tmp_path):
+    """Then the description, the README and the settings say so."""
+    out = tmp_path / "out"
+    with pytest.raises(
+        RunError, match=r"is not verified \(passed\); give --unverified"
+    ):
+        export_ros2(run, out)
+    assert not out.exists()
+    text = ET.parse(package / "package.xml").getroot().findtext("description")
+    assert text.startswith("NOT VERIFIED. ")
+    assert "**Not verified.**" in (package / "README.md").read_text()
+
+
+def test_a_run_of_others_is_only_a_claim(run, tmp_path):
+    """What its files say of a verdict is not believed."""
+    folder = tmp_path / "run"
+    folder.mkdir()
     for file in run.iterdir():
         if file.is_file():
             (folder / file.name).write_bytes(file.read_bytes())
-    record.update(status="passed", confirm=False, mark="")
+    record = json.loads((run / "run.json").read_text())
+    record.update(status="verified", confirm=True)
     (folder / "run.json").write_text(json.dumps(record))
-    return folder
-
-
-def test_what_is_not_verified_needs_a_flag(run, tmp_path):
-    """Then the description, the README and the settings say so."""
-    folder = tmp_path / "run"
-    folder.mkdir()
-    as_unverified(run, folder)
-    out = tmp_path / "out"
-    with pytest.raises(RunError, match="give --unverified"):
-        export_ros2(folder, out)
-    assert not out.exists()
-    made = export_ros2(folder, out, unverified=True)
-    assert made.verified is False
-    text = ET.parse(out / "package.xml").getroot().findtext("description")
-    assert text.startswith("NOT VERIFIED. ")
-    assert "**Not verified.**" in (out / "README.md").read_text()
+    with pytest.raises(RunError, match="only what its files claim; give --unverified"):
+        export_ros2(folder, tmp_path / "out")
 
 
 def test_a_folder_with_files_is_refused(run, tmp_path):
     """Nothing is written over."""
     (tmp_path / "mine").write_text("")
     with pytest.raises(RunError, match="is not an empty folder"):
-        export_ros2(run, tmp_path)
+        export_ros2(run, tmp_path, unverified=True)
     with pytest.raises(RunError, match="--name 'Bad__Name': a ROS package"):
-        export_ros2(run, tmp_path / "out", name="Bad__Name")
+        export_ros2(run, tmp_path / "out", name="Bad__Name", unverified=True)
 
 
 @pytest.mark.parametrize(
