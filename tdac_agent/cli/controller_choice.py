@@ -101,3 +101,15 @@ def _without_controller(folder: Path) -> str:
         command = resume_line(load_run(folder), folder)
         return f"the run {folder} has no controller yet; to continue it: {command}"
     return f"there is no controller.py in {folder}"
+
+
+def check_folder(out: Path) -> None:
+    """Checks before the work begins that the folder can be written to."""
+    folder = out / "trajectories"
+    missing = [each for each in (folder, out) if not each.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for each in missing:
+            each.rmdir()
+    except OSError as error:
+        raise ControllerFileError(f"cannot write to {out}: {error.strerror}") from error

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tdac_agent.cli.controller_choice import (
     change_note,
+    check_folder,
     controller_and_task,
     controller_file,
     with_own_set,
@@ -21,7 +22,6 @@ from tdac_agent.cli.typed_options import (
     typed_fields,
     words_of,
 )
-from tdac_agent.errors import ControllerFileError
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.sequential import SequentialTest
@@ -362,15 +362,3 @@ def _controller_on(tasks: TaskSet, options: VerifyOptions) -> Path:
         worlds = (options.first or 0) + options.episodes
         tasks.check_count(options.split, worlds, "-n")
     return file
-
-
-def check_folder(out: Path) -> None:
-    """Checks before the work begins that the folder can be written to."""
-    folder = out / "trajectories"
-    missing = [each for each in (folder, out) if not each.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for each in missing:
-            each.rmdir()
-    except OSError as error:
-        raise ControllerFileError(f"cannot write to {out}: {error.strerror}") from error
