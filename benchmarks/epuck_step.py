@@ -3,8 +3,8 @@
     python -m benchmarks epuck_step
 
 Cases: a single environment through `gym.make` in several situations; a batch on one
-thread and on two; worlds with more and more solid parts; and MuJoCo. The cases run in turns, in
-short bursts.
+thread and on two; worlds with more and more solid parts; and MuJoCo. The cases run in
+turns, in short bursts.
 """
 
 from __future__ import annotations

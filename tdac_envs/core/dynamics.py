@@ -39,10 +39,10 @@ SAME: dict[str, str] = {
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
     # Another physics can move the body; the exact step is what it was.
-    "6359954e4d19063dd920e374681aac34e47787846dc41da267e1455e95180eec": (
+    "54bdc8d60a9869b9c30c9db68e4e4dd5ff7e16ae41c63d971f7d3a72d8330b3a": (
         "46a5299112cd13c1188f8899f0e1d9ef6aa22ac926b7f3b91c12e6dbe9ef96e7"
     ),
-    "608bd02b9037c57bd241bd6c288413585c2f42200b3d3886fa8eb9e84cd8ff05": (
+    "96c6b28c989ebbde90ec63120f37041f85aa0ffa0623ee458a75796381306cb0": (
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
 }
