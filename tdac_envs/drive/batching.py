@@ -122,10 +122,10 @@ def check_exact(envs: Sequence[Any]) -> None:
         TaskError: Another physics moves one of them.
     """
     for env in envs:
-        if env.setup.physics != EXACT:
+        if not env.setup.physics.is_exact:
             raise TaskError(
                 f"a batch computes the exact step; expected physics={EXACT!r} or "
-                f"vectorization_mode='sync', got physics={env.setup.physics!r}"
+                f"vectorization_mode='sync', got physics={env.setup.physics.name!r}"
             )
 
 

@@ -17,7 +17,7 @@ from tdac_envs.epuck.robot import EPuckArrays
 from tdac_envs.epuck.setup import EPuckSetup
 from tdac_envs.epuck.task import EPuckTask
 from tdac_envs.physics.body import BodySpec, e_puck_body
-from tdac_envs.physics.moved import EXACT, Pose, arc_between, rim_speeds
+from tdac_envs.physics.moved import Pose, arc_between, rim_speeds
 from tdac_envs.physics.scene import Scene, grip_in, scene_of
 
 
@@ -39,7 +39,7 @@ class Carried(Movables):
         ground = task.ground
         self.moves = True
         self.solid, self.seen = ground.solid.copy(), self._visible.copy()
-        body = body_of(ground) if setup.body is None else setup.body
+        body = setup.physics.body_like(body_of(ground))
         self.body = MujocoBody(scene_at(ground), body)
 
     def reset(self, start: Pose) -> None:
@@ -73,7 +73,7 @@ class Carried(Movables):
 
 def movables_of(setup: EPuckSetup, task: EPuckTask) -> Movables:
     """The objects of a task's world, with the physics that moves them."""
-    kind = Movables if setup.physics == EXACT else Carried
+    kind = Movables if setup.physics.is_exact else Carried
     return kind(setup, task)
 
 

@@ -34,6 +34,7 @@ from tdac_envs.epuck.smallest_gap import note_gap
 from tdac_envs.epuck.solid_picture import SolidPicture
 from tdac_envs.epuck.source import WorldSource, open_world
 from tdac_envs.epuck.task import TOLERANCE, make_task
+from tdac_envs.physics.engine_choice import PhysicsOption, engine_of
 from tdac_envs.physics.moved import EXACT
 
 if TYPE_CHECKING:
@@ -175,7 +176,9 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         stopping_distance: From full speed to standstill, m. It changes no motion, but
             the gap to obstacles that the robot should keep (`required_gap`).
         physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
-            moves the robot and the objects that have a mass (`docs/physics.md`).
+            moves the robot and the objects that have a mass. A dict such as
+            `{"engine": "mujoco", "torque": 0.001, "grip": 0.6}` also tells figures of
+            the body (`docs/physics.md`).
         view: Of frames: `"2d"`, or `"3d"`, rendered by MuJoCo (extra `tdac[physics]`).
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
@@ -228,7 +231,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         robot: RobotSource = None,
         disturbed: bool = False,
         stopping_distance: float | None = None,
-        physics: str = EXACT,
+        physics: PhysicsOption = EXACT,
         view: str = "2d",
         render_mode: str | None = None,
     ) -> None:
@@ -276,7 +279,7 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             webots=reflectance == "webots",
             goal_visible=bool(goal_visible),
             stopping_distance=sizes["stopping_distance"],
-            physics=physics,
+            physics=engine_of(physics, robot),
             view=view,
         )
         asked = (ground_sensors, gps, compass, encoders)

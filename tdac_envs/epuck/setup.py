@@ -19,8 +19,7 @@ from tdac_envs.epuck.nearby import NearbyParts, surroundings
 from tdac_envs.epuck.paths import widest_body
 from tdac_envs.epuck.prisms import Prisms
 from tdac_envs.epuck.task import EPuckTask
-from tdac_envs.physics.body import BodySpec
-from tdac_envs.physics.moved import EXACT, engine_named
+from tdac_envs.physics.engine_choice import EXACT_STEP, Engine
 from tdac_envs.worlds.bodies import BODY_RADIUS
 
 
@@ -32,24 +31,21 @@ class EPuckSetup(DriveSetup):
         webots: Whether the sensors see Webots' reflectances; see `Ground.visible`.
         goal_visible: Whether the sensors see the file's goal marker.
         stopping_distance: Of the robot, from full speed, m.
-        physics: `"exact"` or `"mujoco"`.
+        physics: What moves the robot.
         view: `"2d"` or `"3d"`, of frames.
-        body: The robot's body for MuJoCo; None for that of the world's e-puck.
     """
 
     nominal: EPuckTask
     webots: bool
     goal_visible: bool
     stopping_distance: float = 0.0
-    physics: str = EXACT
+    physics: Engine = EXACT_STEP
     view: str = "2d"
-    body: BodySpec | None = None
 
     def __post_init__(self) -> None:
         DriveSetup.__post_init__(self)
         least = non_negative("stopping_distance", self.stopping_distance)
         object.__setattr__(self, "stopping_distance", least)
-        engine_named(self.physics)
         one_of("view", self.view, ("2d", "3d"))
 
     def required_gap(self, task: EPuckTask) -> float:
@@ -60,7 +56,7 @@ class EPuckSetup(DriveSetup):
     @property
     def pushes(self) -> bool:
         """Whether the robot can push objects without another physics."""
-        if self.physics != EXACT:
+        if not self.physics.is_exact:
             return False
         return self.on_collision == "block" and len(self.nominal.ground.masses) > 0
 

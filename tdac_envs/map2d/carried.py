@@ -25,7 +25,7 @@ from tdac_envs.map2d.setup import Map2DSetup
 from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.physics.body import BodySpec, disc_body
 from tdac_envs.physics.boxes import scene_on
-from tdac_envs.physics.moved import EXACT, Pose, arc_between, rim_speeds
+from tdac_envs.physics.moved import Pose, arc_between, rim_speeds
 
 UNSCALED_RADIUS = 0.1
 """Body radius of a robot on a map without a resolution, m."""
@@ -54,7 +54,7 @@ class Carried:
         if setup.has_movers:
             raise TaskError("physics 'mujoco' has no movers; leave them out")
         self._metres = metres_of(setup, task)
-        body = body_of(task, self._metres) if setup.body is None else setup.body
+        body = setup.physics.body_like(body_of(task, self._metres))
         cells = task.terrain.grid.cells
         self.body = MujocoBody(scene_on(cells, self._metres, _WALLS * body.top), body)
 
@@ -94,18 +94,17 @@ class Carried:
 
 def carried_by(setup: Map2DSetup, task: Map2DTask) -> Carried | None:
     """What moves the robot in place of the compiled step; None for the latter."""
-    return None if setup.physics == EXACT else Carried(setup, task)
+    return None if setup.physics.is_exact else Carried(setup, task)
 
 
 def metres_of(setup: Map2DSetup, task: Map2DTask) -> float:
     """Size of a pixel for the physics, m.
 
-    That of the map if it has a resolution; otherwise the one with which the body's
-    radius is `UNSCALED_RADIUS`.
+    The one that is given, or that of the map if it has one; otherwise the one with
+    which the body's radius is `UNSCALED_RADIUS`.
     """
-    if setup.pixel_size is not None:
-        return setup.pixel_size
-    return UNSCALED_RADIUS / task.robot.radius
+    own = setup.physics.resolution or setup.pixel_size
+    return UNSCALED_RADIUS / task.robot.radius if own is None else own
 
 
 def body_of(task: Map2DTask, metres: float) -> BodySpec:

@@ -40,6 +40,7 @@ from tdac_envs.map2d.task import Terrain, make_task
 from tdac_envs.mapping.params import FrameName, ReadingOptions, Shade
 from tdac_envs.movers.spec import MoversOption, read_specs
 from tdac_envs.movers.state import Movers
+from tdac_envs.physics.engine_choice import PhysicsOption, engine_of
 from tdac_envs.physics.moved import EXACT
 
 MOST_GHOSTS = 200
@@ -248,8 +249,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         ray_angles: Directions of the rays from the heading, rad, in the order of
             `ranges`, instead of `n_rays` and `field_of_view`. Default: an even fan.
         physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
-            moves the robot (`docs/physics.md`).
-        resolution: Metres per px of a map that does not say it; only MuJoCo uses it.
+            moves the robot. A dict such as `{"engine": "mujoco", "resolution": 0.05,
+            "torque": 0.1}` also tells metres per px, and figures of the body
+            (`docs/physics.md`).
         view: Of frames: `"2d"`, or `"3d"`, rendered by MuJoCo (extra `tdac[physics]`).
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
@@ -321,8 +323,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         movers: MoversOption = None,
         frame: FrameName = "pixels",
         ray_angles: Sequence[float] | None = None,
-        physics: str = EXACT,
-        resolution: float | None = None,
+        physics: PhysicsOption = EXACT,
         view: str = "2d",
         render_mode: str | None = None,
     ) -> None:
@@ -412,9 +413,9 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
             reception=Reception(
                 **{n: given[n] or 0 for n in RECEIVED}, message_drop=message_drop
             ),
-            physics=physics,
+            physics=engine_of(physics, robot),
             view=view,
-            pixel_size=params.resolution if resolution is None else resolution,
+            pixel_size=params.resolution,
         )
         notes = with_tolerance_note(params.notes, nominal, units.length)
         self.params = params.model_copy(update={"notes": notes})

@@ -35,8 +35,7 @@ from tdac_envs.map2d.task import Map2DTask
 from tdac_envs.map2d.terrain import widest_connected_radius
 from tdac_envs.mapping.params import RobotParams
 from tdac_envs.movers.spec import AnySpec
-from tdac_envs.physics.body import BodySpec
-from tdac_envs.physics.moved import engine_named
+from tdac_envs.physics.engine_choice import EXACT_STEP, Engine
 
 MOST_STARTS = 100
 """Starts that are drawn until no mover touches the robot."""
@@ -56,10 +55,9 @@ class Map2DSetup(DriveSetup):
         range_min: Ranges below it are invalid, px; 0 for that of the robot.
         max_acceleration: Of a wheel, px/s²; 0 for that of the robot.
         reception: How pose and scan reach the robot.
-        physics: `"exact"` or `"mujoco"`.
+        physics: What moves the robot.
         view: `"2d"` or `"3d"`, of frames.
         pixel_size: Metres per px of a map that has a resolution, for MuJoCo.
-        body: The robot's body for MuJoCo; None for one that follows from the radius.
         sonar: The sonars; None with rays.
         directions: Directions of the rays, from `rays.directions_of`.
         movers_setup: The movers, checked on the map.
@@ -75,20 +73,16 @@ class Map2DSetup(DriveSetup):
     range_min: float = 0.0
     max_acceleration: float = 0.0
     reception: Reception = EXACT
-    physics: str = "exact"
+    physics: Engine = EXACT_STEP
     view: str = "2d"
     pixel_size: float | None = None
-    body: BodySpec | None = None
     sonar: Sonar | None = field(init=False)
     directions: NDArray[np.float64] = field(init=False)
     movers_setup: MoversSetup = field(init=False)
 
     def __post_init__(self) -> None:
         DriveSetup.__post_init__(self)
-        engine_named(self.physics)
         one_of("view", self.view, ("2d", "3d"))
-        if self.pixel_size is not None:
-            positive("resolution", self.pixel_size)
         noise = non_negative("range_noise", self.range_noise)
         dropout = number_up_to("range_dropout", self.range_dropout, 1.0)
         object.__setattr__(self, "range_noise", noise)

@@ -89,6 +89,19 @@ class Wheels(StrictModel):
     slip: _Share = Field(0.0, description="Relative standard deviation in a step.")
 
 
+class Body(StrictModel):
+    """What a physics engine needs beyond the disc: metres, kg, N·m; see `BodySpec`."""
+
+    mass: _Size | None = Field(None, description="With its wheels, kg.")
+    height: _Size | None = Field(None, description="Of the body's top, m.")
+    centre: _Size | None = Field(None, description="Height of its mass, m.")
+    wheel_radius: _Size | None = Field(None, description="m")
+    wheel_mass: _Size | None = Field(None, description="Of one wheel, kg.")
+    torque: _Size | None = Field(None, description="Largest one of a motor, N·m.")
+    grip: _Amount | None = Field(None, description="Friction of the tyres.")
+    friction: _Amount | None = Field(None, description="Of the body on obstacles.")
+
+
 class RobotFile(StrictModel):
     """Contents of a robot file, schema 1."""
 
@@ -110,6 +123,7 @@ class RobotFile(StrictModel):
     scanner: Scanner | None = Field(None, description="None on an e-puck.")
     pose: Pose
     wheels: Wheels = Wheels()
+    body: Body | None = Field(None, description="For `physics`; None for the usual.")
     control_rate: _Size = Field(description="Commands per second.")
     stopping_distance: _Amount = Field(
         description="From full speed, from the command to stop until it stands."

@@ -157,8 +157,9 @@ class Map2DSetting:
 
     def make_env(self, **options: Any) -> Map2DEnv:
         """Constructs this task's environment; `options` override its arguments."""
-        if "physics" in options:
-            options = {"resolution": self.params.resolution, **options}
+        if isinstance(options.get("physics"), str):
+            known = {"engine": options["physics"], "resolution": self.params.resolution}
+            options = {**options, "physics": known}
         return Map2DEnv(**{**self.env_kwargs(), **options})
 
     def displaced(self, x: float, y: float) -> dict[str, Any]:

@@ -1,17 +1,22 @@
 """Promises of the environments whose robot MuJoCo moves."""
 
 import math
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
+import tdac_envs.robots
 from tdac_envs.core.errors import TaskError
 from tdac_envs.epuck.env import EPuckEnv
 from tdac_envs.map2d.env import Map2DEnv
 
 pytest.importorskip("mujoco")
-SEEN = ("pose", "goal", "wheel_speeds")
+
+
+def bundled_robot_text(name):
+    return (Path(tdac_envs.robots.__file__).parent / f"files/{name}.yaml").read_text()
 
 
 def open_map(size=200):
@@ -140,6 +145,60 @@ def test_each_episode_begins_anew():
 def test_an_unknown_physics_is_refused_in_one_line(name, physics):
     with pytest.raises(TaskError, match=r"unknown physics .*; expected one of exact, "):
         gym.make(name, physics=physics)
+
+
+@pytest.mark.parametrize(
+    ("physics", "told"),
+    [
+        ({"engine": "mujoco", "tork": 1.0}, r"unknown key 'tork'.*'torque'"),
+        ({"torque": 1.0}, "unknown physics ''"),
+        ({"engine": "mujoco", "mass": -1.0}, "body: mass above 0, got -1"),
+        ({"engine": "mujoco", "resolution": 0.0}, "resolution above 0"),
+    ],
+)
+def test_a_wrong_figure_is_refused_in_one_line(physics, told):
+    with pytest.raises(TaskError, match=told) as refused:
+        Map2DEnv("office", physics=physics)
+    assert "\n" not in str(refused.value)
+
+
+def test_figures_of_the_body_change_the_motion():
+    """Weak motors, and a smooth floor, make the start late."""
+    driven_by = []
+    for own in ({}, {"torque": 0.0004}, {"grip": 0.02}):
+        env = EPuckEnv("arena", physics={"engine": "mujoco", **own})
+        env.reset(seed=0)
+        begin = env.pose()
+        driven(env, (1.0, 1.0), 15)
+        driven_by.append(math.dist(env.pose()[:2], begin[:2]))
+    usual, weak, smooth = driven_by
+    assert usual > 0.055
+    assert weak < usual - 0.01
+    assert smooth < usual - 0.01
+
+
+def test_a_robot_file_has_figures_of_the_body(tmp_path):
+    """And what the argument says overrides them; each figure has a source."""
+    bundled = bundled_robot_text("e-puck")
+    file = tmp_path / "weak.yaml"
+    body = "body:\n  torque: 0.0004\n  mass: 0.2\n"
+    source = '  body.torque: "measured"\n  body.mass: "measured"\n'
+    file.write_text(body + bundled + source)
+    env = EPuckEnv("arena", robot=file, physics="mujoco")
+    assert env.setup.physics.body == {"torque": 0.0004, "mass": 0.2}
+    total = env._movables.body.model.body_subtreemass[0]
+    assert total == pytest.approx(0.2)
+    env = EPuckEnv("arena", robot=file, physics={"engine": "mujoco", "torque": 0.01})
+    assert env.setup.physics.body == {"torque": 0.01, "mass": 0.2}
+    file.write_text(body + bundled)
+    with pytest.raises(TaskError, match=r"no source of body.mass, body.torque"):
+        EPuckEnv("arena", robot=file, physics="mujoco")
+
+
+def test_a_map_is_as_large_as_its_resolution_says():
+    env = Map2DEnv("office", physics={"engine": "mujoco", "resolution": 0.02})
+    hull = env._carried.body.model.geom("hull")
+    assert hull.size[0] == pytest.approx(0.02 * env.task.body_radius)
 
 
 @pytest.mark.parametrize("name", ["TDAC-Map2D-v0", "TDAC-EPuck-v0"])

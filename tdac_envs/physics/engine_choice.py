@@ -1,0 +1,88 @@
+"""Which physics moves the robot: the argument `physics` of the environments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from tdac_envs.core.arguments import positive
+from tdac_envs.core.errors import TaskError, hint
+from tdac_envs.physics.body import BodySpec
+from tdac_envs.physics.moved import EXACT, engine_named
+from tdac_envs.robots.bundled import load_robot
+from tdac_envs.robots.robot_file import RobotFile
+
+BODY_KEYS = tuple(one.name for one in fields(BodySpec) if one.name != "radius")
+KEYS = "engine", "resolution", *BODY_KEYS
+PhysicsOption = str | Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """A physics and what it needs beyond the task.
+
+    Attributes:
+        name: One of `moved.ENGINES`.
+        resolution: Metres per px of a map that does not say it.
+        body: Values of the `BodySpec`, where they differ from the robot's usual ones.
+    """
+
+    name: str = EXACT
+    resolution: float | None = None
+    body: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the compiled step moves the robot."""
+        return self.name == EXACT
+
+    def body_like(self, usual: BodySpec) -> BodySpec:
+        """The body, given the usual one of the robot.
+
+        Raises:
+            TaskError: A value is not valid.
+        """
+        return usual.changed(**self.body)
+
+
+EXACT_STEP = Engine()
+
+
+def engine_of(given: Any, robot: Any = None) -> Engine:
+    """The physics that a user asks for.
+
+    Args:
+        given: Its name, or a dict with the name as `engine` and any of the other
+            `KEYS`.
+        robot: Name or path of a robot file, whose `body` counts where `given` says
+            nothing.
+
+    Raises:
+        TaskError: There is no such physics, or a key or value is not valid.
+    """
+    if not isinstance(given, Mapping):
+        given = {"engine": given}
+    for key in given:
+        if key not in KEYS:
+            raise TaskError(
+                f"physics: unknown key {key!r:.60}; expected {', '.join(KEYS)}"
+                f"{hint(str(key), KEYS)}"
+            )
+    name = engine_named(given.get("engine", ""))
+    if name == EXACT:
+        return EXACT_STEP
+    resolution = given.get("resolution")
+    if resolution is not None:
+        resolution = positive("physics: resolution", resolution)
+    own = {} if robot is None else body_in(load_robot(robot))
+    own |= {key: given[key] for key in BODY_KEYS if given.get(key) is not None}
+    return Engine(name, resolution, own)
+
+
+def body_in(file: RobotFile) -> dict[str, float]:
+    """The values of a `BodySpec` that a robot file has."""
+    if file.body is None:
+        return {}
+    known = file.body.model_dump(exclude_none=True)
+    return {"top" if key == "height" else key: own for key, own in known.items()}
