@@ -12,28 +12,24 @@ from rich.table import Table
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.ros_flags import DriveOptions, SimOptions
 from tdac_agent.cli.sentences import print_plain
-from tdac_agent.cli.task_changes import changed_task
 from tdac_agent.cli.task_choice import chosen_single
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import typed_fields
 from tdac_agent.ros2.bag import Bag, check_packages
 from tdac_agent.ros2.export import core_settings, settings_of
 from tdac_agent.ros2.faults import STOPPING, read_fault
 from tdac_agent.ros2.package.core import PERIODS
-from tdac_agent.runs.ownership import load_task
 from tdac_agent.storage.files import write_atomic
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command
 
 if TYPE_CHECKING:
     from tdac_agent.ros2.simulator import DriveReport
-    from tdac_agent.tasks.task import Task
 
 
 def sim(options: SimOptions, flags: TaskFlags) -> int:
     """Simulates a robot and prints its drive; returns 0 if it reached the goal."""
     faults = tuple(read_fault(text) for text in options.fault)
-    task = _task(options, flags)
+    task = chosen_single(flags)
     settings = settings_of(task)
     dead_man = _dead_man(settings, options.dead_man)
     require_dds()
@@ -113,15 +109,6 @@ def require_dds() -> None:
     """
     if importlib.util.find_spec("cyclonedds") is None:
         raise TaskError(f"this needs Cyclone DDS: {install_command('ros2')}")
-
-
-def _task(options: SimOptions, flags: TaskFlags) -> Task:
-    if options.run is None:
-        return chosen_single(flags)
-    named = [each.name for each in typed_fields(flags) if each.name in ("task", "map")]
-    if named:
-        raise TaskError(f"give RUN or --{named[0]}, not both")
-    return changed_task(load_task(options.run), flags)
 
 
 def _dead_man(settings: dict[str, Any], given: float | None) -> float:

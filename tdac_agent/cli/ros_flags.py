@@ -48,9 +48,6 @@ _real_time = partial(
 class SimOptions:
     """The further flags of `tdac ros sim`."""
 
-    run: Path | None = option(
-        None, "Run folder, or folder of a task.", metavar="RUN", argument=True
-    )
     real_time: bool = _real_time()
     seconds: float = option(
         600.0, "Longest drive, simulated seconds.", metavar="SECONDS", least=1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hmac
 import importlib
+import math
 import sys
 import time
 from collections.abc import Callable
@@ -33,6 +34,8 @@ SHARE = 0.6
 """Share of a period in which the controller may answer in real time."""
 ANSWER = 1.0
 """Longest wait for an answer in simulated time, s of the wall clock."""
+CLOCK_STANDS = 10.0
+"""Time after which a clock that stands still ends the drive, s of the wall clock."""
 ZEROS = 5
 """Commands of zero at the end."""
 
@@ -158,7 +161,7 @@ class Node:
         self._out = bus.writer("cmd_vel")
         self._frames: dict[str, tuple[str, tuple[float, float, float]]] = {}
         self._said = ""
-        self._clock = -1.0
+        self._clock, self._end = -1.0, math.inf
 
     def run(self, seconds: float | None = None) -> Any:
         """Drives until the goal or a failure; returns the last command.
@@ -166,12 +169,13 @@ class Node:
         Args:
             seconds: Longest time, s of the wall clock.
         """
-        end = None if seconds is None else time.monotonic() + seconds
+        end = math.inf if seconds is None else time.monotonic() + seconds
+        self._end = end
         self._send(self._package.core.Command(0.0, 0.0, "waiting"))
         try:
             while self.core.final is None:
                 self._tick()
-                if end is not None and time.monotonic() > end:
+                if time.monotonic() > end:
                     self.core.end("out of time")
         finally:
             last = self.core.end("the node was told to end")
@@ -189,10 +193,15 @@ class Node:
                 time.sleep(min(rest, 0.005))
                 self._hear()
             return
-        last = self._clock
+        last, end = self._clock, time.monotonic() + CLOCK_STANDS
         while self._clock < last + self.dt - 1e-6:
             self._hear()
             time.sleep(0.0003)
+            if time.monotonic() > self._end:
+                return
+            if last >= 0.0 and time.monotonic() > end:
+                self._send(self.core.end("the clock stands still"))
+                return
             if self._clock < last:  # the simulation began again
                 break
         end = time.monotonic() + TOGETHER

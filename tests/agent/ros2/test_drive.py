@@ -196,6 +196,16 @@ def test_a_slow_node(task, settings, package, stated, domain, here):
 
 
 @pytest.mark.slow
+def test_a_simulation_that_ends(task, settings, package, domain):
+    """When the clock stands still, the node ends by itself, with zero."""
+    with NodeProcess(package, domain) as node:
+        Simulator(robot_of(task, settings), Bus(domain), patience=30.0).run(1.0)
+        printed = node.output()
+    assert "ended: the clock stands still" in printed
+    assert node.process.returncode == 1
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_random_faults(task, settings, package, stated, steps, domain, seed):
     """Four faults in a drive: no contact, each stop within its stated distance."""

@@ -1,0 +1,99 @@
+"""`tdac export ros2` and `tdac ros …`: what they print, and one line for bad input."""
+
+import importlib.util
+import json
+
+import pytest
+from floor_task import write_task
+
+from tdac_agent.cli.main import main
+
+
+@pytest.fixture
+def tdac(monkeypatch, capsys):
+    """Runs a command line; returns its exit code and what it printed."""
+
+    def run(*words):
+        monkeypatch.setattr("sys.argv", ["tdac", *map(str, words)])
+        with pytest.raises(SystemExit) as done:
+            main()
+        return done.value.code, capsys.readouterr()
+
+    return run
+
+
+def refused(result, why):
+    """Exit code 2, and one line that says why."""
+    code, printed = result
+    assert code == 2
+    assert printed.err.count("\n") == 1
+    assert why in printed.err
+    assert "Traceback" not in printed.err
+
+
+def test_export_says_what_it_wrote(tdac, run, tmp_path):
+    """The verdict, the longest stop, and that the wrapper was not run."""
+    code, printed = tdac("export", "ros2", run, "--out", tmp_path / "a", "--unverified")
+    assert code == 0
+    text = " ".join(printed.out.split())
+    assert "(ROS 2 package tdac_floor)" in text
+    assert "not verified: the package says so" in text
+    assert "stops within 0.165 m, whatever happens" in text
+    assert "the rclpy wrapper was not run" in text
+    words = "export", "ros2", run, "--out", tmp_path / "b", "--unverified", "--json"
+    record = json.loads(tdac(*words)[1].out)
+    assert record["run_in_ros"] is False
+    assert record["verified"] is False
+
+
+def test_what_cannot_be_exported(tdac, run, tmp_path):
+    """An unverified run, no run, and a folder with files."""
+    out = tmp_path / "out"
+    refused(tdac("export", "ros2", run, "--out", out), "give --unverified")
+    refused(tdac("export", "ros2", tmp_path, "--out", out), "is not a run folder")
+    assert not out.exists()
+    words = "export", "ros2", run, "--out", tmp_path, "--unverified"
+    (tmp_path / "mine").write_text("")
+    refused(tdac(*words), "is not an empty folder")
+
+
+def test_tasks_that_no_robot_drives(tdac, tmp_path):
+    """A task in pixels, an e-puck, and robots that cannot stop as they say."""
+    refused(tdac("ros", "sim", "--task", "maze"), "is a task in pixels")
+    refused(tdac("ros", "sim", "--task", "epuck-crates"), "tdac export webots")
+    robot = {"file": "robot.yaml", "stopping_distance": 0.001}
+    refused(tdac("ros", "sim", write_task(tmp_path, robot=robot)), "impossible robot")
+    text = (tmp_path / "robot.yaml").read_text()
+    (tmp_path / "robot.yaml").write_text(text.replace("radius: 0.1\n", "radius: -1\n"))
+    refused(tdac("ros", "sim", write_task_again(tmp_path)), "radius")
+
+
+def write_task_again(folder):
+    """The task with the robot file as it is now."""
+    text = (folder / "task.yaml").read_text()
+    begin = text.index("robot:")
+    end = text.index("start:")
+    text = text[:begin] + "robot: robot.yaml\n" + text[end:]
+    (folder / "task.yaml").write_text(text)
+    return folder / "task.yaml"
+
+
+def test_flags_that_are_wrong(tdac, run):
+    """Faults, a timer that is too long, and the name of a bag."""
+    refused(tdac("ros", "sim", run, "--fault", "nan-scan@1+2"), "did you mean")
+    refused(tdac("ros", "sim", run, "--dead-man", "0.5"), "dead_man: expected")
+    refused(tdac("ros", "sim", run, "--mcap", "x.bag"), "must end in .mcap")
+    refused(tdac("ros", "drive", run), "is not a package of tdac export ros2")
+
+
+def test_the_extra_is_named(tdac, run, monkeypatch):
+    """Without Cyclone DDS, one line says what to install."""
+    found = importlib.util.find_spec
+
+    def without(name, *rest):
+        return None if name == "cyclonedds" else found(name, *rest)
+
+    monkeypatch.setattr("importlib.util.find_spec", without)
+    code, printed = tdac("ros", "sim", run)
+    assert code == 2
+    assert "[ros2]" in printed.err
