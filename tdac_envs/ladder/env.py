@@ -25,6 +25,7 @@ from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.map2d.carried import carried_by
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.setup import Map2DSetup
+from tdac_envs.physics.engine_choice import PhysicsOption, engine_of
 from tdac_envs.physics.moved import EXACT
 
 TRAIN_POOL = 4096
@@ -187,7 +188,7 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
         render_mode: str | None = None,
         hidden_folder: str | Path | None = None,
         nearer_starts: float = 0.0,
-        physics: str = EXACT,
+        physics: PhysicsOption = EXACT,
     ) -> None:
         task_set, source = _opened(
             level, split, train_pool, salt_file, hidden_folder, nearer_starts
@@ -201,7 +202,7 @@ class LadderEnv(TaskSetEnv, Map2DEnv):
             reception=file.disturbances.reception,
             max_acceleration=file.disturbances.max_acceleration,
             resolution=file.resolution,
-            physics=physics,
+            physics=engine_of(physics),
             pixel_size=file.resolution,
         )
         self._prepare(setup, render_mode)
@@ -231,7 +232,7 @@ class EPuckLadderEnv(TaskSetEnv, EPuckEnv):
         reward_weights: Mapping[str, float] | None = None,
         render_mode: str | None = None,
         nearer_starts: float = 0.0,
-        physics: str = EXACT,
+        physics: PhysicsOption = EXACT,
     ) -> None:
         task_set, source = _opened(
             level, split, train_pool, salt_file, None, nearer_starts
@@ -239,7 +240,9 @@ class EPuckLadderEnv(TaskSetEnv, EPuckEnv):
         robot, seen = task_set.file.robot, task_set.file.observed
         assert isinstance(robot, EPuckRobotParams)
         shared = _shared(task_set, source, reward_weights)
-        setup = EPuckSetup(**shared, webots=False, goal_visible=False, physics=physics)
+        setup = EPuckSetup(
+            **shared, webots=False, goal_visible=False, physics=engine_of(physics)
+        )
         further = tuple(key for key in ("encoders",) if key in seen)
         EPuckEnv._prepare(self, setup, robot.sensor_noise, further, render_mode)
         self._look(task_set, bool(privileged))

@@ -191,7 +191,7 @@ def test_the_command(bag, run, monkeypatch, capsys):
 def test_a_recorded_simulation(source, task, settings, package, tmp_path):
     """A drive over DDS with a fault is replayed to the last command, with its stop."""
     pytest.importorskip("cyclonedds", reason="no wheel of Cyclone DDS")
-    from test_drive import NodeProcess
+    from test_ros_drive import NodeProcess
 
     from tdac_agent.ros2.dds import Bus
     from tdac_agent.ros2.simulator import Simulator
