@@ -47,7 +47,7 @@ from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.suite_check import prove_suite
 from tdac_agent.verification.verdict import confirmed_text, is_verified
-from tdac_agent.verification.verify import check_physics, kept_report, verify
+from tdac_agent.verification.verify import kept_report, verify
 
 POOL = "improve"
 """Episodes of a race, and their folders inside that of a candidate."""
@@ -83,7 +83,6 @@ class SuiteTrials:
     def prove(self) -> None:
         """See `Trials`: the reference passes the suite, one that stands still fails."""
         recorder, judge = self.terms.recorder, self.terms.judge
-        check_physics(self.task, self.terms.options.physics)
         if recorder.past.proven and self.terms.trusts_record:
             return
 

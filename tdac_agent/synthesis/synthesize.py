@@ -42,7 +42,7 @@ from tdac_agent.synthesis.trials import Trials, conclude, trials_of
 from tdac_agent.synthesis.workload import LEAST_IMPROVE, MOST_EPISODES, shares
 from tdac_agent.tasks.task import Task
 from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.verify import read_source
+from tdac_agent.verification.verify import check_physics, read_source
 from tdac_envs.core.arguments import whole_number
 from tdac_envs.core.errors import TaskError
 
@@ -181,6 +181,8 @@ def _check(wanted: SynthOptions, problem: Problem) -> None:
     if wanted.search == RACE:
         _check_race(wanted, problem)
     problem.check(wanted.improve)
+    if isinstance(problem.task, Task):
+        check_physics(problem.task, wanted.physics)
 
 
 def _check_race(wanted: SynthOptions, problem: Problem) -> None:

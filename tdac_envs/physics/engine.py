@@ -186,7 +186,7 @@ class MujocoBody:
         return found
 
     def __getstate__(self) -> dict[str, Any]:
-        kind = self._engine.mjtState.mjSTATE_INTEGRATION
+        kind = self._engine.mjtState.mjSTATE_INTEGRATION.value
         state = np.zeros(self._engine.mj_stateSize(self.model, kind))
         self._engine.mj_getState(self.model, self.data, state, kind)
         own = {"_scene": self._scene, "_body": self._body, "_rest": self._rest}
@@ -196,6 +196,6 @@ class MujocoBody:
         now = state.pop("state")
         self.__dict__.update(state)
         self._load()
-        kind = self._engine.mjtState.mjSTATE_INTEGRATION
+        kind = self._engine.mjtState.mjSTATE_INTEGRATION.value
         self._engine.mj_setState(self.model, self.data, now, kind)
         self._engine.mj_forward(self.model, self.data)

@@ -4,10 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
-from script import AHEAD
+from script import AHEAD, Script, code
 from small import write_small_task
+from unconfirmed import synthesize
 
 from tdac_agent import load_task
+from tdac_agent.html_report import make_page
 from tdac_agent.verification.diagnosis.report import OtherEpisode, SecondOpinion
 from tdac_agent.verification.diagnosis.second_opinion import as_test, opinion_text
 from tdac_agent.verification.verify import verify
@@ -105,3 +107,35 @@ def test_a_task_with_movers_is_refused_before_anything_is_driven(good_source, tm
     task = load_task(write_small_task(tmp_path, movers="bounce:2"))
     with pytest.raises(TaskError, match="has no movers; leave them out"):
         verify(good_source, task, physics="mujoco")
+
+
+def test_a_run_asks_for_it_and_its_page_says_so(tmp_path, good_source):
+    """Each candidate that arrives here has the line; one that does not has none."""
+    task = load_task(write_small_task(tmp_path / "task", profile="policy"))
+    run = synthesize(
+        task,
+        Script(code(AHEAD), code(good_source)),
+        out=tmp_path / "run",
+        iterations=2,
+        patience=1,
+        physics="mujoco",
+    )
+    assert run.passed
+    page = make_page(tmp_path / "run").html.decode()
+    line = "second opinion (MuJoCo "
+    assert page.count(line) == 1
+    assert "6 of 6 arrive; smallest gap " in page[page.index(line) :][:120]
+
+
+def test_a_run_is_refused_before_the_model_is_asked(tmp_path):
+    task = load_task(write_small_task(tmp_path / "task", movers="bounce:2"))
+    model = Script()
+    with pytest.raises(TaskError, match="has no movers"):
+        synthesize(task, model, out=tmp_path / "run", physics="mujoco")
+    assert model.requests == []
+
+
+def test_an_episode_is_played_in_three_dimensions(done, good):
+    said = done("play", good, "--view", "3d", "--video", "a.gif", "--speed", "50")
+    assert "wrote a.gif" in said
+    assert Path("a.gif").stat().st_size > 20_000
