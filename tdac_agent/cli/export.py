@@ -58,7 +58,7 @@ def run_ros2(options: ExportRos2Options) -> int:
     if not made.verified:
         console.print("[bold red]not verified[/]: the package says so")
     longest = max(made.stops.values())
-    console.print(f"stops within {longest:.3f} m, whatever happens (README.md)")
+    console.print(f"stops within {longest:.3f} m (README.md lists the causes)")
     console.print(f"[yellow]{NOT_RUN}[/]", soft_wrap=True)
     print_plain(
         console, f"drive it over DDS: tdac ros sim {options.run}, and in another"
