@@ -39,10 +39,10 @@ SAME: dict[str, str] = {
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
     # Another physics can move the body; the exact step is what it was.
-    "bd48a7e17d77b211e6e0d2fca78ddb0bf3be44f0895d3853e63308825f7a1d43": (
+    "9acbc0c93768b50cba34e8fd49ba67ed4f0de8108832d90e685e678395391d38": (
         "46a5299112cd13c1188f8899f0e1d9ef6aa22ac926b7f3b91c12e6dbe9ef96e7"
     ),
-    "ca69cb7809e3387b6ee4aa1969039c5f47e2428b4bb5c4d37e4b2863aec4969d": (
+    "a59539acbd749c472a5b0f8c6d39a1708280fd2238c35c7b14c21468abd9e00e": (
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
 }
