@@ -28,8 +28,9 @@ from tdac_agent.ros2.export import (
 from tdac_agent.storage.files import read_inside
 from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_json
 
-TOGETHER = 0.05
-"""Longest wait for scan and pose of a tick of the clock, s of the wall clock."""
+TOGETHER, MISSING = 0.5, 0.05
+"""Longest wait for scan and pose of a tick of the clock, s of the wall clock; the same
+after a tick that had none."""
 SHARE = 0.6
 """Share of a period in which the controller may answer in real time."""
 ANSWER = 1.0
@@ -161,7 +162,7 @@ class Node:
         self._out = bus.writer("cmd_vel")
         self._frames: dict[str, tuple[str, tuple[float, float, float]]] = {}
         self._said = ""
-        self._clock, self._end = -1.0, math.inf
+        self._clock, self._end, self._complete = -1.0, math.inf, False
 
     def run(self, seconds: float | None = None) -> Any:
         """Drives until the goal or a failure; returns the last command.
@@ -204,10 +205,11 @@ class Node:
                 return
             if self._clock < last:  # the simulation began again
                 break
-        end = time.monotonic() + TOGETHER
+        end = time.monotonic() + (TOGETHER if self._complete else MISSING)
         while not self.core.has(self._clock) and time.monotonic() < end:
             self._hear()
             time.sleep(0.0003)
+        self._complete = self.core.has(self._clock)
         self._decide(self._clock, ANSWER)
 
     def _decide(self, now: float, wait: float) -> None:
