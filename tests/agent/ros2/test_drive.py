@@ -66,7 +66,7 @@ def robot_of(task, settings):
 
 
 def test_as_many_commands_as_verified(task, settings, package, steps, domain):
-    """In simulated time, the drive has the steps of the verified episode, or one off."""
+    """In simulated time, a drive has the steps of the verified episode, or one off."""
     with NodeProcess(package, domain) as node:
         simulator = Simulator(robot_of(task, settings), Bus(domain), patience=30.0)
         report = simulator.run(60.0)
