@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.cli.console import Console, print_json
-from tdac_agent.cli.controller_choice import own_folder, with_own_set
+from tdac_agent.cli.controller_choice import check_folder, own_folder, with_own_set
 from tdac_agent.cli.driving_bar import DrivingBar
 from tdac_agent.cli.falsify_flags import FalsifyOptions
 from tdac_agent.cli.falsify_view import show_falsification
@@ -44,6 +44,8 @@ PICTURE, CURVES = "counterexample.png", "curves.png"
 def run(flags: TaskFlags, options: FalsifyOptions) -> int:
     """Searches, and prints what was found; 1 if it fails without a deviation."""
     check_tier(options.tier)
+    if options.out is not None:
+        check_folder(options.out)
     flags = with_own_set(options.policy, flags)
     check_scope(flags.set_name is not None, flags, options)
     plan = SearchPlan(
@@ -160,6 +162,8 @@ def _replay(
     words = ["tdac", "play", options.policy, *words_of(flags)]
     if found.split is not None:
         words += ["--index", str(failed.number), "--split", found.split]
+    elif failed.number:
+        words += ["--seed", str(failed.number)]
     if failed.deviation.parts():
         words += ["--deviation", deviation_words(failed.deviation)]
     return words if options.tier == "auto" else [*words, "--tier", options.tier]
@@ -194,8 +198,8 @@ def _picture(
     runs: list[Points] = []
     outcomes, labels = [], []
     chosen = [failed.deviation]
-    if failed.deviation.parts():
-        chosen.append(Deviation())
+    if failed.deviation.parts():  # what fails is drawn on top
+        chosen.insert(0, Deviation())
     for deviation in chosen:
         part = part_of(problem, failed.number, found.split)
         rollout = drive_episode(entrant, problem, part, tier, deviation).rollout

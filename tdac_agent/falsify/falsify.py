@@ -128,8 +128,10 @@ def falsify(
             Search(drives, number, space, steps, plan.seed + place, share).run()
             for place, (number, share) in enumerate(numbers)
         ]
+        searched = drives.count
         curves = _curves(drives, points, plan)
         found = _record(entrant, problem, plan, space, drives, envelopes, curves)
+        found = found.model_copy(update={"episodes": searched})
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             write_atomic(out / RECORD_FILE, found.model_dump_json(indent=2) + "\n")
@@ -186,7 +188,9 @@ def _points(
     for name, size in space.items():
         signs = (-1, 1) if DEVIATIONS[name].signed else (1,)
         step, times = steps.get(name, 0.0), range(1, round(MOST) + 1)
-        values = sorted({near(s * n * size, step) for s in signs for n in times} - {0})
+        values = sorted(
+            {0.0, *(near(s * n * size, step) for s in signs for n in times)}
+        )
         limit = limit_of(name, size)
         found += [(name, value) for value in values if abs(value) <= limit + 1e-9]
     return found

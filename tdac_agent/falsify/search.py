@@ -30,6 +30,7 @@ FOR_SINGLES, FOR_SHRINKING = 0.5, 0.25
 """Shares of the budget."""
 SURVIVED = 1000.0
 """What a survived case costs at least: more than any failed one."""
+_ROUNDED, _SLACK = 1.001, 1e-9
 NEAR = 0.25
 """First step of the search around an expected failure, in sizes."""
 _FAR = 5.0
@@ -86,10 +87,22 @@ class Search:
         self._shrink()
         return Envelope(
             **about,
-            directions=tuple(directions),
+            directions=tuple(map(self._narrowed, directions)),
             counterexample=self._found(),
             episodes=self.spent,
         )
+
+    def _narrowed(self, own: Direction) -> Direction:
+        """A direction, with the smallest failure if that is of this part alone."""
+        parts = {} if self._best is None else self._best[1].parts()
+        value = parts.get(own.part, 0.0)
+        same = list(parts) == [own.part] and value * own.sign > 0.0
+        if not same or (own.fails is not None and abs(own.fails) <= abs(value)):
+            return own
+        survives = own.survives if abs(own.survives) < abs(value) else 0.0
+        assert self._best is not None
+        update = {"fails": value, "survives": survives, "cause": self._best[2].cause}
+        return own.model_copy(update=update)
 
     def _found(self) -> Counterexample | None:
         if self._best is None:
@@ -135,6 +148,8 @@ class Search:
         ]
         while self.spent < budget:
             asked = [each for each in brackets if each.next() is not None]
+            # If few episodes are left, they narrow what fails.
+            asked.sort(key=lambda each: each.fails is None)
             asked = asked[: budget - self.spent]
             if not asked:
                 break
@@ -247,12 +262,22 @@ class Search:
             deviation = Deviation.of(
                 {n: near(factor * v, self.steps.get(n, 0.0)) for n, v in kept.items()}
             )
-            (row,) = self._rows([deviation])
+            norm = deviation.norm(self.space)
+            row = None
+            if norm <= _ROUNDED * whole.norm(self.space) and self._is_within(deviation):
+                (row,) = self._rows([deviation])
             if row is None or row.success:
                 most = count
             else:
-                least, norm = count, deviation.norm(self.space)
+                least = count
                 self._best = norm, deviation, row, by
+
+    def _is_within(self, deviation: Deviation) -> bool:
+        """Whether each part is within the limit of the search."""
+        return all(
+            abs(value) <= limit_of(name, self.space[name]) + _SLACK
+            for name, value in deviation.parts().items()
+        )
 
     def _smaller(self, name: str, by: str) -> None:
         """Bisects one part of the smallest failure, with the others as they are."""
@@ -293,7 +318,7 @@ def nearest_of(
 
 def near(value: float, step: float) -> float:
     """The nearest value that there is; few digits, so that it can be written."""
-    return round(step * round(value / step) if step else value, 6)
+    return float(f"{step * round(value / step) if step else value:.6g}")
 
 
 def between(safe: float, fails: float, step: float) -> float | None:

@@ -14,8 +14,9 @@ from tdac_agent.runs.falsify_text import (
     range_text,
     summary_of,
 )
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.deviation import DEVIATIONS
-from tdac_envs.core.intake import read_file
+from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 PICTURE = "counterexample.png"
 _MOST_BYTES = 16 << 20
@@ -24,7 +25,7 @@ _MOST_BYTES = 16 << 20
 def envelope_of(folder: Path) -> dict[str, Any] | None:
     """Values for the template; None if the run has no record of this search."""
     found = read_falsification(folder)
-    if found is None:
+    if found is None or found.policy_sha256 != _controller_sha256(folder):
         return None
     failed, summary = found.counterexample, summary_of(found)
     return {
@@ -50,6 +51,14 @@ def _world(envelope: Envelope, found: Falsification) -> dict[str, Any]:
             rows.append((part, words, survived, ", ".join(values), ", ".join(causes)))
     plain = plain_text(envelope, found)
     return {"number": envelope.number, "plain": plain, "rows": rows}
+
+
+def _controller_sha256(folder: Path) -> str:
+    """Hash of the run's controller: a search for another one says nothing of it."""
+    try:
+        return sha256_of(read_file(folder / "controller.py", TEXT_BYTES))
+    except (OSError, ValueError):
+        return ""
 
 
 def _picture(folder: Path) -> str | None:

@@ -85,7 +85,7 @@ class Falsification(StrictRecord):
     seed: int
     physics: str = Field("exact", description="What moved the robot.")
     budget: int = Field(description="Most episodes of the search.")
-    episodes: int = Field(description="Episodes that were driven.")
+    episodes: int = Field(description="Episodes of the search, without curves.")
     sandbox: str
     envelopes: tuple[Envelope, ...]
     curves: tuple[Point, ...] = ()

@@ -50,7 +50,15 @@ def _survived_alone(own: Direction, found: Falsification) -> str:
         return text
     if own.impossible:
         return f"{text} (no room for more)"
-    return f"{text} and more" if own.survives else "not tried"
+    if not own.survives:
+        return "not tried"
+    whole = abs(own.survives) > 0.999 * abs(own.limit) or _next_is_beyond(own, found)
+    return f"{text} and more" if whole else f"{text} so far"
+
+
+def _next_is_beyond(own: Direction, found: Falsification) -> bool:
+    """Whether the next value would have been beyond the limit."""
+    return abs(own.survives) + found.space[own.part] > abs(own.limit) + 1e-9
 
 
 def summary_of(found: Falsification) -> str:
@@ -71,9 +79,8 @@ def summary_of(found: Falsification) -> str:
         least = min(failed, key=lambda each: each.norm)
         where = "" if found.split is None else f" in world {least.number}"
         cause = least.row.cause or least.row.outcome
-        lines.append(
-            f"smallest failure{where}: {found.in_words(least.deviation)} ({cause})"
-        )
+        words = found.in_words(least.deviation)
+        lines.append(f"smallest failure found{where}: {words} ({cause})")
     elif any(each.base.success for each in found.envelopes):
         lines.append("no failure was found")
     return "; ".join(lines)
@@ -98,8 +105,10 @@ def _survived(found: Falsification) -> str:
             texts.append(
                 f"{name} {found.value(least.part, abs(least.survives)).lstrip('+')}"
             )
+    if not texts and all(each.survives or each.impossible for each in own):
+        return "survives each deviation alone, as far as it was tried"
     if not texts:
-        return "survives each deviation alone"
+        return "not each deviation was tried"
     return f"survives, alone, {', '.join(texts)}"
 
 

@@ -60,7 +60,7 @@ DEVIATIONS = {
     "obstacles_y": DeviationPart("obstacles, y", 0.1, "radii", own_world=True),
 }
 """All parts by their names, in the order in which reports list them."""
-_LARGEST_SIZE = 1000.0
+_SMALLEST_SIZE, _LARGEST_SIZE = 1e-4, 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +104,11 @@ class Deviation:
     lag: float = 0.0
     obstacles_x: float = 0.0
     obstacles_y: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not abs(value) <= _LARGEST_SIZE:  # not a number, either
+                raise ValueError(f"{name}: {value!r:.20} is no deviation")
 
     @classmethod
     def of(cls, sizes: Mapping[str, float]) -> Deviation:
@@ -162,8 +167,11 @@ def space_of(
             raise TaskError(f"{name} is for {what} alone; here: {', '.join(here)}")
         if size is not None:
             number_up_to(f"size of {name}", size, _LARGEST_SIZE)
-            if size <= 0.0:
-                raise TaskError(f"size of {name}: expected more than 0, got {size:g}")
+            least = 1.0 if DEVIATIONS[name].unit == "steps" else _SMALLEST_SIZE
+            if size < least:
+                raise TaskError(
+                    f"size of {name}: expected {least:g} or more, got {size:g}"
+                )
     return {
         name: size if (own := chosen[name]) is None else float(own)
         for name, size in here.items()
@@ -214,11 +222,14 @@ def deviation_of(text: str) -> Deviation:
                 f"unknown deviation {name!r}{known}; known: {', '.join(DEVIATIONS)}"
             )
         if value is None or not math.isfinite(value):
-            raise TaskError(f"deviation {name}: expected {name}=NUMBER")
+            raise TaskError(f"deviation {name}: expected {name}=NUMBER, a finite one")
         if value < 0 and not part.signed:
             raise TaskError(f"deviation {name}: expected 0 or more, got {value:g}")
         if abs(value) > min(part.most, _LARGEST_SIZE):
-            raise TaskError(f"deviation {name}: {value:g} is too large")
+            most = min(part.most, _LARGEST_SIZE)
+            raise TaskError(
+                f"deviation {name}: expected at most {most:g}, got {value:g}"
+            )
         if part.unit == "steps" and value != round(value):
             raise TaskError(f"deviation {name}: expected a whole number, got {value:g}")
     return Deviation.of({name: float(value or 0.0) for name, value in own.items()})

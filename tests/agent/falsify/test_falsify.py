@@ -129,7 +129,7 @@ def test_curves_count_jittered_starts(search):
     plan = replace(PLAN, episodes=16, space={"delay": None}, curves=3)
     found = search(BREAKS_WHEN_LATE, plan)
     rates = {point.value: (point.successes, point.count) for point in found.curves}
-    assert rates == {1.0: (3, 3), 2.0: (3, 3), 3.0: (0, 3)}
+    assert rates == {0.0: (3, 3), 1.0: (3, 3), 2.0: (3, 3), 3.0: (0, 3)}
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ def test_the_failure_is_told_drawn_and_played(corridor, done, rejected, tmp_path
     file = corridor / "controller.py"
     told = done("falsify", file, *SMALL, "--out", out)
     assert "survives, alone, delay 2 steps" in told
-    assert "smallest failure: delay 3 steps" in told
+    assert "smallest failure found: delay 3 steps" in told
     assert "not a proof" in told
     assert {each.name for each in out.iterdir()} == {
         "falsify.json",
@@ -58,6 +58,9 @@ def test_a_failure_without_a_deviation_is_exit_1(corridor, rejected):
         (["--space", "dely"], "unknown deviation 'dely' (did you mean 'delay'?)"),
         (["--space", "delay=x"], "expected a number, got 'x'"),
         (["--space", "delay=-1"], "size of delay"),
+        (["--space", "delay=0.3"], "expected 1 or more, got 0.3"),
+        (["--space", "axle=1e-300"], "expected 0.0001 or more"),
+        (["--out", "{file}"], "cannot write to"),
         (["--space", "delay,delay"], "given twice"),
         (["--task", "epuck", "--space", "range_bias"], "robots with ranges alone"),
         (["--set", "unknown", "--space", "start_x"], "single tasks alone"),
@@ -69,6 +72,7 @@ def test_a_failure_without_a_deviation_is_exit_1(corridor, rejected):
 def test_mistakes_are_one_line(corridor, refused, tmp_path, words, told):
     file = tmp_path / "other.py"
     file.write_text(CAREFUL)
+    words = [str(file) if word == "{file}" else word for word in words]
     assert told in refused("falsify", file, *words)
 
 
@@ -80,6 +84,7 @@ def test_mistakes_are_one_line(corridor, refused, tmp_path, words, told):
         ("delay=1.5", "expected a whole number"),
         ("slip=-0.1", "expected 0 or more"),
         ("axle=nan", "expected axle=NUMBER"),
+        ("axle=-1", "expected at most 0.9, got -1"),
         ("wheel=1", "unknown deviation 'wheel'"),
         ("start_y=4", "no episode begins with this deviation: start (45, 120)"),
     ],
