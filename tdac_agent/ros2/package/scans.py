@@ -10,6 +10,12 @@ import numpy as np
 
 MOST_MISSING = 0.2
 """Largest share of rays without a value in a scan that counts."""
+MOST_ZERO = 0.5
+"""
+Largest share of rays that read nothing, zeros of a near obstacle among them.
+
+A flat wall is in less than half of all directions.
+"""
 MOST_RAYS = 20_000
 _NEAR, _NONE = -1.0, 1e9
 
@@ -58,10 +64,26 @@ class Scanner:
         self.range_max = float(robot['range_max'])
         blind = {'range_min': float(robot.get('range_min') or 0.0), 'zero': 0.0}
         self.blind = blind.get(str(robot.get('below_min')), self.range_max)
+        self.zero_is_near = self._can_be_near()
         gaps = np.abs(_turns(np.diff(np.concatenate([self.angles, self.angles[:1]]))))
         self._gap = float(gaps[:-1].max()) if len(gaps) > 1 else 0.1
         self._layout: Layout | None = None
         self._sector = self._own = np.zeros(0, np.int64)
+
+    def _can_be_near(self) -> np.ndarray[Any, Any]:
+        """
+        Return the rays in which something may be too near to be measured.
+
+        In the others the body itself reaches as far as the smallest range: what would be
+        nearer was touched before.
+        """
+        if self.robot.get('below_min') != 'zero':
+            return np.zeros(len(self.angles), bool)
+        x, y = self.robot.get('scanner_offset') or (0.0, 0.0)
+        along = x * np.cos(self.angles) + y * np.sin(self.angles)
+        rest = along**2 + float(self.robot['radius']) ** 2 - x**2 - y**2
+        edge = np.sqrt(np.maximum(rest, 0.0)) - along
+        return np.asarray(edge < float(self.robot.get('range_min') or 0.0))
 
     def use(self, layout: Layout) -> None:
         """
@@ -110,7 +132,9 @@ class Scanner:
 
         The first is None if too many rays have no value. Of the second, NaN is unknown, and inf
         is free. A range of 0 is one without a return, as many drivers publish it; between 0
-        and the smallest range, something is too near.
+        and the smallest range, something is too near. Where the robot file says that a ray
+        reads 0 below the smallest range, a 0 counts as a value only in directions in which
+        something can be so near, and only if at most `MOST_ZERO` of the rays read nothing.
         """
         assert self._layout is not None
         raw = np.asarray(ranges, np.float64)
@@ -124,12 +148,14 @@ class Scanner:
         inside = self._sector >= 0
         np.minimum.at(found, self._sector[inside], value[inside])
         found = np.where(found == _NONE, value[self._own], found)
-        zero = (found == _NONE) & (raw[self._own] == 0.0)
-        if str(self.robot.get('below_min')) == 'zero':
+        nothing = found == _NONE
+        zero = nothing & (raw[self._own] == 0.0)
+        unexplained = nothing & ~(zero & self.zero_is_near)
+        if self.robot.get('below_min') == 'zero':
             found[zero] = 0.0
         lost = found == _NONE
         task = None
-        if lost.mean() <= MOST_MISSING:
+        if unexplained.mean() <= MOST_MISSING and nothing.mean() <= MOST_ZERO:
             task = np.where(found == _NEAR, self.blind, _filled(found, lost))
             task = task.astype(np.float32)
         guard = np.where(near, np.nan, np.where(raw > self.range_max, np.inf, raw))

@@ -292,6 +292,7 @@ def test_the_rays_of_the_simulated_turtlebot_are_taken(settings):
     robot = {
         "ray_angles": [math.radians(i) for i in range(360)],
         "is_scanner": True,
+        "radius": 0.105,
         "range_max": 3.5,
         "range_min": 0.12,
         "below_min": "zero",
@@ -341,6 +342,72 @@ def test_ranges_without_a_value():
     assert scanner.read([1, nan, nan, 4, 5, 6])[0] is None
     assert scanner.read([1, 2])[0] is None
     assert scanner.read([0.05, 2, 3, -inf, 5, 4])[0].tolist() == [5, 2, 3, 5, 5, 4]
+
+
+ZEROS = [slice(None), slice(0, 14), slice(None, None, 2), slice(14, 47)]
+
+
+@pytest.mark.parametrize("part", ZEROS)
+def test_zeros_that_say_nothing_are_missing(make_core, robot, part):
+    """A scanner that is covered and reads 0 stops the robot, as one that reads NaN."""
+    core = make_core()
+
+    def covered(core, robot, now):
+        reading = robot.read()
+        reading.ranges[part] = 0.0
+        core.pose(now, *reading.pose)
+        core.scan(now, robot.layout, reading.ranges)
+
+    assert drive(core, robot, 0.5)[-1].state == "driving"
+    before = robot.way
+    commands = drive(core, robot, 1.0, covered)
+    assert commands[-1].state == "stopped"
+    assert "the last scan is older" in commands[-1].reason
+    stated = core.settings.stops_within()["a scan or a pose is late, lost or old"]
+    assert robot.way - before <= stated
+
+
+@given(
+    x=st.floats(-0.15, 0.15),
+    y=st.floats(-0.15, 0.15),
+    least=st.floats(0.02, 0.3),
+)
+def test_a_zero_counts_where_something_can_be_near(x, y, least):
+    """In these directions, a point at the smallest range is outside the body."""
+    robot = {
+        "ray_angles": np.linspace(-3.0, 3.0, 40),
+        "radius": 0.22,
+        "scanner_offset": (x, y),
+        "below_min": "zero",
+        "range_min": least,
+        "range_max": 5.0,
+    }
+    for angle, near in zip(
+        robot["ray_angles"], Scanner(robot).zero_is_near, strict=True
+    ):
+        away = math.hypot(x + least * math.cos(angle), y + least * math.sin(angle))
+        assert near == (away > 0.22) or abs(away - 0.22) < 1e-9
+
+
+def test_a_wall_that_is_too_near_is_no_missing_scan(settings):
+    """A third of the rays behind the burger read 0 beside a wall: the scan counts."""
+    burger = {
+        "ray_angles": [math.radians(i) for i in range(360)],
+        "radius": 0.105,
+        "scanner_offset": (-0.032, 0.0),
+        "below_min": "zero",
+        "range_min": 0.12,
+        "range_max": 3.5,
+    }
+    scanner = Scanner(burger)
+    scanner.use(Layout(360, 0.0, math.radians(1), 0.12, 3.5))
+    ranges = np.full(360, 2.0)
+    ranges[120:240] = 0.0
+    assert scanner.read(ranges)[0].tolist() == ranges.tolist()
+    front = np.full(360, 2.0)
+    front[:40] = front[-40:] = 0.0
+    assert scanner.read(front)[0] is None
+    assert scanner.read(np.zeros(360))[0] is None
 
 
 @given(yaw=ANGLES)
