@@ -308,6 +308,7 @@ def _values(
         "full": f"{speed:g}",
         "rate": f"{1 / dt:g}",
         "limit": f"{PERIODS * dt:g}",
+        "period": f"{dt:g}",
         "timer": f"{2 * dt:g}",
         "start": [f"{value:g}" for value in settings["start"]],
         "goal": [f"{value:g}" for value in settings["goal"]],

@@ -21,6 +21,8 @@ from .scans import Guard, Layout, LayoutError, Scanner
 
 PERIODS = 3
 """Control periods after which a scan or a pose is too old."""
+LATENCY = 1
+"""Control periods from a command to the wheels that are reckoned with; more is not covered."""
 
 
 class SettingsError(ValueError):
@@ -80,9 +82,15 @@ class Settings:
         robot = self.robot
         return float(min(robot['max_wheel_speed'], robot.get('max_speed') or math.inf))
 
+    @property
+    def latency(self) -> float:
+        """Longest time from a command to the wheels that is reckoned with."""
+        return LATENCY * self.dt
+
     def stops_within(self) -> dict[str, float]:
         """Distance to standstill, from full speed, by what happens."""
-        v, own = self.full_speed, float(self.robot['stopping_distance'])
+        v = self.full_speed
+        own = float(self.robot['stopping_distance']) + v * self.latency
         return {
             'a scan or a pose is late, lost or old': v * (self.oldest + self.dt) + own,
             'the controller is late, raises or is not finite': v * self.dt + own,
@@ -125,7 +133,8 @@ class Core:
     def __init__(self, settings: Settings, policy: Policy) -> None:
         self.settings, self._policy = settings, policy
         self._wheels = Wheels(settings.robot, settings.dt)
-        self._scanner, self._guard = Scanner(settings.robot), Guard(settings.robot)
+        self._scanner = Scanner(settings.robot)
+        self._guard = Guard(settings.robot, settings.latency)
         self._layout: Layout | None = None
         self._ranges: np.ndarray[Any, Any] | None = None
         self._scan_stamp = self._pose_stamp = -math.inf

@@ -168,10 +168,15 @@ class Guard:
 
     A ray that was near and has no value now keeps what it read, until it reads again: what
     is too near to be measured is not gone.
+
+    Args:
+        robot: See `settings.json`.
+        latency: Time for which the body drives on before it obeys a command.
     """
 
-    def __init__(self, robot: dict[str, Any]) -> None:
+    def __init__(self, robot: dict[str, Any], latency: float) -> None:
         self.radius, self.stop = float(robot['radius']), float(robot['stopping_distance'])
+        self.latency = latency
         self.offset = np.asarray(robot.get('scanner_offset') or (0.0, 0.0), np.float64)
         self.keep = float(robot.get('range_min') or 0.0) + 2.0 * (self.radius + self.stop)
         self.points = np.zeros((0, 2))
@@ -194,6 +199,8 @@ class Guard:
         """
         Whether a command leads the body to something within its stopping distance.
 
+        To this distance comes the way of the latency.
+
         Args:
             v: Speed.
             omega: Turn rate.
@@ -206,7 +213,8 @@ class Guard:
         cosine, sine = math.cos(yaw), math.sin(yaw)
         rest = self.points - (x, y)
         points = rest @ np.array([[cosine, -sine], [sine, cosine]])
-        way = np.linspace(0.0, math.copysign(self.stop * min(abs(v) / full, 1.0), v), 9)
+        far = self.stop * min(abs(v) / full, 1.0) + abs(v) * self.latency
+        way = np.linspace(0.0, math.copysign(far, v), 9)
         turn = way * (omega / v)
         half = 0.5 * turn
         chord = way * np.sinc(half / math.pi)

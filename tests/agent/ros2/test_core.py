@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tdac_agent.ros2.export import core_settings
-from tdac_agent.ros2.package.core import Core, SettingsError
+from tdac_agent.ros2.package.core import Command, Core, SettingsError
 from tdac_agent.ros2.package.motion import Wheels, compose, wrapped, yaw_of
 from tdac_agent.ros2.package.scans import Guard, Layout, LayoutError, Scanner
 from tdac_agent.ros2.package.worker import Worker
@@ -140,7 +140,39 @@ def test_stops_before_what_is_ahead(make_core, robot):
     assert robot.stands
     assert "something is ahead" in core.tick(robot.time, 0.0).reason
     ahead = min(r for r in (*robot.read().ranges[:8], *robot.read().ranges[-7:]))
-    assert ahead < 0.1 + 0.045 + 0.03 + 0.03
+    assert ahead < 0.1 + 0.045 + 0.03 + 0.03 + 0.03
+
+
+def drive_late(core, robot, seconds, see=see):
+    """Drives with wheels that obey each command a control period later."""
+    late = Command(0.0, 0.0, "")
+    for _ in range(round(seconds / robot.dt)):
+        see(core, robot, robot.time)
+        robot.obey(late.v, late.omega)
+        late = core.tick(robot.time, 0.0)
+        robot.step()
+    return late
+
+
+def test_late_wheels_do_not_touch_a_wall(make_core, robot):
+    """A latency of one control period is covered at full speed towards a wall."""
+    core = make_core(any_start=True)
+    last = drive_late(core, robot, 20.0)
+    assert "something is ahead" in last.reason
+    assert robot.stands
+    assert not robot.contact
+
+
+@pytest.mark.parametrize("missing", ["scan", "pose"])
+def test_late_wheels_stand_within_the_stated_distance(make_core, robot, missing):
+    """With old data, too, the distance holds for wheels that obey a period late."""
+    core = make_core()
+    drive_late(core, robot, 0.5)
+    before = robot.way
+    drive_late(core, robot, 1.5, lambda *a: see(*a, **{missing: False}))
+    assert robot.stands
+    stated = core.settings.stops_within()["a scan or a pose is late, lost or old"]
+    assert robot.way - before <= stated
 
 
 def test_turns_away_from_what_is_ahead(make_core, robot):
@@ -158,7 +190,7 @@ def test_turns_away_from_what_is_ahead(make_core, robot):
 
 def test_a_foot_before_the_scanner_stays(settings):
     """What was near and cannot be measured any more still stops the robot."""
-    guard, angles = Guard(settings["robot"]), np.array([0.0])
+    guard, angles = Guard(settings["robot"], 0.1), np.array([0.0])
     args = 0.3, 0.0, 0.3, (0.0, 0.0, 0.0)
     guard.see(np.array([2.0]), angles)
     assert not guard.blocked(*args)
@@ -179,11 +211,11 @@ def test_a_foot_before_the_scanner_stays(settings):
 def test_the_guard_sees_what_it_would_touch(v, omega, x, y):
     """Compared with 500 places along the arc: nothing that comes nearer is missed."""
     robot = {"radius": 0.1, "stopping_distance": 0.045}
-    guard = Guard(robot)
+    guard = Guard(robot, 0.1)
     angle, away = math.atan2(y, x), math.hypot(x, y)
     guard.see(np.array([away]), np.array([angle]))
     pose, least = (0.0, 0.0, 0.0), away
-    way = 0.045 * abs(v) / 0.3
+    way = 0.045 * abs(v) / 0.3 + 0.1 * abs(v)
     for _ in range(500):
         time = way / 500 / abs(v) if v else 0.0
         half = 0.5 * omega * time
