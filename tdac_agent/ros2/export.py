@@ -30,7 +30,7 @@ from tdac_envs.core.intake import RECORD_BYTES
 from tdac_envs.mapping.ros_writer import write_ros_map
 
 PACKAGE = Path(__file__).parent / "package"
-COPIED = ("core.py", "motion.py", "scans.py", "worker.py", "node.py")
+COPIED = ("core.py", "motion.py", "scans.py", "worker.py", "ending.py", "node.py")
 """Modules of the package, byte for byte those of this one."""
 CONTROLLER = "controller"
 """Folder of the package with what the controller reads."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-import signal
 from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
@@ -15,14 +14,14 @@ from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters
 import rclpy
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import String
 from tf2_ros import Buffer, TransformException, TransformListener
 
-from . import core, motion, scans, worker
+from . import core, ending, motion, scans, worker
 
 PACKAGE = __package__ or ''
 DEFAULTS: dict[str, Any] = {
@@ -65,7 +64,8 @@ class DriveNode(Node):  # type: ignore[misc]
         self._listener = TransformListener(self._buffer, self)
         kind = TwistStamped if own['stamped'] else Twist
         self._out = self.create_publisher(kind, own['command_topic'], 1)
-        self._state = self.create_publisher(String, '~/state', 1)
+        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._state = self.create_publisher(String, '~/state', kept)
         self.create_subscription(
             LaserScan, own['scan_topic'], self._on_scan, qos_profile_sensor_data)
         if own['pose_source'] == 'odom':
@@ -174,15 +174,10 @@ def _seconds(stamp: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
-def _interrupt(_number: int, _frame: Any) -> None:
-    raise KeyboardInterrupt
-
-
 def main(args: Any = None) -> None:
     """Drive until the process is told to end; the last command is zero."""
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    ending.take_signals()
     node = None
     try:
         node = DriveNode()
@@ -192,8 +187,10 @@ def main(args: Any = None) -> None:
     except (core.SettingsError, OSError, ValueError) as error:
         raise SystemExit(f'drive: {error}') from None
     finally:
+        ending.ignore_signals()
         if node is not None:
-            node.publish(node.core.end('the node was told to end'))
+            last = node.core.end('the node was told to end')
+            ending.send_last(node.publish, last, core.PERIODS * node.core.settings.dt)
             node.destroy_node()
         rclpy.try_shutdown()
 
