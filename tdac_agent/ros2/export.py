@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shlex
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -309,6 +310,7 @@ def _values(
         "rate": f"{1 / dt:g}",
         "limit": f"{PERIODS * dt:g}",
         "period": f"{dt:g}",
+        "silent": f"{1 + PERIODS * dt:g}",
         "timer": f"{2 * dt:g}",
         "start": [f"{value:g}" for value in settings["start"]],
         "goal": [f"{value:g}" for value in settings["goal"]],
@@ -316,8 +318,8 @@ def _values(
         f"{robot['range_max']:g} m",
         "stops": made.stops,
         "numpy": np.__version__,
-        "run": run_folder.name,
-        "out": made.folder.name,
+        "run": shlex.quote(run_folder.as_posix()),
+        "out": shlex.quote(made.folder.as_posix()),
     }
 
 

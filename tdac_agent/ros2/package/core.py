@@ -44,6 +44,8 @@ class Settings:
         dead_man: Time after which the robot stops by itself without a command.
         max_age: Largest age of a scan and of a pose; 0 for three periods.
         any_start: Whether to drive from a start that no verified drive had.
+        start_on: When the drive begins: `pose`, as soon as the data fit, or `service`, when
+            `Core.start` is called.
     """
 
     dt: float
@@ -55,6 +57,7 @@ class Settings:
     dead_man: float
     max_age: float = 0.0
     any_start: bool = False
+    start_on: str = 'pose'
 
     def __post_init__(self) -> None:
         limit = PERIODS * self.dt
@@ -66,6 +69,8 @@ class Settings:
         if not 0.0 <= self.max_age <= limit + 1e-9:
             raise SettingsError(
                 f'max_age: expected at most {limit:g} s (three periods), got {self.max_age:g}')
+        if self.start_on not in ('pose', 'service'):
+            raise SettingsError(f'start_on: expected pose or service, got {self.start_on!r}')
         for name in ('radius', 'axle_length', 'max_wheel_speed', 'stopping_distance'):
             value = self.robot.get(name)
             if not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
@@ -141,6 +146,7 @@ class Core:
         self._pose = (0.0, 0.0, 0.0)
         self._motion: deque[tuple[float, float, float]] = deque(maxlen=100)
         self._asked = self._planned = False
+        self._held = settings.start_on == 'service'
         self.publishers = 1
         self.commands = 0
         self.final: Command | None = None
@@ -172,6 +178,24 @@ class Core:
         """End the drive, as on SIGTERM."""
         return self.final or self._end('ended', reason)
 
+    def start(self, now: float) -> tuple[bool, str]:
+        """Begin the drive, if all fits now; return whether it does, and what to say."""
+        if self.final is not None:
+            return False, f'{self.final.state}: {self.final.reason}'
+        if not self._held:
+            return True, 'the drive has begun'
+        why = self._unfit(now)
+        self._held = bool(why)
+        return not why, why or 'the drive begins'
+
+    def check_timer(self, name: str, values: list[float | None]) -> None:
+        """End the drive if the robot's timer, as its driver says, is missing or too long."""
+        limit = PERIODS * self.settings.dt
+        value = values[0] if values else None
+        if value is None or not 0.0 < value <= limit + 1e-9:
+            got = 'no number' if value is None else f'{value:g}'
+            self._end('failed', f'{name}: expected above 0 and at most {limit:g} s, got {got}')
+
     def drove(self, v: float, omega: float) -> None:
         """Take another command than the last one as driven, as in a recorded drive."""
         self._wheels.last = self._wheels.fractions(v, omega)
@@ -199,7 +223,8 @@ class Core:
             if answer is None or self._planned is False or answer[0] == 'error':
                 return self._take(answer, why, now)
             self._asked = False  # a late answer, to an observation that is old
-        if why:
+        if why or self._held:
+            why = why or 'ready: call the service start'
             return self._stand('stopped' if self._planned else 'waiting', why)
         if math.dist(self._pose[:2], self.settings.goal) <= self.settings.goal_tolerance:
             return self._end('reached', 'the goal')

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from tdac_agent.ros2.export import core_settings
 from tdac_agent.ros2.package.core import Command, Core, SettingsError
-from tdac_agent.ros2.package.motion import Wheels, compose, wrapped, yaw_of
+from tdac_agent.ros2.package.motion import Wheels, compose, stamp_of, wrapped, yaw_of
 from tdac_agent.ros2.package.scans import Guard, Layout, LayoutError, Scanner
 from tdac_agent.ros2.package.worker import Worker
 from tdac_agent.ros2.robot import Robot
@@ -270,6 +270,37 @@ def test_waits_at_the_start(make_core, robot):
     assert drive(core, robot, 0.2)[-1].state == "driving"
 
 
+def test_the_drive_is_held_until_it_is_started(make_core, robot):
+    """With `service`, nothing moves before the call; an early call begins nothing."""
+    core = make_core(start_on="service")
+    assert core.start(0.0) == (False, "no scan yet")
+    commands = drive(core, robot, 0.5)
+    assert {(c.v, c.omega, c.state) for c in commands} == {(0.0, 0.0, "waiting")}
+    assert core._policy.observations == []
+    assert "call the service start" in commands[-1].reason
+    assert core.start(robot.time - robot.dt) == (True, "the drive begins")
+    assert drive(core, robot, 0.1)[-1].state == "driving"
+    core.end("SIGTERM")
+    assert core.start(robot.time) == (False, "ended: SIGTERM")
+    with pytest.raises(SettingsError, match="start_on: expected pose or service"):
+        make_core(start_on="now")
+
+
+@pytest.mark.parametrize(
+    ("values", "got"),
+    [([], "no number"), ([None], "no number"), ([0.5], "0.5"), ([0.0], "0")],
+)
+def test_a_timer_that_is_missing_or_too_long_ends_the_drive(make_core, values, got):
+    """What the robot's driver answers may be empty, too."""
+    core = make_core()
+    core.check_timer("cmd_vel_timeout of /base", [0.3])
+    assert core.final is None
+    core.check_timer("cmd_vel_timeout of /base", values)
+    assert core.final.reason == (
+        f"cmd_vel_timeout of /base: expected above 0 and at most 0.3 s, got {got}"
+    )
+
+
 def test_a_clock_that_differs_is_named(make_core, robot):
     """Stamps of another clock move nothing."""
     core = make_core()
@@ -459,6 +490,19 @@ def test_poses_compose_as_matrices(a, b):
         return np.array([[c, -s, x], [s, c, y], [0, 0, 1]])
 
     assert np.allclose(matrix(*compose(a, b)), matrix(*a) @ matrix(*b), atol=1e-8)
+
+
+def test_a_silent_localiser_is_old_although_it_stamps_ahead(make_core, robot):
+    """AMCL that was silent for 0.4 s stops the robot, if the tolerance is declared."""
+    for tolerance, state in ((1.0, "stopped"), (0.0, "driving")):
+        core = make_core()
+        see(core, robot, 10.0)
+        assert core.tick(10.0, 0.0).state == "driving"
+        for now in (10.1, 10.2, 10.3, 10.4):
+            stamp = stamp_of(now, 10.0 + 1.0, tolerance)
+            core.pose(stamp, *robot.read().pose)
+            see(core, robot, now, pose=False)
+        assert core.tick(10.4, 0.0).state == state
 
 
 @given(angle=ANGLES)

@@ -14,8 +14,8 @@ import time
 from tdac_agent.ros2.package.ending import ignore_signals, send_last, take_signals
 
 take_signals()
-print("ready", flush=True)
 try:
+    print("ready", flush=True)
     time.sleep(60)
 except KeyboardInterrupt:
     pass
