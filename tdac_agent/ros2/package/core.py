@@ -99,7 +99,7 @@ class Settings:
         return {
             'a scan or a pose is late, lost or old': v * (self.oldest + self.dt) + own,
             'the controller is late, raises or is not finite': v * self.dt + own,
-            'something is ahead, the goal, SIGTERM, a second publisher': v * self.dt + own,
+            'something is ahead, the goal, SIGTERM, a silent second publisher': v * self.dt + own,
             'the node is killed, frozen or unreachable': v * (self.dead_man + self.dt) + own,
         }
 
