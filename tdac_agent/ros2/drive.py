@@ -25,6 +25,8 @@ from tdac_agent.ros2.export import (
     core_settings,
     mark_of,
 )
+from tdac_agent.ros2.package.core import PERIODS
+from tdac_agent.ros2.package.ending import send_last
 from tdac_agent.storage.files import read_inside
 from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_json
 
@@ -37,8 +39,6 @@ ANSWER = 1.0
 """Longest wait for an answer in simulated time, s of the wall clock."""
 CLOCK_STANDS = 10.0
 """Time after which a clock that stands still ends the drive, s of the wall clock."""
-ZEROS = 5
-"""Commands of zero at the end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,9 +180,7 @@ class Node:
                     self.core.end("out of time")
         finally:
             last = self.core.end("the node was told to end")
-            for _ in range(ZEROS):
-                self._send(last)
-                time.sleep(0.01)
+            send_last(self._send, last, PERIODS * self.dt)
         return last
 
     def _tick(self) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import shlex
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,7 +31,7 @@ from tdac_envs.core.intake import RECORD_BYTES
 from tdac_envs.mapping.ros_writer import write_ros_map
 
 PACKAGE = Path(__file__).parent / "package"
-COPIED = ("core.py", "motion.py", "scans.py", "worker.py", "node.py")
+COPIED = ("core.py", "motion.py", "scans.py", "worker.py", "ending.py", "node.py")
 """Modules of the package, byte for byte those of this one."""
 CONTROLLER = "controller"
 """Folder of the package with what the controller reads."""
@@ -308,6 +309,8 @@ def _values(
         "full": f"{speed:g}",
         "rate": f"{1 / dt:g}",
         "limit": f"{PERIODS * dt:g}",
+        "period": f"{dt:g}",
+        "silent": f"{1 + PERIODS * dt:g}",
         "timer": f"{2 * dt:g}",
         "start": [f"{value:g}" for value in settings["start"]],
         "goal": [f"{value:g}" for value in settings["goal"]],
@@ -315,8 +318,8 @@ def _values(
         f"{robot['range_max']:g} m",
         "stops": made.stops,
         "numpy": np.__version__,
-        "run": run_folder.name,
-        "out": made.folder.name,
+        "run": shlex.quote(run_folder.as_posix()),
+        "out": shlex.quote(made.folder.as_posix()),
     }
 
 

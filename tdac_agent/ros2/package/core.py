@@ -21,6 +21,8 @@ from .scans import Guard, Layout, LayoutError, Scanner
 
 PERIODS = 3
 """Control periods after which a scan or a pose is too old."""
+LATENCY = 1
+"""Control periods from a command to the wheels that are reckoned with; more is not covered."""
 
 
 class SettingsError(ValueError):
@@ -42,6 +44,8 @@ class Settings:
         dead_man: Time after which the robot stops by itself without a command.
         max_age: Largest age of a scan and of a pose; 0 for three periods.
         any_start: Whether to drive from a start that no verified drive had.
+        start_on: When the drive begins: `pose`, as soon as the data fit, or `service`, when
+            `Core.start` is called.
     """
 
     dt: float
@@ -53,6 +57,7 @@ class Settings:
     dead_man: float
     max_age: float = 0.0
     any_start: bool = False
+    start_on: str = 'pose'
 
     def __post_init__(self) -> None:
         limit = PERIODS * self.dt
@@ -64,6 +69,8 @@ class Settings:
         if not 0.0 <= self.max_age <= limit + 1e-9:
             raise SettingsError(
                 f'max_age: expected at most {limit:g} s (three periods), got {self.max_age:g}')
+        if self.start_on not in ('pose', 'service'):
+            raise SettingsError(f'start_on: expected pose or service, got {self.start_on!r}')
         for name in ('radius', 'axle_length', 'max_wheel_speed', 'stopping_distance'):
             value = self.robot.get(name)
             if not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
@@ -80,13 +87,19 @@ class Settings:
         robot = self.robot
         return float(min(robot['max_wheel_speed'], robot.get('max_speed') or math.inf))
 
+    @property
+    def latency(self) -> float:
+        """Longest time from a command to the wheels that is reckoned with."""
+        return LATENCY * self.dt
+
     def stops_within(self) -> dict[str, float]:
         """Distance to standstill, from full speed, by what happens."""
-        v, own = self.full_speed, float(self.robot['stopping_distance'])
+        v = self.full_speed
+        own = float(self.robot['stopping_distance']) + v * self.latency
         return {
             'a scan or a pose is late, lost or old': v * (self.oldest + self.dt) + own,
             'the controller is late, raises or is not finite': v * self.dt + own,
-            'something is ahead, the goal, SIGTERM, a second publisher': v * self.dt + own,
+            'something is ahead, the goal, SIGTERM, a silent second publisher': v * self.dt + own,
             'the node is killed, frozen or unreachable': v * (self.dead_man + self.dt) + own,
         }
 
@@ -125,13 +138,15 @@ class Core:
     def __init__(self, settings: Settings, policy: Policy) -> None:
         self.settings, self._policy = settings, policy
         self._wheels = Wheels(settings.robot, settings.dt)
-        self._scanner, self._guard = Scanner(settings.robot), Guard(settings.robot)
+        self._scanner = Scanner(settings.robot)
+        self._guard = Guard(settings.robot, settings.latency)
         self._layout: Layout | None = None
         self._ranges: np.ndarray[Any, Any] | None = None
         self._scan_stamp = self._pose_stamp = -math.inf
         self._pose = (0.0, 0.0, 0.0)
         self._motion: deque[tuple[float, float, float]] = deque(maxlen=100)
         self._asked = self._planned = False
+        self._held = settings.start_on == 'service'
         self.publishers = 1
         self.commands = 0
         self.final: Command | None = None
@@ -163,6 +178,24 @@ class Core:
         """End the drive, as on SIGTERM."""
         return self.final or self._end('ended', reason)
 
+    def start(self, now: float) -> tuple[bool, str]:
+        """Begin the drive, if all fits now; return whether it does, and what to say."""
+        if self.final is not None:
+            return False, f'{self.final.state}: {self.final.reason}'
+        if not self._held:
+            return True, 'the drive has begun'
+        why = self._unfit(now)
+        self._held = bool(why)
+        return not why, why or 'the drive begins'
+
+    def check_timer(self, name: str, values: list[float | None]) -> None:
+        """End the drive if the robot's timer, as its driver says, is missing or too long."""
+        limit = PERIODS * self.settings.dt
+        value = values[0] if values else None
+        if value is None or not 0.0 < value <= limit + 1e-9:
+            got = 'no number' if value is None else f'{value:g}'
+            self._end('failed', f'{name}: expected above 0 and at most {limit:g} s, got {got}')
+
     def drove(self, v: float, omega: float) -> None:
         """Take another command than the last one as driven, as in a recorded drive."""
         self._wheels.last = self._wheels.fractions(v, omega)
@@ -190,7 +223,8 @@ class Core:
             if answer is None or self._planned is False or answer[0] == 'error':
                 return self._take(answer, why, now)
             self._asked = False  # a late answer, to an observation that is old
-        if why:
+        if why or self._held:
+            why = why or 'ready: call the service start'
             return self._stand('stopped' if self._planned else 'waiting', why)
         if math.dist(self._pose[:2], self.settings.goal) <= self.settings.goal_tolerance:
             return self._end('reached', 'the goal')

@@ -23,6 +23,18 @@ def compose(
         wrapped(yaw + second[2]))
 
 
+def stamp_of(whole: float, localised: float, tolerance: float) -> float:
+    """
+    Stamp of a pose whose localiser stamps ahead of its data, as AMCL does.
+
+    Args:
+        whole: Stamp of the pose in the map, as tf gives it.
+        localised: Stamp of the odometry's frame in the map.
+        tolerance: How far the localiser stamps ahead.
+    """
+    return min(whole, localised - tolerance)
+
+
 def inverse(pose: tuple[float, float, float]) -> tuple[float, float, float]:
     """Pose of A in B, from the pose of B in A."""
     x, y, yaw = pose

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-import signal
 from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
@@ -15,14 +14,15 @@ from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters
 import rclpy
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 from tf2_ros import Buffer, TransformException, TransformListener
 
-from . import core, motion, scans, worker
+from . import core, ending, motion, scans, worker
 
 PACKAGE = __package__ or ''
 DEFAULTS: dict[str, Any] = {
@@ -33,11 +33,14 @@ DEFAULTS: dict[str, Any] = {
     'pose_source': 'tf',
     'map_frame': 'map',
     'base_frame': 'base_link',
+    'odom_frame': 'odom',
+    'transform_tolerance': 0.0,
     'origin': [0.0, 0.0, 0.0],
     'dead_man': 0.0,
     'dead_man_node': '',
     'dead_man_parameter': 'cmd_vel_timeout',
     'max_age': 0.0,
+    'start_on': 'service',
     'any_start': False,
 }
 
@@ -56,7 +59,7 @@ class DriveNode(Node):  # type: ignore[misc]
             dt=written['dt'], horizon=written['horizon'], start=tuple(written['start']),
             goal=tuple(written['goal']), goal_tolerance=written['goal_tolerance'],
             robot=written['robot'], dead_man=own['dead_man'], max_age=own['max_age'],
-            any_start=own['any_start'])
+            any_start=own['any_start'], start_on=own['start_on'])
         self.core = core.Core(settings, worker.Worker(folder, written['controller_sha256']))
         self._wait = 0.5 * settings.dt
         self._mounts: dict[str, float | None] = {}
@@ -65,7 +68,8 @@ class DriveNode(Node):  # type: ignore[misc]
         self._listener = TransformListener(self._buffer, self)
         kind = TwistStamped if own['stamped'] else Twist
         self._out = self.create_publisher(kind, own['command_topic'], 1)
-        self._state = self.create_publisher(String, '~/state', 1)
+        kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._state = self.create_publisher(String, '~/state', kept)
         self.create_subscription(
             LaserScan, own['scan_topic'], self._on_scan, qos_profile_sensor_data)
         if own['pose_source'] == 'odom':
@@ -74,6 +78,7 @@ class DriveNode(Node):  # type: ignore[misc]
         self.get_logger().info(f'stops within (m): {settings.stops_within()}')
         self.publish(core.Command(0.0, 0.0, 'waiting'))
         self._dead_man = self._ask_dead_man()
+        self.create_service(Trigger, '~/start', self._on_start)
         self.create_timer(settings.dt, self._tick)
 
     def _ask_dead_man(self) -> Any:
@@ -93,14 +98,18 @@ class DriveNode(Node):  # type: ignore[misc]
             return True
         if not self._dead_man.done():
             return False
-        value = self._dead_man.result().values[0]
-        self._dead_man = None
-        limit = core.PERIODS * self.core.settings.dt
-        if value.type != ParameterType.PARAMETER_DOUBLE or not 0 < value.double_value <= limit:
-            self.core.end(
-                f'{self.own["dead_man_parameter"]} of {self.own["dead_man_node"]}: expected '
-                f'above 0 and at most {limit:g} s, got {value.double_value:g}')
+        response, self._dead_man = self._dead_man.result(), None
+        values = [
+            each.double_value if each.type == ParameterType.PARAMETER_DOUBLE else None
+            for each in (response.values if response is not None else ())]
+        name = f'{self.own["dead_man_parameter"]} of {self.own["dead_man_node"]}'
+        self.core.check_timer(name, values)
         return True
+
+    def _on_start(self, _request: Any, response: Any) -> Any:
+        now = self.get_clock().now().nanoseconds * 1e-9
+        response.success, response.message = self.core.start(now)
+        return response
 
     def _on_scan(self, message: LaserScan) -> None:
         mount = self._mount(message.header.frame_id)
@@ -143,7 +152,15 @@ class DriveNode(Node):  # type: ignore[misc]
             return
         place, turn = found.transform.translation, found.transform.rotation
         yaw = motion.yaw_of(turn.x, turn.y, turn.z, turn.w)
-        self.core.pose(_seconds(found.header.stamp), place.x, place.y, yaw)
+        stamp, ahead = _seconds(found.header.stamp), self.own['transform_tolerance']
+        if ahead > 0.0:
+            try:
+                found = self._buffer.lookup_transform(
+                    self.own['map_frame'], self.own['odom_frame'], Time())
+            except TransformException:
+                return
+            stamp = motion.stamp_of(stamp, _seconds(found.header.stamp), ahead)
+        self.core.pose(stamp, place.x, place.y, yaw)
 
     def _tick(self) -> None:
         if not self._check_dead_man():
@@ -174,15 +191,10 @@ def _seconds(stamp: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
 
 
-def _interrupt(_number: int, _frame: Any) -> None:
-    raise KeyboardInterrupt
-
-
 def main(args: Any = None) -> None:
     """Drive until the process is told to end; the last command is zero."""
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    ending.take_signals()
     node = None
     try:
         node = DriveNode()
@@ -192,8 +204,10 @@ def main(args: Any = None) -> None:
     except (core.SettingsError, OSError, ValueError) as error:
         raise SystemExit(f'drive: {error}') from None
     finally:
+        ending.ignore_signals()
         if node is not None:
-            node.publish(node.core.end('the node was told to end'))
+            last = node.core.end('the node was told to end')
+            ending.send_last(node.publish, last, core.PERIODS * node.core.settings.dt)
             node.destroy_node()
         rclpy.try_shutdown()
 

@@ -10,6 +10,12 @@ import numpy as np
 
 MOST_MISSING = 0.2
 """Largest share of rays without a value in a scan that counts."""
+MOST_ZERO = 0.5
+"""
+Largest share of rays that read nothing, zeros of a near obstacle among them.
+
+A flat wall is in less than half of all directions.
+"""
 MOST_RAYS = 20_000
 _NEAR, _NONE = -1.0, 1e9
 
@@ -58,10 +64,26 @@ class Scanner:
         self.range_max = float(robot['range_max'])
         blind = {'range_min': float(robot.get('range_min') or 0.0), 'zero': 0.0}
         self.blind = blind.get(str(robot.get('below_min')), self.range_max)
+        self.zero_is_near = self._can_be_near()
         gaps = np.abs(_turns(np.diff(np.concatenate([self.angles, self.angles[:1]]))))
         self._gap = float(gaps[:-1].max()) if len(gaps) > 1 else 0.1
         self._layout: Layout | None = None
         self._sector = self._own = np.zeros(0, np.int64)
+
+    def _can_be_near(self) -> np.ndarray[Any, Any]:
+        """
+        Return the rays in which something may be too near to be measured.
+
+        In the others the body itself reaches as far as the smallest range: what would be
+        nearer was touched before.
+        """
+        if self.robot.get('below_min') != 'zero':
+            return np.zeros(len(self.angles), bool)
+        x, y = self.robot.get('scanner_offset') or (0.0, 0.0)
+        along = x * np.cos(self.angles) + y * np.sin(self.angles)
+        rest = along**2 + float(self.robot['radius']) ** 2 - x**2 - y**2
+        edge = np.sqrt(np.maximum(rest, 0.0)) - along
+        return np.asarray(edge < float(self.robot.get('range_min') or 0.0))
 
     def use(self, layout: Layout) -> None:
         """
@@ -110,7 +132,9 @@ class Scanner:
 
         The first is None if too many rays have no value. Of the second, NaN is unknown, and inf
         is free. A range of 0 is one without a return, as many drivers publish it; between 0
-        and the smallest range, something is too near.
+        and the smallest range, something is too near. Where the robot file says that a ray
+        reads 0 below the smallest range, a 0 counts as a value only in directions in which
+        something can be so near, and only if at most `MOST_ZERO` of the rays read nothing.
         """
         assert self._layout is not None
         raw = np.asarray(ranges, np.float64)
@@ -124,12 +148,14 @@ class Scanner:
         inside = self._sector >= 0
         np.minimum.at(found, self._sector[inside], value[inside])
         found = np.where(found == _NONE, value[self._own], found)
-        zero = (found == _NONE) & (raw[self._own] == 0.0)
-        if str(self.robot.get('below_min')) == 'zero':
+        nothing = found == _NONE
+        zero = nothing & (raw[self._own] == 0.0)
+        unexplained = nothing & ~(zero & self.zero_is_near)
+        if self.robot.get('below_min') == 'zero':
             found[zero] = 0.0
         lost = found == _NONE
         task = None
-        if lost.mean() <= MOST_MISSING:
+        if unexplained.mean() <= MOST_MISSING and nothing.mean() <= MOST_ZERO:
             task = np.where(found == _NEAR, self.blind, _filled(found, lost))
             task = task.astype(np.float32)
         guard = np.where(near, np.nan, np.where(raw > self.range_max, np.inf, raw))
@@ -142,10 +168,15 @@ class Guard:
 
     A ray that was near and has no value now keeps what it read, until it reads again: what
     is too near to be measured is not gone.
+
+    Args:
+        robot: See `settings.json`.
+        latency: Time for which the body drives on before it obeys a command.
     """
 
-    def __init__(self, robot: dict[str, Any]) -> None:
+    def __init__(self, robot: dict[str, Any], latency: float) -> None:
         self.radius, self.stop = float(robot['radius']), float(robot['stopping_distance'])
+        self.latency = latency
         self.offset = np.asarray(robot.get('scanner_offset') or (0.0, 0.0), np.float64)
         self.keep = float(robot.get('range_min') or 0.0) + 2.0 * (self.radius + self.stop)
         self.points = np.zeros((0, 2))
@@ -168,6 +199,8 @@ class Guard:
         """
         Whether a command leads the body to something within its stopping distance.
 
+        To this distance comes the way of the latency.
+
         Args:
             v: Speed.
             omega: Turn rate.
@@ -180,7 +213,8 @@ class Guard:
         cosine, sine = math.cos(yaw), math.sin(yaw)
         rest = self.points - (x, y)
         points = rest @ np.array([[cosine, -sine], [sine, cosine]])
-        way = np.linspace(0.0, math.copysign(self.stop * min(abs(v) / full, 1.0), v), 9)
+        far = self.stop * min(abs(v) / full, 1.0) + abs(v) * self.latency
+        way = np.linspace(0.0, math.copysign(far, v), 9)
         turn = way * (omega / v)
         half = 0.5 * turn
         chord = way * np.sinc(half / math.pi)

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tdac_agent.ros2.export import core_settings
-from tdac_agent.ros2.package.core import Core, SettingsError
-from tdac_agent.ros2.package.motion import Wheels, compose, wrapped, yaw_of
+from tdac_agent.ros2.package.core import Command, Core, SettingsError
+from tdac_agent.ros2.package.motion import Wheels, compose, stamp_of, wrapped, yaw_of
 from tdac_agent.ros2.package.scans import Guard, Layout, LayoutError, Scanner
 from tdac_agent.ros2.package.worker import Worker
 from tdac_agent.ros2.robot import Robot
@@ -140,7 +140,39 @@ def test_stops_before_what_is_ahead(make_core, robot):
     assert robot.stands
     assert "something is ahead" in core.tick(robot.time, 0.0).reason
     ahead = min(r for r in (*robot.read().ranges[:8], *robot.read().ranges[-7:]))
-    assert ahead < 0.1 + 0.045 + 0.03 + 0.03
+    assert ahead < 0.1 + 0.045 + 0.03 + 0.03 + 0.03
+
+
+def drive_late(core, robot, seconds, see=see):
+    """Drives with wheels that obey each command a control period later."""
+    late = Command(0.0, 0.0, "")
+    for _ in range(round(seconds / robot.dt)):
+        see(core, robot, robot.time)
+        robot.obey(late.v, late.omega)
+        late = core.tick(robot.time, 0.0)
+        robot.step()
+    return late
+
+
+def test_late_wheels_do_not_touch_a_wall(make_core, robot):
+    """A latency of one control period is covered at full speed towards a wall."""
+    core = make_core(any_start=True)
+    last = drive_late(core, robot, 20.0)
+    assert "something is ahead" in last.reason
+    assert robot.stands
+    assert not robot.contact
+
+
+@pytest.mark.parametrize("missing", ["scan", "pose"])
+def test_late_wheels_stand_within_the_stated_distance(make_core, robot, missing):
+    """With old data, too, the distance holds for wheels that obey a period late."""
+    core = make_core()
+    drive_late(core, robot, 0.5)
+    before = robot.way
+    drive_late(core, robot, 1.5, lambda *a: see(*a, **{missing: False}))
+    assert robot.stands
+    stated = core.settings.stops_within()["a scan or a pose is late, lost or old"]
+    assert robot.way - before <= stated
 
 
 def test_turns_away_from_what_is_ahead(make_core, robot):
@@ -158,7 +190,7 @@ def test_turns_away_from_what_is_ahead(make_core, robot):
 
 def test_a_foot_before_the_scanner_stays(settings):
     """What was near and cannot be measured any more still stops the robot."""
-    guard, angles = Guard(settings["robot"]), np.array([0.0])
+    guard, angles = Guard(settings["robot"], 0.1), np.array([0.0])
     args = 0.3, 0.0, 0.3, (0.0, 0.0, 0.0)
     guard.see(np.array([2.0]), angles)
     assert not guard.blocked(*args)
@@ -179,11 +211,11 @@ def test_a_foot_before_the_scanner_stays(settings):
 def test_the_guard_sees_what_it_would_touch(v, omega, x, y):
     """Compared with 500 places along the arc: nothing that comes nearer is missed."""
     robot = {"radius": 0.1, "stopping_distance": 0.045}
-    guard = Guard(robot)
+    guard = Guard(robot, 0.1)
     angle, away = math.atan2(y, x), math.hypot(x, y)
     guard.see(np.array([away]), np.array([angle]))
     pose, least = (0.0, 0.0, 0.0), away
-    way = 0.045 * abs(v) / 0.3
+    way = 0.045 * abs(v) / 0.3 + 0.1 * abs(v)
     for _ in range(500):
         time = way / 500 / abs(v) if v else 0.0
         half = 0.5 * omega * time
@@ -236,6 +268,37 @@ def test_waits_at_the_start(make_core, robot):
     assert "from the verified start" in command.reason
     core = Core(dataclasses.replace(far, any_start=True), Ready(forward))
     assert drive(core, robot, 0.2)[-1].state == "driving"
+
+
+def test_the_drive_is_held_until_it_is_started(make_core, robot):
+    """With `service`, nothing moves before the call; an early call begins nothing."""
+    core = make_core(start_on="service")
+    assert core.start(0.0) == (False, "no scan yet")
+    commands = drive(core, robot, 0.5)
+    assert {(c.v, c.omega, c.state) for c in commands} == {(0.0, 0.0, "waiting")}
+    assert core._policy.observations == []
+    assert "call the service start" in commands[-1].reason
+    assert core.start(robot.time - robot.dt) == (True, "the drive begins")
+    assert drive(core, robot, 0.1)[-1].state == "driving"
+    core.end("SIGTERM")
+    assert core.start(robot.time) == (False, "ended: SIGTERM")
+    with pytest.raises(SettingsError, match="start_on: expected pose or service"):
+        make_core(start_on="now")
+
+
+@pytest.mark.parametrize(
+    ("values", "got"),
+    [([], "no number"), ([None], "no number"), ([0.5], "0.5"), ([0.0], "0")],
+)
+def test_a_timer_that_is_missing_or_too_long_ends_the_drive(make_core, values, got):
+    """What the robot's driver answers may be empty, too."""
+    core = make_core()
+    core.check_timer("cmd_vel_timeout of /base", [0.3])
+    assert core.final is None
+    core.check_timer("cmd_vel_timeout of /base", values)
+    assert core.final.reason == (
+        f"cmd_vel_timeout of /base: expected above 0 and at most 0.3 s, got {got}"
+    )
 
 
 def test_a_clock_that_differs_is_named(make_core, robot):
@@ -292,6 +355,7 @@ def test_the_rays_of_the_simulated_turtlebot_are_taken(settings):
     robot = {
         "ray_angles": [math.radians(i) for i in range(360)],
         "is_scanner": True,
+        "radius": 0.105,
         "range_max": 3.5,
         "range_min": 0.12,
         "below_min": "zero",
@@ -343,6 +407,72 @@ def test_ranges_without_a_value():
     assert scanner.read([0.05, 2, 3, -inf, 5, 4])[0].tolist() == [5, 2, 3, 5, 5, 4]
 
 
+ZEROS = [slice(None), slice(0, 14), slice(None, None, 2), slice(14, 47)]
+
+
+@pytest.mark.parametrize("part", ZEROS)
+def test_zeros_that_say_nothing_are_missing(make_core, robot, part):
+    """A scanner that is covered and reads 0 stops the robot, as one that reads NaN."""
+    core = make_core()
+
+    def covered(core, robot, now):
+        reading = robot.read()
+        reading.ranges[part] = 0.0
+        core.pose(now, *reading.pose)
+        core.scan(now, robot.layout, reading.ranges)
+
+    assert drive(core, robot, 0.5)[-1].state == "driving"
+    before = robot.way
+    commands = drive(core, robot, 1.0, covered)
+    assert commands[-1].state == "stopped"
+    assert "the last scan is older" in commands[-1].reason
+    stated = core.settings.stops_within()["a scan or a pose is late, lost or old"]
+    assert robot.way - before <= stated
+
+
+@given(
+    x=st.floats(-0.15, 0.15),
+    y=st.floats(-0.15, 0.15),
+    least=st.floats(0.02, 0.3),
+)
+def test_a_zero_counts_where_something_can_be_near(x, y, least):
+    """In these directions, a point at the smallest range is outside the body."""
+    robot = {
+        "ray_angles": np.linspace(-3.0, 3.0, 40),
+        "radius": 0.22,
+        "scanner_offset": (x, y),
+        "below_min": "zero",
+        "range_min": least,
+        "range_max": 5.0,
+    }
+    for angle, near in zip(
+        robot["ray_angles"], Scanner(robot).zero_is_near, strict=True
+    ):
+        away = math.hypot(x + least * math.cos(angle), y + least * math.sin(angle))
+        assert near == (away > 0.22) or abs(away - 0.22) < 1e-9
+
+
+def test_a_wall_that_is_too_near_is_no_missing_scan(settings):
+    """A third of the rays behind the burger read 0 beside a wall: the scan counts."""
+    burger = {
+        "ray_angles": [math.radians(i) for i in range(360)],
+        "radius": 0.105,
+        "scanner_offset": (-0.032, 0.0),
+        "below_min": "zero",
+        "range_min": 0.12,
+        "range_max": 3.5,
+    }
+    scanner = Scanner(burger)
+    scanner.use(Layout(360, 0.0, math.radians(1), 0.12, 3.5))
+    ranges = np.full(360, 2.0)
+    ranges[120:240] = 0.0
+    assert scanner.read(ranges)[0].tolist() == ranges.tolist()
+    front = np.full(360, 2.0)
+    front[:40] = front[-40:] = 0.0
+    assert scanner.read(front)[0] is None
+    assert scanner.read(np.zeros(360))[0] is None
+
+
 @given(yaw=ANGLES)
 def test_yaw_of_a_quaternion(yaw):
     """The inverse of the quaternion of a yaw."""
@@ -360,6 +490,19 @@ def test_poses_compose_as_matrices(a, b):
         return np.array([[c, -s, x], [s, c, y], [0, 0, 1]])
 
     assert np.allclose(matrix(*compose(a, b)), matrix(*a) @ matrix(*b), atol=1e-8)
+
+
+def test_a_silent_localiser_is_old_although_it_stamps_ahead(make_core, robot):
+    """AMCL that was silent for 0.4 s stops the robot, if the tolerance is declared."""
+    for tolerance, state in ((1.0, "stopped"), (0.0, "driving")):
+        core = make_core()
+        see(core, robot, 10.0)
+        assert core.tick(10.0, 0.0).state == "driving"
+        for now in (10.1, 10.2, 10.3, 10.4):
+            stamp = stamp_of(now, 10.0 + 1.0, tolerance)
+            core.pose(stamp, *robot.read().pose)
+            see(core, robot, now, pose=False)
+        assert core.tick(10.4, 0.0).state == state
 
 
 @given(angle=ANGLES)

@@ -38,7 +38,7 @@ def test_export_says_what_it_wrote(tdac, run, tmp_path):
     text = " ".join(printed.out.split())
     assert "(ROS 2 package tdac_floor)" in text
     assert "not verified: the package says so" in text
-    assert "stops within 0.165 m" in text
+    assert "stops within 0.195 m" in text
     assert "the rclpy wrapper was not run" in text
     words = "export", "ros2", run, "--out", tmp_path / "b", "--unverified", "--json"
     record = json.loads(tdac(*words)[1].out)

@@ -86,6 +86,7 @@ def test_the_layout_is_that_of_ament_python(package):
     }
     ours = {"__future__", "json", "math", "pathlib", "signal", "typing"}
     assert used - ours <= depends
+    assert {"rviz2", "nav2_bringup", "nav2_velocity_smoother"} <= depends
     config = configparser.ConfigParser()
     config.read(package / "setup.cfg")
     assert config["develop"]["script_dir"] == f"$base/lib/{name}"
@@ -149,7 +150,7 @@ def test_the_map_is_that_of_the_task(package, task):
 def test_the_parameters_are_those_of_the_node(package):
     """`drive.yaml` has each parameter of the node, and no timer yet."""
     written = yaml.safe_load((package / "config" / "drive.yaml").read_text())
-    own = written["drive"]["ros__parameters"]
+    own = written["/**"]["ros__parameters"]
     scope = {}
     text = (package / "tdac_floor" / "node.py").read_text()
     begin = text.index("DEFAULTS:")
@@ -164,7 +165,16 @@ def test_the_readme_says_what_was_not_run(package):
     """Nobody can take the wrapper for tested."""
     text = (package / "README.md").read_text()
     assert NOT_RUN in text
-    assert "| a scan or a pose is late, lost or old | 0.165 |" in text
+    assert "ros2 service call /drive/start" in text
+    assert "| a scan or a pose is late, lost or old | 0.195 |" in text
+
+
+def test_the_readme_names_run_and_package_as_they_were_given(run, package):
+    """Its commands work from where the package was exported."""
+    text = (package / "README.md").read_text()
+    assert f"tdac ros sim {run} " in text
+    assert f"tdac ros drive {package}\n" in text
+    assert f"cp -r {package} " in text
 
 
 def test_what_is_not_verified_needs_a_flag(run, package, tmp_path):
