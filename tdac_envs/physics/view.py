@@ -7,6 +7,7 @@ import importlib
 import itertools
 import math
 import os
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -57,7 +58,7 @@ class View3D:
         tolerance: float,
     ) -> None:
         engine = self._engine = mujoco_module()
-        self._context = gl_context()
+        self._context = current_context()
         self._floor, self._body = scene.floor, body
         self._goal, self._tolerance = goal, tolerance
         text = drawn_model(scene, body, WIDTH, HEIGHT)
@@ -69,7 +70,11 @@ class View3D:
         self._options.geomgroup[:] = 0
         self._options.geomgroup[[mjcf.SEEN, DRAWN]] = 1
         scale = engine.mjtFontScale.mjFONTSCALE_100.value
-        self._renderer = engine.MjrContext(self._model, scale)
+        try:
+            self._renderer = engine.MjrContext(self._model, scale)
+        except engine.FatalError:  # the display was closed, and current all the same
+            self._context = another_context(self._context)
+            self._renderer = engine.MjrContext(self._model, scale)
         self._azimuth: float | None = None
         bounds = _bounds(scene, goal)
         self._inset = _inset_of(bounds)
@@ -216,6 +221,41 @@ class View3D:
         )  # fmt: skip
         scene.ngeom += 1
         return geom
+
+
+_ENDED: list[Any] = []
+"""Contexts whose display another library has closed: freeing them is an error."""
+
+
+def current_context() -> Any:
+    """The context of this process, made current.
+
+    A library that opens windows, such as SDL, may have closed the display that EGL
+    gives to all; then a new one is opened.
+
+    Raises:
+        TaskError: As for `gl_context`.
+    """
+    context = gl_context()
+    try:
+        context.make_current()
+    except Exception:  # of any kind, as below
+        return another_context(context)
+    return context
+
+
+def another_context(ended: Any) -> Any:
+    """A new context in place of one whose display was closed, made current.
+
+    Raises:
+        TaskError: As for `gl_context`.
+    """
+    _ENDED.append(ended)
+    gl_context.cache_clear()
+    module: Any = sys.modules.get("mujoco.egl")
+    if module is not None:
+        module.EGL_DISPLAY = None  # the next context opens it anew
+    return gl_context()
 
 
 @functools.cache

@@ -46,8 +46,9 @@ def test_drives_as_verified(package, settings, robot, steps, here):
     """The exported controller needs as many commands as the verified episode has."""
     worker = Worker(package / "controller", settings["controller_sha256"])
     core = Core(core_settings(settings, dead_man=0.3), worker)
-    drive(core, robot, 0.1 * steps, wait=60.0)
-    assert robot.reached
+    # On a busy machine the first plan may take some periods more.
+    last = drive(core, robot, 0.1 * (steps + 50), wait=60.0)[-1]
+    assert robot.reached, last
     assert not robot.contact
     assert core.commands == steps
     see(core, robot, robot.time)

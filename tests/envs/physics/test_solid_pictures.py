@@ -121,3 +121,14 @@ def test_without_opengl_one_line_says_what_to_install(monkeypatch):
         monkeypatch.undo()
         view.gl_context.cache_clear()
         gl_context()
+
+
+def test_a_closed_display_is_opened_again():
+    """As after another library has closed the one that EGL gives to all."""
+    egl = pytest.importorskip("mujoco.egl")
+    first = drawn("TDAC-Map2D-v0", map=EMPTY, start=(20, 30), goal=(70, 30))
+    if egl.EGL_DISPLAY is None:
+        pytest.skip("OSMesa renders here")
+    egl.EGL.eglTerminate(egl.EGL_DISPLAY)
+    again = drawn("TDAC-Map2D-v0", map=EMPTY, start=(20, 30), goal=(70, 30))
+    assert np.array_equal(first, again)
