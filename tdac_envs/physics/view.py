@@ -223,6 +223,7 @@ class View3D:
         return geom
 
 
+_TOLD = "PYOPENGL_PLATFORM"
 _ENDED: list[Any] = []
 """Contexts whose display another library has closed: freeing them is an error."""
 
@@ -271,6 +272,8 @@ def gl_context() -> Any:
         TaskError: There is neither.
     """
     wanted = os.environ.get("MUJOCO_GL", "").lower()
+    # MuJoCo tells PyOpenGL by a variable, which other processes must not inherit.
+    before = os.environ.get(_TOLD)
     reasons = []
     for place in (wanted,) if wanted in _PLACES else _PLACES:
         try:
@@ -281,6 +284,10 @@ def gl_context() -> Any:
             reasons.append(f"{place}: {' '.join(str(error).split())[:80]}")
         else:
             return context
+        finally:
+            os.environ.pop(_TOLD, None)
+            if before is not None:
+                os.environ[_TOLD] = before
     raise TaskError(
         "view '3d' needs OpenGL without a window: install libegl1 (EGL) or libosmesa6 "
         f"(OSMesa) and the package PyOpenGL ({'; '.join(reasons)})"

@@ -73,6 +73,8 @@ def _imported(folder: Path) -> Any:
     sys.dont_write_bytecode = True
     os.chdir(folder)
     sys.path.insert(0, str(folder))
+    for file in folder.glob('*.py'):  # another controller may have imported its own
+        sys.modules.pop(file.stem, None)
     spec = importlib.util.spec_from_file_location('controller', folder / 'controller.py')
     assert spec is not None
     assert spec.loader is not None

@@ -1,5 +1,9 @@
 """Promises of pictures in three dimensions: the goal, the path and things are there."""
 
+import os
+import subprocess
+import sys
+
 import gymnasium as gym
 import numpy as np
 import pytest
@@ -132,3 +136,11 @@ def test_a_closed_display_is_opened_again():
     egl.EGL.eglTerminate(egl.EGL_DISPLAY)
     again = drawn("TDAC-Map2D-v0", map=EMPTY, start=(20, 30), goal=(70, 30))
     assert np.array_equal(first, again)
+
+
+def test_the_environment_of_other_processes_stays():
+    """MuJoCo sets a variable for PyOpenGL, which is gone again."""
+    code = "import os; from tdac_envs.physics.view import gl_context; gl_context(); "
+    code += "assert 'PYOPENGL_PLATFORM' not in os.environ"
+    environment = {k: v for k, v in os.environ.items() if k != "PYOPENGL_PLATFORM"}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment)
