@@ -23,7 +23,7 @@ from tdac_agent.evaluation.replay import drive_episode
 from tdac_agent.falsify.curves import draw_curves
 from tdac_agent.falsify.falsify import SearchPlan, falsify, space_on
 from tdac_agent.problems.part import Part
-from tdac_agent.runs.falsification import Counterexample, Falsification
+from tdac_agent.runs.falsification import PICTURE, Counterexample, Falsification
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.tasks.deviation import Deviation, parsed
 from tdac_agent.tasks.deviation import words_of as deviation_words
@@ -38,7 +38,7 @@ from tdac_envs.drawing.canvas import Image
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.map2d.task import Map2DTask
 
-PICTURE, CURVES = "counterexample.png", "curves.png"
+CURVES = "curves.png"
 
 
 def run(flags: TaskFlags, options: FalsifyOptions) -> int:

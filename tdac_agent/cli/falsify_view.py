@@ -10,15 +10,14 @@ from rich.table import Table
 
 from tdac_agent.cli.console import Console
 from tdac_agent.cli.sentences import print_command, print_sentences
-from tdac_agent.runs.falsification import Direction, Envelope, Falsification
+from tdac_agent.runs.falsification import Envelope, Falsification
 from tdac_agent.runs.falsify_text import (
     NO_PROOF,
     failure_text,
     plain_text,
-    range_text,
+    rows_of,
     summary_of,
 )
-from tdac_agent.tasks.deviation import DEVIATIONS
 
 
 def show_falsification(
@@ -56,15 +55,6 @@ def _table(envelope: Envelope, found: Falsification) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     for name in ("alone", "survives", "fails at", "cause"):
         table.add_column(f"  {name}" if name == "alone" else name)
-    for part in found.space:
-        own = [each for each in envelope.directions if each.part == part]
-        if own:
-            table.add_row(f"  {DEVIATIONS[part].words}", *_cells(own, found))
+    for _, words, survived, fails, causes in rows_of(envelope, found):
+        table.add_row(f"  {words}", survived, fails or "–", causes)
     return table
-
-
-def _cells(own: Sequence[Direction], found: Falsification) -> tuple[str, str, str]:
-    fails = [each for each in own if each.fails is not None]
-    texts = ", ".join(found.value(each.part, each.fails or 0.0) for each in fails)
-    causes = dict.fromkeys(each.cause or "" for each in fails)
-    return range_text(own, found), texts or "–", ", ".join(causes)

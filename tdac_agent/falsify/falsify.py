@@ -130,8 +130,8 @@ def falsify(
         ]
         searched = drives.count
         curves = _curves(drives, points, plan)
-        found = _record(entrant, problem, plan, space, drives, envelopes, curves)
-        found = found.model_copy(update={"episodes": searched})
+        own = drives, searched, envelopes, curves
+        found = _record(entrant, problem, plan, space, *own)
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             write_atomic(out / RECORD_FILE, found.model_dump_json(indent=2) + "\n")
@@ -222,6 +222,7 @@ def _record(
     plan: SearchPlan,
     space: dict[str, float],
     drives: Drives,
+    searched: int,
     envelopes: list[Envelope],
     curves: list[Point],
 ) -> Falsification:
@@ -250,7 +251,7 @@ def _record(
         seed=plan.seed,
         physics=plan.physics,
         budget=plan.episodes,
-        episodes=drives.count,
+        episodes=searched,
         sandbox=drives.used,
         envelopes=tuple(envelopes),
         curves=tuple(curves),

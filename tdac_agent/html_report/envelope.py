@@ -6,19 +6,22 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.html_report.scene import data_address
-from tdac_agent.runs.falsification import Envelope, Falsification, read_falsification
+from tdac_agent.runs.falsification import (
+    PICTURE,
+    Envelope,
+    Falsification,
+    read_falsification,
+)
 from tdac_agent.runs.falsify_text import (
     NO_PROOF,
     failure_text,
     plain_text,
-    range_text,
+    rows_of,
     summary_of,
 )
 from tdac_agent.storage.hashes import sha256_of
-from tdac_agent.tasks.deviation import DEVIATIONS
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
-PICTURE = "counterexample.png"
 _MOST_BYTES = 16 << 20
 
 
@@ -40,17 +43,8 @@ def envelope_of(folder: Path) -> dict[str, Any] | None:
 
 
 def _world(envelope: Envelope, found: Falsification) -> dict[str, Any]:
-    rows = []
-    for part in found.space:
-        own = [each for each in envelope.directions if each.part == part]
-        if own:
-            failed = [each for each in own if each.fails is not None]
-            values = [found.value(part, each.fails or 0.0) for each in failed]
-            causes = dict.fromkeys(each.cause or "" for each in failed)
-            words, survived = DEVIATIONS[part].words, range_text(own, found)
-            rows.append((part, words, survived, ", ".join(values), ", ".join(causes)))
     plain = plain_text(envelope, found)
-    return {"number": envelope.number, "plain": plain, "rows": rows}
+    return {"number": envelope.number, "plain": plain, "rows": rows_of(envelope, found)}
 
 
 def _controller_sha256(folder: Path) -> str:

@@ -13,7 +13,7 @@ from tdac_agent.tasks.provenance import origin
 from tdac_agent.tasks.task import Task, lay_out
 from tdac_agent.tasks.units import frame_of
 from tdac_agent.verification.judge.policy_spec import PolicySpec
-from tdac_agent.verification.judge.worlds import TaskWorld
+from tdac_agent.verification.judge.worlds import TaskWorld, public_split
 from tdac_envs.core.errors import TaskError
 from tdac_envs.physics.moved import EXACT, engine_named
 
@@ -46,7 +46,8 @@ def check_physics(problem: Task | TaskSet, physics: str) -> None:
     from tdac_agent.verification.judge.set_files import write_set
     from tdac_envs.ladder.env import make
 
-    split = next(each for each in ("dev", "test", "train") if problem.count(each) != 0)
+    split = public_split(problem)
+    assert split is not None
     with tempfile.TemporaryDirectory(prefix="tdac-set-") as name:
         file = write_set(problem, Path(name) / "set.yaml")
         make(file, split=split, physics=physics)

@@ -13,7 +13,7 @@ from tdac_agent.tasks.units import Frame, Place, Units, units_in
 from tdac_agent.verification.judge.episode_row import EpisodeRow
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
-RECORD_FILE = "falsify.json"
+RECORD_FILE, PICTURE = "falsify.json", "counterexample.png"
 
 
 class Direction(StrictRecord):

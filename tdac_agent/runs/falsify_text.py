@@ -44,6 +44,22 @@ def range_text(own: Sequence[Direction], found: Falsification) -> str:
     return " to ".join(texts)
 
 
+def rows_of(
+    envelope: Envelope, found: Falsification
+) -> list[tuple[str, str, str, str, str]]:
+    """Part, words, what is survived, where it fails, and why, of each part alone."""
+    rows = []
+    for part in found.space:
+        own = [each for each in envelope.directions if each.part == part]
+        if own:
+            failed = [each for each in own if each.fails is not None]
+            values = [found.value(part, each.fails or 0.0) for each in failed]
+            causes = dict.fromkeys(each.cause or "" for each in failed)
+            words, survived = DEVIATIONS[part].words, range_text(own, found)
+            rows.append((part, words, survived, ", ".join(values), ", ".join(causes)))
+    return rows
+
+
 def _survived_alone(own: Direction, found: Falsification) -> str:
     text = found.value(own.part, own.survives)
     if own.fails is not None:
