@@ -1,11 +1,12 @@
 """Judges the runs of benchmarks.feedback_trial on hidden worlds, and makes the tables.
 
-    python -m benchmarks.feedback_tables judge RUNS OUT --salts DIR [-n 40]
-    python -m benchmarks.feedback_tables tables OUT
+    python -m benchmarks.feedback_tables judge EXPERIMENT RUNS OUT --salts DIR [-n 40]
+    python -m benchmarks.feedback_tables tables EXPERIMENT OUT
 
-`judge` drives each candidate of each run once, on the first N hidden worlds of its
-level, whose salt is DIR/LEVEL (OUT/scores.csv and OUT/worlds.csv), and the best one of
-each race on 200; it then has the best one of each arm verified (OUT/verdicts.csv).
+EXPERIMENT is `dose`, `race` or `transfer`. `judge` drives each candidate of each of its
+runs once, on the first N hidden worlds of its level, whose salt is DIR/LEVEL
+(OUT/scores.csv and OUT/worlds.csv), and the best one of each race on 200; it then has
+the best one of each arm verified (OUT/verdicts.csv). Equal files of a level drive once.
 `tables` needs these files alone.
 """
 
@@ -40,6 +41,7 @@ from benchmarks.recorded_answers import driven_on, episodes_in
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.runs.run_record import Attempt, load_run
 from tdac_agent.runs.selection_record import CandidateFigures, read_selection
+from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.verify_episodes import verify_episodes
 from tdac_envs.ladder.task_sets import load_set
@@ -48,6 +50,8 @@ PRIMARY = ("I", "A+")
 OTHERS = (("E", "A+"), ("M", "A+"), ("S", "A+"), ("I", "M"), ("I", "E"), ("S", "I"))
 """Contrasts of the dose experiment. The primary one stands alone; Holm over the others.
 A+ are fresh answers, as many as cost what the other arm cost."""
+EXPERIMENTS = {"dose": "dose-", "race": "race-", "transfer": "rules-"}
+"""How the groups of each experiment begin: each has its own salts and its own look."""
 OUTCOMES = "time_score", "success"
 OF_INTEREST = 0.03
 """Smallest difference of interest of the race over best of N, in time score."""
@@ -56,7 +60,13 @@ COPIED = 0.5
 """Share of common lines from which an answer is called a copy."""
 
 
-def judge(runs: Path, out: Path, salts: Path, worlds: int) -> None:
+def cells_of(experiment: str) -> list[Cell]:
+    """The cells of an experiment, in their order."""
+    begins = EXPERIMENTS[experiment]
+    return [cell for cell in planned() if cell.group.startswith(begins)]
+
+
+def judge(experiment: str, runs: Path, out: Path, salts: Path, worlds: int) -> None:
     """Drives all candidates on hidden worlds, and verifies the best of each cell."""
     out.mkdir(parents=True, exist_ok=True)
     known = {level: known_controllers(level) for level in ("unknown", "lost", "floor")}
@@ -64,7 +74,7 @@ def judge(runs: Path, out: Path, salts: Path, worlds: int) -> None:
     verdicts: list[dict[str, Any]] = []
     driven: list[pd.DataFrame] = []
     with WarmJudge() as warm:
-        for cell in planned():
+        for cell in cells_of(experiment):
             folder, salt = runs / cell.name, salts / cell.level
             about = facts_of(cell, folder)
             own = []
@@ -152,9 +162,8 @@ def _drive(
     """The episodes of a candidate; None if it has no file, or the tests refuse it."""
     if not file.is_file():
         return None
-    kept = out / "hidden" / level / f"{file.parent.parent.parent.parent.name}"
-    kept = kept / f"{file.parent.parent.name}-{worlds}"
     source = file.read_text(encoding="utf-8")
+    kept = out / "hidden" / level / f"{sha256_of(file.read_bytes())[:16]}-{worlds}"
     report = driven_on(source, level, worlds, salt, kept, warm)
     return None if report.refused else episodes_in(kept)
 
@@ -424,14 +433,14 @@ def costs(scores: pd.DataFrame) -> pd.DataFrame:
     return table.reset_index()
 
 
-def checked(out: Path) -> pd.DataFrame:
-    """`scores.csv`, if it has all cells of the plan.
+def checked(experiment: str, out: Path) -> pd.DataFrame:
+    """`scores.csv`, if it has all cells of an experiment.
 
     Raises:
         SystemExit: It has not, or a score is missing.
     """
     scores = pd.read_csv(out / "scores.csv")
-    missing = {cell.name for cell in planned()} - set(scores["cell"])
+    missing = {cell.name for cell in cells_of(experiment)} - set(scores["cell"])
     if missing:
         raise SystemExit(f"{len(missing)} cells have not been judged: {min(missing)} …")
     if not np.isfinite(scores[["time_score", "success", "pool", "cost"]]).all().all():
@@ -439,30 +448,47 @@ def checked(out: Path) -> pd.DataFrame:
     return scores
 
 
-def tables(out: Path) -> None:
-    """Writes all tables, as CSV and as text."""
-    scores = checked(out)
+def tables(experiment: str, out: Path) -> None:
+    """Writes the tables of an experiment, as CSV and as text, and its tests."""
+    scores = checked(experiment, out)
     verdicts = pd.read_csv(out / "verdicts.csv")
-    rounds = after_rounds(scores)
-    pairs, raced = race_pairs(scores)
-    rules, transferred = transfers(scores)
-    shown: dict[str, pd.DataFrame] = {
-        "rounds": rounds.pivot_table(
-            index=["level", "arm"], columns="round", values="time_score"
-        ).reset_index(),
-        "contrasts": pd.concat([contrasts(scores, each) for each in OUTCOMES]),
-        "by_dose": by_dose(scores),
-        "verified": verdicts.groupby(["level", "arm", "verdict"]).size().reset_index(),
-        "costs": costs(scores),
-        "pairs": pairs,
-        "transfers": rules,
-    }
+    shown, found = MAKERS[experiment](scores)
+    shown["verified"] = (
+        verdicts.groupby(["level", "arm", "verdict"]).size().reset_index(name="runs")
+    )
+    shown["costs"] = costs(scores)
     for name, table in shown.items():
         table.to_csv(out / f"{name}.csv", index=False)
         print(f"\n{name}\n{table.to_string(index=False, float_format='%.3f')}")
-    found = {"race": raced, "transfer": transferred, "dose": dose_slope(scores)}
     (out / "tests.json").write_text(json.dumps(found, indent=1) + "\n")
     print(json.dumps(found, indent=1))
+
+
+def _dose(scores: pd.DataFrame) -> tuple[dict[str, pd.DataFrame], dict[str, float]]:
+    """The tables of dose and response, and the test of its slope."""
+    rounds = after_rounds(scores).pivot_table(
+        index=["level", "arm"], columns="round", values="time_score"
+    )
+    shown = {
+        "rounds": rounds.reset_index(),
+        "contrasts": pd.concat([contrasts(scores, each) for each in OUTCOMES]),
+        "by_dose": by_dose(scores),
+    }
+    return shown, dose_slope(scores)
+
+
+def _race(scores: pd.DataFrame) -> tuple[dict[str, pd.DataFrame], dict[str, Any]]:
+    pairs, found = race_pairs(scores)
+    return {"pairs": pairs}, found
+
+
+def _transfer(scores: pd.DataFrame) -> tuple[dict[str, pd.DataFrame], dict[str, Any]]:
+    pairs, found = transfers(scores)
+    return {"transfers": pairs}, found
+
+
+MAKERS = {"dose": _dose, "race": _race, "transfer": _transfer}
+"""What makes the tables of each experiment."""
 
 
 def main() -> None:
@@ -470,17 +496,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     judging = commands.add_parser("judge")
+    judging.add_argument("experiment", choices=EXPERIMENTS)
     judging.add_argument("runs", type=Path)
     judging.add_argument("out", type=Path)
     judging.add_argument("--salts", type=Path, required=True)
     judging.add_argument("-n", type=int, default=40)
     making = commands.add_parser("tables")
+    making.add_argument("experiment", choices=EXPERIMENTS)
     making.add_argument("out", type=Path)
     options = parser.parse_args()
     if options.command == "judge":
-        judge(options.runs, options.out, options.salts, options.n)
+        judge(options.experiment, options.runs, options.out, options.salts, options.n)
     else:
-        tables(options.out)
+        tables(options.experiment, options.out)
 
 
 if __name__ == "__main__":

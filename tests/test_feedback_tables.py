@@ -10,8 +10,10 @@ import pytest
 from scipy import stats
 
 from benchmarks.feedback_tables import (
+    EXPERIMENTS,
     at_equal_cost,
     by_dose,
+    cells_of,
     contrasts,
     costs,
     differences,
@@ -22,6 +24,7 @@ from benchmarks.feedback_tables import (
     stratified_interval,
     stratified_p,
     t_interval,
+    tables,
     transfers,
 )
 from benchmarks.feedback_trial import (
@@ -214,6 +217,22 @@ def test_the_slope():
     assert found["slope"] == pytest.approx(0.05)
     assert found["p"] < 0.02
     assert dose_slope(made_up())["p"] > 0.001
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_an_experiment_has_its_own_tables(experiment, tmp_path, capsys):
+    scores = made_up()
+    named = scores["cell"].isin([cell.name for cell in cells_of(experiment)])
+    scores[named].to_csv(tmp_path / "scores.csv", index=False)
+    cells = scores[named].drop_duplicates("cell")
+    cells.assign(verdict="rejected").to_csv(tmp_path / "verdicts.csv", index=False)
+    tables(experiment, tmp_path)
+    assert "costs" in capsys.readouterr().out
+    written = {file.name for file in tmp_path.iterdir()}
+    assert {"verified.csv", "costs.csv", "tests.json"} < written
+    other = next(each for each in EXPERIMENTS if each != experiment)
+    with pytest.raises(SystemExit, match="have not been judged"):
+        tables(other, tmp_path)
 
 
 def test_other_tables():
