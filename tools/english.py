@@ -1,4 +1,4 @@
-"""Counts what makes the text of README and docs hard to read: `python -m tools.english`.
+"""Counts what makes README and docs hard to read: `python -m tools.english`.
 
 A paragraph, a list item or a cell of a table has at most `LONGEST` words. Some turns of
 phrase are correct and are read twice; how often each may still stand is in `MOST`,
@@ -26,7 +26,7 @@ PATTERNS = {
     "two semicolons": r"[^.;:!?|]+;[^.;:!?|]+;[^.;:!?|]+",
     "what is told": r"\bwhat (?:is|was) (?:told|said|found|given)\b",
 }
-MOST = {name: 0 for name in PATTERNS}
+MOST = dict.fromkeys(PATTERNS, 0)
 """How often each may stand in all pages together."""
 
 
