@@ -15,6 +15,7 @@ from tdac_agent.html_report.figures import drawn
 from tdac_agent.html_report.overview import format_seconds
 from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.html_report.set_part import set_part_of
+from tdac_agent.html_report.story import story_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import RunHistory, learner_named
@@ -30,6 +31,7 @@ from tdac_agent.runs.selection_record import asked_text
 from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.confirmation import read_confirmation
 from tdac_agent.verification.diagnosis.losses import Losses
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 from tdac_envs.ladder.frozen import BEFORE
@@ -84,6 +86,8 @@ def section_of(
         "scene": scene,
         "task_near": _near(history),
         "episodes": episodes,
+        "story": story_of(history, episodes),
+        "confirmed": read_confirmation(run) if run.confirmations else None,
         "watchable": {(e["candidate"], e["name"]): n for n, e in enumerate(episodes)},
         "most_lines": max(least, min(most, share)),
         "breakdown": _breakdown(history),
