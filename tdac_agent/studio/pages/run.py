@@ -20,6 +20,7 @@ from tdac_agent.studio.pages.layout import (
     ShownCommand,
     framed,
     report_frame,
+    say_missing,
     shown_first,
 )
 from tdac_agent.studio.pages.questions import Questions
@@ -49,11 +50,11 @@ def add(place: Path) -> None:
 
     @ui.page("/run")
     async def page(at: str = "") -> None:
-        with framed(at):
+        with framed(at or "Run", headed=False):
             folder = within(place, at)
             known = folder is not None and (folder.is_dir() or job_of(place, at))
             if folder is None or not at or not known:
-                ui.label(f"There is no run {at!r} in this folder.").classes("problem")
+                say_missing("run", at, "Runs")
                 return
             await RunPage(place, at, folder).show()
 
