@@ -13,6 +13,7 @@ from nicegui import events, ui
 
 from tdac_agent.studio.folder import FILES, keep
 from tdac_agent.studio.jobs import stop_job
+from tdac_agent.studio.pages.frames import FITTED
 from tdac_agent.studio.pages.named_parts import NAMED
 from tdac_agent.studio.pages.style import PRIMARY, STYLE
 
@@ -36,6 +37,7 @@ def framed(title: str, *, headed: bool = True) -> Generator[None]:
     """
     ui.add_css(STYLE)
     ui.add_body_html(NAMED)
+    ui.add_body_html(FITTED)
     ui.colors(primary=PRIMARY)
     ui.page_title(f"{title} – tdac studio")
     with ui.header().classes("items-center gap-4 py-2"):

@@ -102,3 +102,24 @@ def test_an_address_without_a_page_leads_back(browser, filled):
         )
     )  # fmt: skip
     assert "Nothing is at /nothing/here" in browser.page_source
+
+
+def test_a_report_has_no_scroll_bar_of_its_own(browser, filled):
+    """Its frame is as high as it is, and its links move the page around it."""
+    browser.get(filled.address)
+    WebDriverWait(browser, SECONDS).until(lambda b: "token" not in b.current_url)
+    browser.get(filled.base + PAGES["run"])
+    find = "document.querySelector('iframe.report')"
+    WebDriverWait(browser, SECONDS).until(
+        lambda b: b.execute_script(f"return ({find}?.clientHeight ?? 0) > 1500")
+    )
+    browser.switch_to.frame(browser.find_element("css selector", "iframe.report"))
+    inner = browser.execute_script(
+        "return [document.documentElement.scrollHeight, innerHeight]"
+    )
+    assert inner[0] <= inner[1] + 2
+    browser.execute_script("document.querySelector('.cell:last-child').click()")
+    browser.switch_to.default_content()
+    WebDriverWait(browser, SECONDS).until(
+        lambda b: b.execute_script("return scrollY") > 300
+    )
