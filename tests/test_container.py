@@ -24,7 +24,7 @@ def test_the_installation_works_for_another_folder(tmp_path):
         capture_output=True,
         text=True,
     )
-    assert "verified in iteration 1" in found.stdout
+    assert "✔ verified: " in found.stdout
     assert "compiling" not in found.stderr
     assert (work / "runs/maze-1/controller.py").is_file()
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 from rich.box import SIMPLE
 from rich.markup import escape
-from rich.padding import Padding
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.sentences import print_plain
+from tdac_agent.cli.run_ending import show_ending, show_next
+from tdac_agent.cli.sentences import print_indented, print_plain
 from tdac_agent.cli.set_view import show_set_report
 from tdac_agent.library.listing import resume_command
 from tdac_agent.models.budget import format_usd
@@ -21,7 +21,7 @@ from tdac_agent.runs.improvement_record import (
     is_shown,
     read_improvement,
 )
-from tdac_agent.runs.run_record import Attempt, Run, status_now
+from tdac_agent.runs.run_record import Attempt, Run
 from tdac_agent.runs.selection_record import (
     HIDDEN_FILE,
     CandidateFigures,
@@ -31,9 +31,8 @@ from tdac_agent.runs.selection_record import (
     losses_text,
 )
 from tdac_agent.tasks.task_file import SET_FILE
-from tdac_agent.verification.confirmation import CONFIRMATION_FILE, read_confirmation
 from tdac_agent.verification.episode_report import EpisodeReport
-from tdac_agent.verification.verdict import COLOURS, delivered_text, verified_text
+from tdac_agent.verification.verdict import COLOURS
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 
@@ -43,30 +42,10 @@ def show_run(run: Run, console: Console) -> None:
     search = read_improvement(folder) if run.improve else None
     if run.attempts:
         console.print(_attempts(run, search))
-    status = status_now(run, before=False)
     if run.passed and run.status != "budget":
-        ending = f"[bold {COLOURS.get(status, 'yellow')}]{status}[/] "
-        ending += f"{delivered_text(run)}, "
-        if search is not None and search.selected != search.first:
-            ending += f"improved in iteration {search.k}, "
-        ending += f"{run.seconds:.1f} s: {escape(str(run.controller))}"
-        console.print(ending, soft_wrap=True)
-        confirmation = read_confirmation(run) if run.confirmations else None
-        if confirmation is not None:
-            _print_indented(console, verified_text(confirmation))
-        if search is not None:
-            _print_indented(console, search.told)
-        if run.reason and search is not None:
-            _print_indented(console, f"the search ended early: {run.reason}")
-        if run.status == "passed" and not run.confirmations:
-            words = ["tdac", "verify", str(folder)]
-            print_plain(console, f"  not verified yet: {shlex.join(words)}")
-        _print_indented(console, usage)
-        names = ("report.json", CONFIRMATION_FILE, "trajectory.png")
-        evidence = [str(folder / name) for name in names if (folder / name).is_file()]
-        print_plain(console, f"  evidence: {', '.join(evidence)}")
-        drive = shlex.join(["tdac", "play", str(folder), "--video", "drive.mp4"])
-        print_plain(console, f"  watch it drive: {drive}")
+        show_ending(run, search, console)
+        print_indented(console, usage)
+        show_next(run, console)
     elif run.status == "budget":
         print_budget_end(run, console)
     else:
@@ -74,21 +53,15 @@ def show_run(run: Run, console: Console) -> None:
         ending = f"[bold red]not verified[/] after {times}; "
         attempts = escape(str(folder / "iterations"))
         console.print(f"{ending}the attempts are in {attempts}", soft_wrap=True)
-        _print_indented(console, usage)
+        print_indented(console, usage)
 
 
 def print_budget_end(run: Run, console: Console) -> None:
     """Prints that the budget ended a run, and how to continue it."""
     console.print(f"[bold yellow]stopped by the budget[/]: {escape(run.reason)}")
-    _print_indented(console, usage_of(run))
-    _print_indented(console, run.outlook)
+    print_indented(console, usage_of(run))
+    print_indented(console, run.outlook)
     print_plain(console, f"  to continue: {resume_command(run)}")
-
-
-def _print_indented(console: Console, text: str) -> None:
-    """Prints a wrapped sentence below the line that it belongs to, unless empty."""
-    if text:
-        console.print(Padding(escape(text), (0, 0, 0, 2)))
 
 
 def usage_of(run: Run) -> str:

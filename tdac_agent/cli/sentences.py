@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Sequence
 
 from rich.markup import escape
+from rich.padding import Padding
 from rich.text import Text
 
 from tdac_agent.cli.console import Console
@@ -28,6 +29,12 @@ def print_sentences(
         if console.is_terminal:
             text = folded(text, console.width, indent or 2)
         console.print(Text(text, style), soft_wrap=True)
+
+
+def print_indented(console: Console, text: str) -> None:
+    """Prints a wrapped sentence below the line that it belongs to, unless empty."""
+    if text:
+        console.print(Padding(escape(text), (0, 0, 0, 2)))
 
 
 def print_plain(console: Console, text: str) -> None:

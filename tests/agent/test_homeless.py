@@ -71,7 +71,7 @@ def test_a_run_is_made_verified_and_reported(homeless, place):
     """Nothing is asked of a home; said of it is that no secret can be stored there."""
     place.chmod(0o777)
     for words, told, secrets in (
-        (["synth"], "verified in iteration", 1),
+        (["synth"], "✔ verified: ", 1),
         (["verify", "runs/maze-1"], "verified: 41 of 41", 1),
         (["report", "runs"], "1 verified", 0),
     ):

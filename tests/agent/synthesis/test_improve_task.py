@@ -366,8 +366,8 @@ def test_the_command_improves_a_task(tdac, done, tmp_path, good_source):
     assert out.count(said) == 2  # before the variations, and in the table
     assert re.search(r"improving: \d+ variations?, \d of them passed; ", out)
     assert (found.k, found.j) == (best.k, best.j) != (1, 0)
-    assert f"), improved in iteration {best.k}, " in out
-    assert f"verified in iteration {best.k} (" in out
+    assert f"; improved in iteration {best.k}" in out
+    assert f"in iteration {best.k} (" in out
     listed = tdac("runs", ".")[1]
     assert f"1/20 +{found.asked}" in listed
     assert "k: iterations begun / allowed, + variations of what works" in listed

@@ -1,0 +1,83 @@
+"""The last lines of a run with a controller: verdict, file, and what to do next."""
+
+from __future__ import annotations
+
+import shlex
+
+from rich.markup import escape
+
+from tdac_agent.cli.console import Console
+from tdac_agent.cli.sentences import print_indented, print_plain
+from tdac_agent.runs.improvement_record import TaskImprovement
+from tdac_agent.runs.run_record import Run, status_now
+from tdac_agent.verification.confirmation import CONFIRMATION_FILE, read_confirmation
+from tdac_agent.verification.verdict import COLOURS, delivered_text, verified_text
+from tdac_agent.verification.verify import report_in
+
+
+def show_ending(run: Run, search: TaskImprovement | None, console: Console) -> None:
+    """Prints the verdict on a run's controller, and the next commands.
+
+    Args:
+        run: A run with a controller that passed all tests.
+        search: What its search for improvements brought, if it had one.
+        console: Where to print.
+    """
+    status = status_now(run, before=False)
+    mark = "✔ " if status in {"verified", "passed"} else ""
+    colour = COLOURS.get(status, "yellow")
+    console.print(
+        f"[bold {colour}]{mark}{status}[/]{escape(_shown(run))} → "
+        f"{escape(str(run.controller))}",
+        soft_wrap=True,
+        highlight=False,
+    )
+    how = f"{delivered_text(run)}, {run.seconds:.1f} s"
+    if search is not None and search.selected != search.first:
+        how += f"; improved in iteration {search.k}"
+    print_indented(console, how)
+    confirmation = read_confirmation(run) if run.confirmations else None
+    if confirmation is not None:
+        print_indented(console, verified_text(confirmation))
+    if search is not None:
+        print_indented(console, search.told)
+    if run.reason and search is not None:
+        print_indented(console, f"the search ended early: {run.reason}")
+
+
+def show_next(run: Run, console: Console) -> None:
+    """Prints the commands that show the controller of a run, and the files on it."""
+    folder = str(run.folder)
+    if run.status == "passed" and not run.confirmations:
+        print_plain(console, f"  not verified yet: {_command('verify', folder)}")
+    names = ("report.json", CONFIRMATION_FILE, "trajectory.png")
+    evidence = [str(run.folder / name) for name in names if _is_there(run, name)]
+    print_plain(
+        console, f"  see it: {_command('play', folder, '--video', 'drive.mp4')}"
+    )
+    print_plain(console, f"  the story: {_command('report', folder)}")
+    print_plain(console, f"  evidence: {', '.join(evidence)}")
+
+
+def _is_there(run: Run, name: str) -> bool:
+    return (run.folder / name).is_file()
+
+
+def _command(*words: str) -> str:
+    return shlex.join(["tdac", *words])
+
+
+def _shown(run: Run) -> str:
+    """What the verdict rests on, such as `: 41 of 41 tests, 93 of 93 blind drives`."""
+    parts = []
+    report = report_in(run.folder, {})
+    if report is not None:
+        tests = report.verdict
+        parts.append(f"{tests.passed_tests} of {tests.expected} tests")
+    confirmation = read_confirmation(run) if run.confirmations else None
+    if confirmation is not None:
+        count = f"{confirmation.successes} of {confirmation.count}"
+        parts.append(f"{count} blind drives arrive")
+    elif report is not None:
+        parts.append(f"sandbox {report.provenance.sandbox}")
+    return f": {', '.join(parts)}" if parts else ""
