@@ -16,8 +16,8 @@
 #                     after an interruption it goes on.
 #   make docs         The site, in build/site, with its links checked and its notebooks run.
 #   make linkcheck    Links to other sites; needs a network.
-#   make lint         Style, types, import rules, circles of imports, long modules, and reads
-#                     of files that bypass the safe reader.
+#   make lint         Style, types, import rules, circles of imports, long modules, reads of
+#                     files that bypass the safe reader, and long paragraphs of the docs.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -77,6 +77,7 @@ lint: $(VENV)/.lint-installed
 	$(BIN)/lint-imports
 	$(BIN)/python -m tools.sizes >/dev/null
 	$(BIN)/python -m tools.raw_reads
+	$(BIN)/python -m tools.english
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)

@@ -22,6 +22,9 @@ include_patterns = [
     "docs/**.md",
     "notebooks/*.ipynb",
     "results/**/README.md",
+    "results/feedback/PLAN.md",
+    "results/ladder/BEFORE.md",
+    "results/mutation*.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
 ]

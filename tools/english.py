@@ -38,10 +38,9 @@ def main() -> int:
     pages = {path: blocks(path.read_text("utf-8")) for path in _pages()}
     where = {name: list(_places(pages, name)) for name in PATTERNS}
     where["long"] = [
-        f"{path.relative_to(ROOT)}:{line}: {count} words: {text[:60]} …"
-        for path, own in pages.items()
-        for line, text in own
-        if (count := len(text.split())) > LONGEST
+        f"{path.relative_to(ROOT)}:{line}: {len(text.split())} words: {text[:60]} …"
+        for path in pages
+        for line, text in long_blocks(path.read_text("utf-8"))
     ]
     for place in where.get(chosen, ()):
         print(place)
@@ -100,8 +99,14 @@ def blocks(text: str) -> list[tuple[int, str]]:
     return [(line, _plain(" ".join(parts))) for line, parts in found]
 
 
+def long_blocks(text: str) -> list[tuple[int, str]]:
+    """The `blocks` of a page that have more than `LONGEST` words."""
+    return [block for block in blocks(text) if len(block[1].split()) > LONGEST]
+
+
 def _plain(text: str) -> str:
-    """Text without inline code and the addresses of links."""
+    """Text without the mark of an item, inline code and the addresses of links."""
+    text = re.sub(r"^(?:[-*+]|\d+\.)\s+", "", text)
     text = re.sub(r"`[^`]*`", "code", text)
     return re.sub(r"\]\([^)]*\)", "]", text).strip()
 
