@@ -78,6 +78,8 @@ def make_page(place: Path) -> Page:
             unreadable.append(str(error).replace(str(folder), name))
     if not runs:
         raise RunError(unreadable[0])
+    # What needs a look comes first; the order is else that of the names.
+    runs.sort(key=lambda one: one[1].run.verified)
     details, scenes = _details(runs)
     histories = [one for _, one in runs]
     html = rendered(
@@ -126,7 +128,8 @@ def _details(
     size = 0
     for number, (name, history) in enumerate(runs, 1):
         scene = _scene(history, scenes)
-        section = template.render(section_of(history, number, name, scene))
+        values = section_of(history, number, name, scene, len(runs))
+        section = template.render(values)
         size += len(section)
         if details and size > MOST_BYTES:
             break
