@@ -78,8 +78,8 @@ def make_page(place: Path) -> Page:
             unreadable.append(str(error).replace(str(folder), name))
     if not runs:
         raise RunError(unreadable[0])
-    # What needs a look comes first; the order is else that of the names.
-    runs.sort(key=lambda one: one[1].run.verified)
+    # What needs a look comes first, each in the order of the names.
+    runs.sort(key=lambda one: (one[1].run.verified, one[1].run.passed))
     details, scenes = _details(runs)
     histories = [one for _, one in runs]
     html = rendered(
