@@ -158,6 +158,7 @@ def test_observations_are_in_their_space(name, options):
             assert item in env.observation_space
 
 
+@pytest.mark.slow_after(13)
 @variants
 def test_a_pickle_goes_on_where_the_env_was(name, options):
     env = gym.make(name, **options)

@@ -33,6 +33,7 @@ def make(name, options, *wrappers):
     return wrap(gym.make(name, **options), wrappers)
 
 
+@pytest.mark.slow_after(3)
 @both
 @pytest.mark.parametrize(
     "wrappers",
