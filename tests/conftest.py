@@ -77,7 +77,10 @@ def _set_up_hypothesis() -> None:
         raise pytest.UsageError(message) from error
     # How long an example takes says more of the machine's other work than of the code.
     settings.register_profile(
-        "calm", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+        "calm",
+        deadline=None,
+        max_examples=50,
+        suppress_health_check=[HealthCheck.too_slow],
     )
     settings.load_profile("calm")
 
