@@ -43,11 +43,12 @@ TOPICS: dict[str, tuple[type, Qos]] = {
     "odom": (msg.Odometry, STATE),
     "tf": (msg.TFMessage, TRANSFORMS),
     "tf_static": (msg.TFMessage, LATCHED),
+    "amcl_pose": (msg.PoseWithCovarianceStamped, LATCHED),
     "clock": (msg.Clock, NEWEST),
     "cmd_vel": (msg.Twist, STATE),
 }
 """Topics of a drive; their quality of service is that of ROS 2's profiles for sensor
-data, odometry, tf, the clock and commands."""
+data, odometry, tf, AMCL, the clock and commands."""
 
 
 class Bus:

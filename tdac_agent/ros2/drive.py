@@ -30,12 +30,12 @@ from tdac_agent.ros2.package.ending import send_last
 from tdac_agent.storage.files import read_inside
 from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_json
 
-TOGETHER, MISSING = 0.5, 0.05
+TOGETHER, MISSING = 1.0, 0.05
 """Longest wait for scan and pose of a tick of the clock, s of the wall clock; the same
 after a tick that had none."""
 SHARE = 0.6
 """Share of a period in which the controller may answer in real time."""
-ANSWER = 1.0
+ANSWER = 2.0
 """Longest wait for an answer in simulated time, s of the wall clock."""
 CLOCK_STANDS = 10.0
 """Time after which a clock that stands still ends the drive, s of the wall clock."""
@@ -158,7 +158,8 @@ class Node:
         self.dt = settings.dt
         self._package, self._bus, self._say = package, bus, say
         self._sim_time, self._origin = sim_time, origin
-        self._in = {name: bus.reader(name) for name in ("scan", "odom", "tf", "clock")}
+        names = ("scan", "odom", "tf", "amcl_pose", "clock")
+        self._in = {name: bus.reader(name) for name in names}
         self._out = bus.writer("cmd_vel")
         self._frames: dict[str, tuple[str, tuple[float, float, float]]] = {}
         self._said = ""
@@ -180,7 +181,11 @@ class Node:
                     self.core.end("out of time")
         finally:
             last = self.core.end("the node was told to end")
-            send_last(self._send, last, PERIODS * self.dt)
+            try:
+                send_last(self._send, last, PERIODS * self.dt)
+            except KeyboardInterrupt:  # a second signal ends it at once
+                self._send(last)
+                raise
         return last
 
     def _tick(self) -> None:
@@ -229,7 +234,11 @@ class Node:
                 pose = self._package.motion.compose(
                     self._origin, self._pose_of(message.pose.pose, "position")
                 )
+                self.core.localised(_variances(message))
                 self.core.pose(seconds_of(message.header.stamp), *pose)
+        for message in self._in["amcl_pose"].take():
+            if self._origin is None:
+                self.core.localised(_variances(message))
         for message in self._in["scan"].take():
             layout = self._package.scans.Layout(
                 len(message.ranges),
@@ -266,8 +275,16 @@ class Node:
             twist = msg.TwistStamped(
                 msg.Header(time_of(max(now, 0.0)), "base_link"), twist
             )
-        self._out.write(twist)
+        # By this time of the sample a simulation knows which tick it answers.
+        tick = round(max(self._clock, 0.0) * 1e9) + 1 if self._sim_time else None
+        self._out.write(twist, tick)
         text = f"{command.state}: {command.reason}".rstrip(": ")
         if text != self._said:
             self._said = text
             self._say(text)
+
+
+def _variances(message: Any) -> tuple[float, float, float]:
+    """Variances of x, y and yaw of a message with a pose and its covariance."""
+    own = message.pose.covariance
+    return own[0], own[7], own[35]

@@ -66,15 +66,14 @@ def robot_of(task, settings):
 
 
 def test_as_many_commands_as_verified(task, settings, package, steps, domain):
-    """In simulated time, a drive has the steps of the verified episode, or one off."""
+    """In simulated time, a drive has the steps of the verified episode."""
     with NodeProcess(package, domain) as node:
         simulator = Simulator(robot_of(task, settings), Bus(domain), patience=30.0)
         report = simulator.run(60.0)
         printed = node.output()
     assert report.outcome == "reached"
     assert report.commands == report.steps
-    # On a busy machine the node may see the start, or the goal, one tick longer.
-    assert abs(report.steps - steps) <= 1
+    assert report.steps == steps
     assert report.stops == 0
     assert "reached: the goal" in printed
     assert node.process.returncode == 0
@@ -89,7 +88,7 @@ def test_the_pose_from_odometry(task, settings, package, steps, domain):
         bus = Bus(domain, stamped=True)
         report = Simulator(robot_of(task, settings), bus, patience=30.0).run(60.0)
     assert report.outcome == "reached"
-    assert abs(report.steps - steps) <= 1
+    assert report.steps == steps
 
 
 @pytest.mark.slow
@@ -118,9 +117,9 @@ def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, ki
 
 
 @pytest.mark.slow_after(1)
-@pytest.mark.parametrize("kind", ["pose-jump", "some-nan", "second-publisher"])
+@pytest.mark.parametrize("kind", ["some-nan", "second-publisher"])
 def test_no_fault_leads_to_a_contact(task, settings, package, domain, kind):
-    """A wrong pose, missing ranges, a second publisher: the goal without a contact."""
+    """Missing ranges, a second publisher: the goal without a contact."""
     with NodeProcess(package, domain):
         simulator = Simulator(
             robot_of(task, settings),
