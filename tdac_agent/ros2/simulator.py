@@ -191,7 +191,9 @@ class Simulator:
         late answer to an earlier tick is not taken for that of this one. The drive then
         has the commands of the verified episode, however slow the machine is.
         """
-        end = time.monotonic() + (self._patience if self._is_patient else IMPATIENCE)
+        begins = not self._moves and self._bus.publishers("cmd_vel") > 0
+        is_patient = self._is_patient or begins
+        end = time.monotonic() + (self._patience if is_patient else IMPATIENCE)
         again = time.monotonic() + REPEAT
         while True:
             if self._take():
