@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 import importlib
 import math
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -30,6 +31,10 @@ from tdac_agent.ros2.package.ending import send_last
 from tdac_agent.storage.files import read_inside
 from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_json
 
+OURS = "tdac_agent.ros2.package"
+"""The package of the modules that are exported."""
+MOST_FRAMES = 100
+"""Most frames of tf that are kept; a robot and its map have fewer."""
 TOGETHER, MISSING = 1.0, 0.05
 """Longest wait for scan and pose of a tick of the clock, s of the wall clock; the same
 after a tick that had none."""
@@ -63,7 +68,11 @@ class Opened:
 
 
 def open_package(folder: Path, *, trust: bool = False) -> Opened:
-    """Imports the modules of a package, which run with the rights of this process.
+    """The modules of a package, which run with the rights of this process.
+
+    Those of a package that this installation exported are the same as tdac's own, byte
+    for byte, and tdac's own are taken: nothing else in its folder runs but the
+    controller, whose folder the mark covers.
 
     Args:
         folder: Folder of the package.
@@ -76,6 +85,8 @@ def open_package(folder: Path, *, trust: bool = False) -> Opened:
         text = read_inside(folder, f"{CONTROLLER}/{SETTINGS}", TEXT_BYTES)
         settings = parse_json(text)
         name = settings["package"]
+        if re.fullmatch(r"[a-z][a-z0-9_]*", name) is None:
+            raise ValueError("package: expected the name of a package")
     except FileNotFoundError:
         raise RunError(
             f"{folder} is not a package of tdac export ros2: it has no "
@@ -83,22 +94,25 @@ def open_package(folder: Path, *, trust: bool = False) -> Opened:
         ) from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise RunError(f"{folder}: {CONTROLLER}/{SETTINGS}: {error}") from None
-    if not trust and not is_own(folder, str(name)):
+    if is_own(folder, name):
+        return Opened(folder, settings, *_modules(OURS))
+    if not trust:
         raise RunError(
             f"{folder} was not exported by this installation, or was changed since: "
             "its code would run with your rights; read it, then give --trust"
         )
     sys.path.insert(0, str(folder.resolve()))
     try:
-        found = [
-            importlib.import_module(f"{name}.{part}")
-            for part in ("core", "motion", "scans", "worker")
-        ]
+        return Opened(folder, settings, *_modules(name))
     except ImportError as error:
         raise RunError(f"{folder}: cannot import its modules: {error}") from None
     finally:
         sys.path.pop(0)
-    return Opened(folder, settings, *found)
+
+
+def _modules(package: str) -> list[ModuleType]:
+    parts = "core", "motion", "scans", "worker"
+    return [importlib.import_module(f"{package}.{part}") for part in parts]
 
 
 def is_own(folder: Path, name: str) -> bool:
@@ -173,8 +187,8 @@ class Node:
         """
         end = math.inf if seconds is None else time.monotonic() + seconds
         self._end = end
-        self._send(self._package.core.Command(0.0, 0.0, "waiting"))
         try:
+            self._send(self._package.core.Command(0.0, 0.0, "waiting"))
             while self.core.final is None:
                 self._tick()
                 if time.monotonic() > end:
@@ -252,6 +266,9 @@ class Node:
     def _place(self, each: Any) -> None:
         """Takes a transform; the pose is map to odom to base_link."""
         pose = self._pose_of(each.transform, "translation")
+        is_new = each.child_frame_id not in self._frames
+        if is_new and len(self._frames) >= MOST_FRAMES:
+            self._frames.clear()
         self._frames[each.child_frame_id] = each.header.frame_id, pose
         if each.child_frame_id == "base_link" and self._origin is None:
             parent, own = self._frames["base_link"]
