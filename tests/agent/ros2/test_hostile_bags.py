@@ -93,7 +93,7 @@ def test_a_chunk_that_unpacks_to_much(tmp_path, kind):
     path = tmp_path / "bomb.mcap"
     path.write_bytes(chunk(kind, packed_zeros(kind), len(ZEROS) * TIMES))
     assert path.stat().st_size < 10_000_000
-    refused(path, "needs more than 0.7 GB of memory")
+    refused(path, "needs more than 0.7 GB of memory|Failed to resize buffer")
 
 
 def test_a_chunk_that_declares_much(tmp_path):
@@ -147,7 +147,8 @@ def test_metadata_that_is_none(bag, tmp_path, kind):
             empty.truncate(10**9)
     else:
         nested = "".join(
-            f"a{i + 1}: &a{i + 1} [{', '.join(['*a%d' % i] * 9)}]\n" for i in range(9)
+            f"a{i + 1}: &a{i + 1} [" + ", ".join([f"*a{i}"] * 9) + "]\n"
+            for i in range(9)
         )
         text = {"bomb": f"a0: &a0 [x]\n{nested}", "list": "[1, 2]\n", "empty": ""}
         file.write_text(text[kind])
