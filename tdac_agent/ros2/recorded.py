@@ -36,6 +36,8 @@ SAME = 1e-3
 """Largest difference of equal commands, as a share of the full speeds."""
 APART = 5.0
 """Stamps that differ more from the times of recording are of another clock, s."""
+MOST = 1e6
+"""Number below which places (m), speeds (m/s) and turn rates (rad/s) are."""
 REACH = 1.0
 """Farthest obstacle of which a gap is computed, m."""
 MOST_SHOWN = 10
@@ -72,7 +74,7 @@ class RecordedReport:
         same: How many of them are the controller's.
         stood: How many are zero where the controller would have driven.
         differences: The first of the others.
-        different: Number of the others, with those that are not finite.
+        different: Number of the others, with those that are not finite or huge.
         stops: How often the commands stopped the robot on the way.
         stopped: How long, s.
         way: Driven path by the poses, m.
@@ -286,7 +288,7 @@ class _Drive:
                 return
 
     def _pose(self, stamp: float, pose: Pose) -> None:
-        if not all(map(math.isfinite, pose)):
+        if not all(abs(each) < MOST for each in pose):
             return
         self._core.pose(stamp, *pose)
         if self._began is not None:
@@ -298,7 +300,7 @@ class _Drive:
 
     def _command(self, v: float, omega: float) -> None:
         """Compares a command; before the first motion there are none."""
-        if not (math.isfinite(v) and math.isfinite(omega)):
+        if not (abs(v) < MOST and abs(omega) < MOST):
             self._impossible += 1
             return
         if self._began is None and v == omega == 0.0:

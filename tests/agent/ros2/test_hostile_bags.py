@@ -207,7 +207,8 @@ def test_numbers_that_are_none(bag, run, task, tmp_path, value):
         elif number % 7 == 1 and each.topic == "/tf":
             message.transforms[0].transform.translation.x = value
         elif number % 7 == 2 and each.topic == "/scan":
-            message.ranges[:] = value
+            ranges = [max(min(value, 3e38), -3e38)] * len(message.ranges)
+            message.ranges = np.array(ranges, np.float32)
         elif number % 7 == 3 and each.topic == "/tf":
             message.transforms[0].transform.rotation.w = value
 
