@@ -2,6 +2,7 @@
 
     python -m benchmarks.agreement plan OUT      # the pairs of controller and problem
     python -m benchmarks.agreement drive OUT     # in three arms; goes on where it was
+    python -m benchmarks.agreement drive OUT --part 1 --parts 2    # of two processes
     python -m benchmarks.agreement irsim OUT     # map controllers in ir-sim
     python -m benchmarks.agreement tables OUT    # from the rows alone
 
@@ -33,6 +34,7 @@ from tdac_envs.ladder.env import make
 from tdac_envs.ladder.task_sets import TaskSet
 from tdac_envs.map2d.carried import metres_of
 from tdac_envs.map2d.env import Map2DEnv
+from tdac_envs.mapping.bundled import bundled_maps
 from tdac_envs.physics.moved import EXACT, MUJOCO
 
 EPISODES = 4
@@ -43,7 +45,9 @@ ARMS = {
     "nudged": (EXACT, NUDGE),
     "there": (MUJOCO, Deviation()),
 }
-PAIRS, ROWS = "pairs.csv", "episodes.csv"
+PAIRS, ROWS, IRSIM_ROWS = "pairs.csv", "episodes.csv", "irsim.csv"
+IRSIM_EPISODES = 3
+IRSIM_FIELDS = "pair", "number", "outcome", "steps", "error"
 PAIR_FIELDS = (
     *("pair", "controller", "family", "kind", "problem", "is_level", "sha256"),
     *("radius", "speed", "metres"),
@@ -91,31 +95,32 @@ def robot_of(problem: Task | TaskSet) -> dict[str, float]:
     }
 
 
-def drive(
-    out: Path,
-    only: str = "",
-    split: str = "test",
-    first: int = 0,
-    arms: Sequence[str] = tuple(ARMS),
-) -> None:
-    """Drives what has no rows yet, in a drawn order."""
+def drive(out: Path, only: str = "", part: int = 0, parts: int = 1) -> None:
+    """Drives what has no rows yet, in a drawn order.
+
+    Args:
+        out: Folder of the results.
+        only: Part of the names of the pairs.
+        part: Number of this process, from 0, of those that work at the same time.
+        parts: Their number.
+    """
     file = out / ROWS
-    before = {(row["pair"], row["arm"]) for row in read(file)}
+    pairs = all_pairs()
+    random.Random(SEED).shuffle(pairs)
     with WarmJudge() as judge:
-        pairs = all_pairs()
-        random.Random(SEED).shuffle(pairs)
-        for pair in pairs:
-            missing = [arm for arm in arms if (pair.name, arm) not in before]
+        for pair in pairs[part::parts]:
+            before = {row["arm"] for row in read(file) if row["pair"] == pair.name}
+            missing = [arm for arm in ARMS if arm not in before]
             if only in pair.name and missing:
                 began = time.monotonic()
-                rows = drive_pair(pair, missing, judge, split, first)
+                rows = drive_pair(pair, missing, judge)
                 append(file, ROW_FIELDS, rows)
                 said = {arm: _arrivals(rows, arm) for arm in missing}
                 print(pair.name, said, f"{time.monotonic() - began:.0f} s", flush=True)
 
 
 def drive_pair(
-    pair: Pair, arms: Sequence[str], judge: WarmJudge, split: str, first: int
+    pair: Pair, arms: Sequence[str], judge: WarmJudge
 ) -> list[dict[str, Any]]:
     """The rows of some arms of a pair."""
     problem = pair.opened()
@@ -123,10 +128,10 @@ def drive_pair(
     found = []
     for arm in arms:
         physics, deviation = ARMS[arm]
-        numbers = range(first, first + EPISODES)
+        numbers = range(EPISODES)
         cases = [Case(number=number, deviation=deviation) for number in numbers]
         with Drives(
-            entrant, problem, split if pair.is_level else "", len(cases),
+            entrant, problem, "test" if pair.is_level else "", len(cases),
             {"kind": "agreement"}, "auto", None, judge, physics=physics,
         ) as drives:  # fmt: skip
             rows = drives.drive(cases[:1], JITTER)
@@ -137,6 +142,45 @@ def drive_pair(
             assert row is not None
             found.append({"pair": pair.name, "arm": arm, **figures(row, number)})
     return found
+
+
+def drive_irsim(out: Path, only: str = "") -> None:
+    """Drives controllers for maps in ir-sim, where they have no rows yet."""
+    from benchmarks.irsim_drive import rollouts
+
+    file = out / IRSIM_ROWS
+    before = {row["pair"] for row in read(file)}
+    pairs = [pair for pair in all_pairs() if fits_irsim(pair)]
+    random.Random(SEED).shuffle(pairs)
+    for pair in pairs:
+        if only not in pair.name or pair.name in before:
+            continue
+        problem, rows = pair.opened(), []
+        numbers = range(IRSIM_EPISODES)
+        split = "test" if pair.is_level else ""
+        for rollout in rollouts(pair.entrant(problem), problem, numbers, split):
+            rows.append(
+                {
+                    "pair": pair.name,
+                    "number": rollout.name,
+                    "outcome": rollout.outcome,
+                    "steps": rollout.trajectory.steps,
+                    "error": (rollout.error or "")[:120].replace("\n", " "),
+                }
+            )
+            if not rollout.reached:
+                break
+        append(file, IRSIM_FIELDS, rows)
+        print(pair.name, [row["outcome"] for row in rows], flush=True)
+
+
+def fits_irsim(pair: Pair) -> bool:
+    """Whether the robot has exact ranges on a map, and no neural network drives."""
+    if pair.kind == "learned":
+        return False
+    if pair.is_level:
+        return pair.problem in {"known", "unknown"}
+    return pair.problem in bundled_maps()
 
 
 def figures(row: EpisodeRow, number: int) -> dict[str, Any]:
@@ -189,14 +233,16 @@ def _write(file: Path, names: Sequence[str], rows: Sequence[dict[str, Any]]) -> 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.agreement")
     commands = parser.add_subparsers(required=True)
-    for name, run in (("plan", plan), ("drive", drive), ("tables", written)):
+    runs = {"plan": plan, "drive": drive, "irsim": drive_irsim, "tables": written}
+    for name, run in runs.items():
         command = commands.add_parser(name)
         command.add_argument("out", type=Path)
         command.set_defaults(run=run)
+        if name in {"drive", "irsim"}:
+            command.add_argument("--only", default="", help="part of a pair's name")
         if name == "drive":
-            command.add_argument("--only", default="")
-            command.add_argument("--split", default="test")
-            command.add_argument("--first", type=int, default=0)
+            command.add_argument("--part", type=int, default=0)
+            command.add_argument("--parts", type=int, default=1)
     options = vars(parser.parse_args())
     run = options.pop("run")
     run(**options)
