@@ -64,7 +64,7 @@ class Pair:
     def entrant(self, problem: Task | TaskSet) -> Entrant:
         """The controller, ready to drive on its problem."""
         if self.source is None:
-            return prepared(fitted(entrant_of(self.word), problem), problem)[0]
+            return prepared(fitted(entrant_of(self.word, ours=()), problem), problem)[0]
         code = self.source.encode()
         own = Entrant(
             self.name, PolicySpec("controller"), sha256_of(code), "controller"

@@ -203,9 +203,7 @@ def rollouts(
             place = folder / f"controller-{number}"
             place.mkdir()
             source = entrant.source
-            if source is None:
-                assert entrant.policy.file is not None
-                source = entrant.policy.file.read_bytes()
+            assert source is not None
             worlds.supply(_Folder(place), number, Program(source))  # type: ignore[arg-type]
             record: Record = worlds.record(number)
             record.env = InIrSim(record.env)
