@@ -44,7 +44,7 @@ def animations(
         A dict per episode for the player: candidate, its label, name, and what
         `encoded` returns.
     """
-    entries = [(one, *pair) for one in history.tried for pair in _episodes(one)]
+    entries = [(one, *pair) for one in history.tried for pair in recorded_episodes(one)]
     most = shares([each[-1] for each in entries])
     return [
         {
@@ -129,7 +129,7 @@ def _movers(
     return encoded
 
 
-def _episodes(one: CandidateHistory) -> Iterator[tuple[Episode, Trajectory]]:
+def recorded_episodes(one: CandidateHistory) -> Iterator[tuple[Episode, Trajectory]]:
     """The episodes of a candidate that have a stored trajectory."""
     if one.report is None:
         return
