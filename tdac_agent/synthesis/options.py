@@ -140,11 +140,12 @@ class SynthOptions:
         "--confirm/--no-confirm",
         scope="task",
     )
-    physics: Literal["exact", "mujoco"] = option(
+    physics: Literal["exact", "mujoco", "mujoco-varied"] = option(
         "exact",
         "Another physics that drives what arrives again, for a second opinion in the "
-        "report (extra `physics`); exact for none.",
-        metavar="exact|mujoco",
+        "report (extra `physics`); exact for none. mujoco-varied varies mass, "
+        "friction, axle and wheels a little.",
+        metavar="exact|mujoco|mujoco-varied",
         scope="task",
         recorded=False,
     )
