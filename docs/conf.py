@@ -44,7 +44,11 @@ nitpicky = True
 nitpick_ignore_regex = [("py:.*", r".*")]
 # The page of the API also has what needs this extra, which is large.
 autodoc_mock_imports = ["stable_baselines3"]
-autodoc_typehints = "none"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented_params"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+python_use_unqualified_type_names = True
 autodoc_member_order = "bysource"
 napoleon_use_ivar = True
 
