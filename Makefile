@@ -28,6 +28,9 @@ SAMPLE ?= 1
 # After a crash, a new process would wait for ever for the files of the old one.
 PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
+# Tests start hundreds of interpreters; without its cache, each compiles all that it imports.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: synth test test-all slow slow-sample lint bench portability clients results-rl \
 	docs linkcheck clean
 

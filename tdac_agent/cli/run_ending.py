@@ -11,8 +11,8 @@ from tdac_agent.cli.sentences import print_indented, print_plain
 from tdac_agent.runs.improvement_record import TaskImprovement
 from tdac_agent.runs.run_record import Run, status_now
 from tdac_agent.verification.confirmation import CONFIRMATION_FILE, read_confirmation
+from tdac_agent.verification.evidence import evidence_of
 from tdac_agent.verification.verdict import COLOURS, delivered_text, verified_text
-from tdac_agent.verification.verify import report_in
 
 
 def show_ending(run: Run, search: TaskImprovement | None, console: Console) -> None:
@@ -25,9 +25,10 @@ def show_ending(run: Run, search: TaskImprovement | None, console: Console) -> N
     """
     status = status_now(run, before=False)
     mark = "✔ " if status in {"verified", "passed"} else ""
-    colour = COLOURS.get(status, "yellow")
+    colour, evidence = COLOURS.get(status, "yellow"), evidence_of(run)
+    shown = f": {evidence}" if evidence else ""
     console.print(
-        f"[bold {colour}]{mark}{status}[/]{escape(_shown(run))} → "
+        f"[bold {colour}]{mark}{status}[/]{escape(shown)} → "
         f"{escape(str(run.controller))}",
         soft_wrap=True,
         highlight=False,
@@ -65,19 +66,3 @@ def _is_there(run: Run, name: str) -> bool:
 
 def _command(*words: str) -> str:
     return shlex.join(["tdac", *words])
-
-
-def _shown(run: Run) -> str:
-    """What the verdict rests on, such as `: 41 of 41 tests, 93 of 93 blind drives`."""
-    parts = []
-    report = report_in(run.folder, {})
-    if report is not None:
-        tests = report.verdict
-        parts.append(f"{tests.passed_tests} of {tests.expected} tests")
-    confirmation = read_confirmation(run) if run.confirmations else None
-    if confirmation is not None:
-        count = f"{confirmation.successes} of {confirmation.count}"
-        parts.append(f"{count} blind drives arrive")
-    elif report is not None:
-        parts.append(f"sandbox {report.provenance.sandbox}")
-    return f": {', '.join(parts)}" if parts else ""

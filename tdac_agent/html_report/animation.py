@@ -29,6 +29,8 @@ TOLERANCE = 0.5
 RAD = 20.0
 """Distance that a heading error of one rad counts as, px."""
 MOST_POINTS = 400
+NOMINAL = "nominal"
+"""Name of the episode from the start of the task."""
 ALL_POINTS = 60_000
 """Maximum number of points of all episodes of a run together."""
 ALL_MOVER_POINTS = 60_000
@@ -36,15 +38,26 @@ ALL_MOVER_POINTS = 60_000
 
 
 def animations(
-    history: RunHistory, task: Task, scene: TaskPicture
+    history: RunHistory, task: Task, scene: TaskPicture, *, brief: bool = False
 ) -> list[dict[str, Any]]:
     """Encodes the recorded episodes of all candidates of a run.
+
+    Args:
+        history: The run.
+        task: Its task.
+        scene: The picture on which they are shown.
+        brief: Whether to leave out drives from other starts that reach the goal.
 
     Returns:
         A dict per episode for the player: candidate, its label, name, and what
         `encoded` returns.
     """
-    entries = [(one, *pair) for one in history.tried for pair in _episodes(one)]
+    entries = [
+        (one, *pair)
+        for one in history.tried
+        for pair in _episodes(one)
+        if not brief or pair[0].outcome != "reached" or pair[0].name == NOMINAL
+    ]
     most = shares([each[-1] for each in entries])
     return [
         {

@@ -51,6 +51,23 @@ def count_changes(diff: str) -> tuple[int, int]:
     return marks.count("+"), marks.count("-")
 
 
+def is_new_file(diff: str) -> bool:
+    """Whether a unified diff is that of a file without an earlier version."""
+    return "\n@@ -0,0 " in diff[:80]
+
+
+def is_rewritten(diff: str, source: str) -> bool:
+    """Whether a change kept less than half of the file.
+
+    Args:
+        diff: Unified diff from the file before.
+        source: The file after it.
+    """
+    added, removed = count_changes(diff)
+    before = len(source.splitlines()) - added + removed
+    return added > 0 and 2 * removed > before
+
+
 def _block(tag: str, lines: list[str]) -> Markup:
     text = escape("\n".join(line[:MOST_LINE] for line in lines))
     return Markup("<{0}>{1}</{0}>").format(Markup(tag), text)

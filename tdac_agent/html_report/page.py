@@ -13,7 +13,13 @@ import jinja2
 from markupsafe import Markup
 
 from tdac_agent.errors import RunError
-from tdac_agent.html_report.code import count_changes, highlighted, shown_diff
+from tdac_agent.html_report.code import (
+    count_changes,
+    highlighted,
+    is_new_file,
+    is_rewritten,
+    shown_diff,
+)
 from tdac_agent.html_report.names import candidate_name
 from tdac_agent.html_report.overview import format_seconds, overview_of
 from tdac_agent.html_report.scene import TaskPicture, scene_of
@@ -26,6 +32,7 @@ from tdac_agent.runs.history import RunHistory, gather_run, learner_named, run_f
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.verification.diagnosis.gap import gap_figure, gap_text, too_close_text
 from tdac_agent.verification.diagnosis.second_opinion import opinion_text
+from tdac_agent.verification.verdict import not_covered
 
 MOST_BYTES = 24 << 20
 """Limit for the details of all runs; further runs are only listed."""
@@ -71,6 +78,8 @@ def make_page(place: Path) -> Page:
             unreadable.append(str(error).replace(str(folder), name))
     if not runs:
         raise RunError(unreadable[0])
+    # What needs a look comes first, each in the order of the names.
+    runs.sort(key=lambda one: (one[1].run.verified, one[1].run.passed))
     details, scenes = _details(runs)
     histories = [one for _, one in runs]
     html = rendered(
@@ -119,7 +128,8 @@ def _details(
     size = 0
     for number, (name, history) in enumerate(runs, 1):
         scene = _scene(history, scenes)
-        section = template.render(section_of(history, number, name, scene))
+        values = section_of(history, number, name, scene, len(runs))
+        section = template.render(values)
         size += len(section)
         if details and size > MOST_BYTES:
             break
@@ -168,6 +178,9 @@ def _environment() -> jinja2.Environment:
         "opinion_text": opinion_text,
         "too_close_text": too_close_text,
         "learner": learner_named,
+        "new_file": is_new_file,
+        "not_covered": not_covered,
+        "rewritten": is_rewritten,
         "python": highlighted,
         "shortened": shortened,
         "test": short_test,

@@ -15,6 +15,7 @@ from tdac_agent.html_report.figures import drawn
 from tdac_agent.html_report.overview import format_seconds
 from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.html_report.set_part import set_part_of
+from tdac_agent.html_report.story import story_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import RunHistory, learner_named
@@ -30,12 +31,17 @@ from tdac_agent.runs.selection_record import asked_text
 from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
+from tdac_agent.verification.confirmation import read_confirmation
 from tdac_agent.verification.diagnosis.losses import Losses
 from tdac_agent.verification.diagnosis.report import Diagnosis, Report
 from tdac_envs.ladder.frozen import BEFORE
 
 DIFF_LINES = (100, 600)
 ALL_DIFF_LINES = 20_000
+NEW_LINES = 40
+"""Of a new file; all of it stands below, if it was delivered."""
+FEW = 4
+"""Runs of a page that are shown with everything."""
 MOST_ROWS = 60
 """Limit for the table of failed tests."""
 
@@ -56,7 +62,11 @@ class FailureGroup:
 
 
 def section_of(
-    history: RunHistory, number: int, name: str, scene: tuple[str, TaskPicture] | None
+    history: RunHistory,
+    number: int,
+    name: str,
+    scene: tuple[str, TaskPicture] | None,
+    runs: int = 1,
 ) -> dict[str, Any]:
     """Collects the values for the template of a run.
 
@@ -65,14 +75,17 @@ def section_of(
         number: Number of its section in the page, from 1.
         name: Displayed name of its folder.
         scene: Key of its task's scene in the page, and the scene.
+        runs: Runs of the page. With more than `FEW`, each is shorter: figures of time
+            and coloured code are in the report on the run alone.
     """
     run, report = history.run, history.report
     least, most = DIFF_LINES
-    share = ALL_DIFF_LINES // max(1, len(history.tried))
+    brief = runs > FEW
+    share = ALL_DIFF_LINES // max(1, len(history.tried) * runs)
     iterations = itertools.groupby(history.tried, key=lambda one: one.k)
     episodes = []
     if scene is not None and history.task is not None:
-        episodes = animations(history, history.task, scene[1])
+        episodes = animations(history, history.task, scene[1], brief=brief)
     return {
         "number": number,
         "name": name,
@@ -84,9 +97,13 @@ def section_of(
         "scene": scene,
         "task_near": _near(history),
         "episodes": episodes,
+        "story": story_of(history, episodes),
+        "confirmed": read_confirmation(run) if run.confirmations else None,
         "watchable": {(e["candidate"], e["name"]): n for n, e in enumerate(episodes)},
         "most_lines": max(least, min(most, share)),
-        "breakdown": _breakdown(history),
+        "most_new": NEW_LINES,
+        "brief": brief,
+        "breakdown": None if brief else _breakdown(history),
         "seconds": format_seconds(run.seconds),
         "spent": spent(history),
         "origin": _origin(history),

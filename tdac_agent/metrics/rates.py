@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
-from tdac_agent.metrics.frames import RunFrames, iterations_of
+
+if TYPE_CHECKING:
+    # Slow to import, and no report on episodes needs it.
+    import pandas as pd
+
+    from tdac_agent.metrics.frames import RunFrames
 
 RESAMPLES = 9_999
 ASSUMPTIONS = {
@@ -71,6 +76,8 @@ def success_rate(frames: RunFrames, *, invalid: bool = False, seed: int = 0) -> 
             not the paper's formula, but some of its figures count this way.
         seed: Seed of the resampling.
     """
+    from tdac_agent.metrics.frames import iterations_of
+
     iterations = iterations_of(frames.candidates)
     return _over_runs(iterations[iterations["valid"] | invalid], seed)
 

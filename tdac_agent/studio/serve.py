@@ -23,6 +23,7 @@ from tdac_agent.studio.pages import (
     home,
     run,
     run_list,
+    unknown,
     worlds,
 )
 from tdac_agent.studio.session import SessionCheck
@@ -99,9 +100,12 @@ def _application(place: Path) -> fastapi.FastAPI:
     disconnected.add(application, place)
     for page in (bench, compare, home, run, run_list, worlds):
         page.add(place)
+    unknown.add()
     ui.run_with(
         application,
         title="tdac studio",
+        language="en-US",
+        dark=None,  # as the browser prefers
         message_history_length=MOST_MESSAGES,
         show_welcome_message=False,
     )

@@ -42,6 +42,7 @@ def test_mutants_are_of_their_kind():
         assert {original.profile for original in originals} == {"paper", "policy"}
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("seed", range(6))
 def test_drawn_worlds_are_what_their_files_say(seed):
     """Our reader finds them, and our distances agree with the sampled outlines."""

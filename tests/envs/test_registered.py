@@ -132,6 +132,7 @@ def test_without_a_window_gymnasium_says_what_to_install(name, monkeypatch):
     check_env(env, skip_render_check=True)
 
 
+@pytest.mark.slow_after(13)
 @variants
 def test_stable_baselines_has_nothing_to_say(name, options):
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
@@ -150,6 +151,7 @@ def test_equal_seeds_give_equal_rollouts(name, options):
         assert all(map(same, first, again))
 
 
+@pytest.mark.slow_after(13)
 @variants
 def test_observations_are_in_their_space(name, options):
     env = gym.make(name, **options)
@@ -158,6 +160,7 @@ def test_observations_are_in_their_space(name, options):
             assert item in env.observation_space
 
 
+@pytest.mark.slow_after(13)
 @variants
 def test_a_pickle_goes_on_where_the_env_was(name, options):
     env = gym.make(name, **options)

@@ -14,7 +14,7 @@
     button.addEventListener("click", () => {
       const place = `run-${button.dataset.run}`;
       players.get(place).show(Number(button.dataset.episode), true);
-      document.getElementById(`watch-${button.dataset.run}`).scrollIntoView();
+      goTo(document.getElementById(`watch-${button.dataset.run}`));
     });
   }
   addEventListener("hashchange", reveal);
@@ -23,18 +23,32 @@
     cell.addEventListener("click", () => unfold(cell.hash));
   }
   reveal();
-  if (location.hash === "#play" && players.size) {
-    // `scrollIntoView` would also scroll the page around a frame.
-    scrollTo(0, document.querySelector(".player").getBoundingClientRect().top);
-    [...players.values()][0].play();
-  }
+  if (location.hash === "#play" && players.size) [...players.values()][0].play();
+  if (parent !== window) fitFrame();
 
   function read(id) {
     return JSON.parse(document.getElementById(id).textContent);
   }
 
+  // A page around this one makes its frame as high as this page, and scrolls to where
+  // this page goes: the frame has no rights, and cannot be measured from outside.
+  function fitFrame() {
+    document.documentElement.classList.add("framed");
+    const height = () => Math.ceil(document.body.getBoundingClientRect().height);
+    new ResizeObserver(() => tell({ height: height() })).observe(document.body);
+  }
+
+  function goTo(element) {
+    if (parent === window) element.scrollIntoView();
+    else setTimeout(() => tell({ at: element.getBoundingClientRect().top }), 50);
+  }
+
+  function tell(about) {
+    parent.postMessage({ tdac: about }, "*");
+  }
+
   function reveal() {
-    if (unfold(location.hash)) document.querySelector(location.hash).scrollIntoView();
+    if (unfold(location.hash)) goTo(document.querySelector(location.hash));
   }
 
   function unfold(hash) {

@@ -21,6 +21,8 @@ from tdac_agent.studio.pages.layout import (
     address_of,
     file_frame,
     framed,
+    heading,
+    say_missing,
     shown_first,
     status_badge,
 )
@@ -58,11 +60,11 @@ def add(place: Path) -> None:
 
     @ui.page("/bench")
     async def bench(at: str = "") -> None:
-        with framed(at or "Bench"):
+        with framed(at or "Bench", headed=False):
             folder = within(place, at)
             made = folder is not None and (folder / PAGE).is_file()
             if folder is None or not at or not (made or bench_job(place, at)):
-                ui.label(f"There is no bench {at!r} in this folder.").classes("problem")
+                say_missing("bench", at, "Benches")
                 return
             await BenchPage(place, at, folder).show()
 
@@ -79,7 +81,7 @@ class BenchForm:
 
     def show(self) -> None:
         """Builds the form."""
-        ui.label("New bench").classes("text-lg font-bold")
+        heading("New bench")
         ui.label(
             "Controllers, classical planners and learned policies drive on the same "
             "worlds, and are compared."
@@ -234,7 +236,7 @@ def show_benches(place: Path, title: str) -> None:
     names = {*folders_with(place, RESULTS), *begun}
     if not names:
         return
-    ui.label(title).classes("text-lg font-bold")
+    heading(title)
     for name in sorted(names):
         job = begun.get(name)
         with ui.row().classes("items-center gap-3"):

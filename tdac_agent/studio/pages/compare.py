@@ -22,7 +22,9 @@ from tdac_agent.studio.folder import within
 from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
+    heading,
     report_frame,
+    say_missing,
     shown_first,
 )
 
@@ -35,18 +37,18 @@ def add(place: Path) -> None:
 
     @ui.page("/compare")
     async def compare(one: str = "", other: str = "") -> None:
-        with framed("Two runs"):
+        with framed("Two runs", headed=False):
             runs = {}
             for at in (one, other):
                 folder = within(place, at)
                 if folder is None or not (folder / RUN_FILE).is_file():
-                    ui.label(f"There is no run {at!r} here.").classes("problem")
+                    say_missing("run", at, "Runs")
                     return
                 runs[at] = folder
+            heading("Two runs", 1)
             if len(runs) < 2:
                 ui.label("Choose two different runs.").classes("problem")
                 return
-            ui.label("Two runs").classes("text-xl font-bold")
             await shown_first()
             await _show(list(runs), list(runs.values()))
 
@@ -61,14 +63,14 @@ async def _show(names: Sequence[str], folders: Sequence[Path]) -> None:
     _show_table(names, figures)
     different = [line for line in settings if line[1] != line[2]]
     same = [line for line in settings if line[1] == line[2]]
-    ui.label("Settings").classes("text-lg font-bold")
+    heading("Settings")
     if different:
         _show_table(names, different)
     with ui.expansion(f"{len(same)} settings are the same").classes("w-full"):
         _show_table(names, same)
-    ui.label("Controllers").classes("text-lg font-bold")
+    heading("Controllers")
     await _show_difference(names, folders)
-    ui.label("Reports").classes("text-lg font-bold")
+    heading("Reports")
     with ui.element("div").classes("w-full grid grid-cols-1 lg:grid-cols-2 gap-3"):
         for at, folder in zip(names, folders, strict=True):
             with ui.column().classes("gap-1 min-w-0"):
@@ -104,4 +106,4 @@ async def _show_difference(names: Sequence[str], folders: Sequence[Path]) -> Non
             "alone (+)."
         ).classes("note")
         text = shown_diff(diff, MOST_LINES)  # with all that was in the files escaped
-        ui.html(text, sanitize=False, tag="pre").classes("diff")
+        ui.html(text, sanitize=False, tag="pre").classes("diff").props("tabindex=0")

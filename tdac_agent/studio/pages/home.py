@@ -28,6 +28,7 @@ from tdac_agent.studio.pages.layout import (
     ShownCommand,
     address_of,
     framed,
+    heading,
     shown_first,
 )
 from tdac_agent.studio.pages.overlay import overlay
@@ -84,7 +85,7 @@ class StartPage:
         with ui.element("div").classes("choosing"):
             with ui.column().classes("min-w-0 gap-3"):
                 self._source = SourceChoice(self._place, source, obstacles, self._open)
-                ui.label("2. Start and goal").classes("text-lg font-bold")
+                heading("2. Start and goal")
                 self._form = TaskForm(
                     self._typed, self._resized, self._named, self._move, self._shrink
                 )
@@ -97,7 +98,7 @@ class StartPage:
             await self._take(task, robot)
 
     def _build_start(self) -> None:
-        ui.label("3. Who writes").classes("text-lg font-bold")
+        heading("3. Who writes")
         self._writers = Writers(self._place, self._refresh_command, on_task=True)
         self._go = ui.button("Write and verify a controller", on_click=self._begin)
         self._go.disable()

@@ -13,74 +13,10 @@ from nicegui import events, ui
 
 from tdac_agent.studio.folder import FILES, keep
 from tdac_agent.studio.jobs import stop_job
+from tdac_agent.studio.pages.frames import FITTED
+from tdac_agent.studio.pages.named_parts import NAMED
+from tdac_agent.studio.pages.style import PRIMARY, STYLE
 
-STYLE = """
-body { font-family: system-ui, sans-serif; background: #f6f6f3; color: #23262e; }
-.q-header { background: #23262e; }
-.nicegui-content { max-width: 1500px; margin: 0 auto; width: 100%; }
-code.command { display: block; background: #eceae3; padding: .6em .8em;
-  border-radius: 6px; white-space: pre-wrap; overflow-wrap: anywhere;
-  font-size: .85rem; width: 100%; }
-code.command span { display: inline-block; max-width: 100%; }
-.board { width: 100%; border: 1px solid #d4d2c8; border-radius: 6px; overflow: hidden; }
-.board img { width: 100%; cursor: crosshair; }
-.choosing { display: grid; gap: 1.5rem; width: 100%; }
-@media (min-width: 1024px) {
-  .choosing { grid-template-columns: 26rem minmax(0, 1fr); }
-  .beside { position: sticky; top: 4rem; align-self: start;
-    --room: (100vh - 9rem); } /* height for the map */
-}
-@media (max-width: 1023px) {
-  .choosing { grid-template-columns: minmax(0, 1fr); }
-  .beside { order: -1; --room: 55vh; }
-  /* What was found is in sight while the map above it is clicked. */
-  .found { position: sticky; bottom: 0; z-index: 2; padding: .4em 0; width: 100%;
-    background: #f6f6f3; border-top: 1px solid #d4d2c8; }
-}
-.world { width: min(100%, 78vh); }
-.problem { color: #a3280f; } .fine { color: #12694a; } .note { color: #5d6068; }
-iframe.report { border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
-  height: 82vh; background: white; }
-.status { border-radius: 999px; padding: .1em .7em; font-weight: 600;
-  background: #e4e2da; }
-.status.verified, .status.trained, .status.finished { background: #cfe9dc; }
-.status.passed { background: #cfe6ec; }
-.status.selected { background: #dcdcf3; }
-.status.running { background: #d6e4f5; }
-.status.not-verified, .status.not-finished { background: #f4d9d2; }
-.q-uploader { width: 100%; max-width: 32rem; border: 2px dashed #bdbab0;
-  border-radius: 8px; background: none; }
-.q-uploader:hover, .q-uploader:focus-within { border-color: #1d5fae; }
-.q-uploader__header { background: none; color: #3d4048; border-radius: 0; }
-.q-uploader__header-content { position: relative; }
-.q-uploader__title { font-size: .9rem; font-weight: 500; line-height: 1.4;
-  white-space: normal; }
-.q-uploader__subtitle, .q-uploader__list { display: none; }
-/* A click anywhere opens the choice of a file. */
-.q-uploader .q-btn, .q-uploader .q-btn .q-btn__content { position: static; }
-.q-uploader__input { inset: 0; width: 100%; height: 100%; }
-td a { color: #1d5fae; }
-.compared { width: 100%; border-collapse: collapse; background: white;
-  font-size: .9rem; }
-.compared td, .compared th { text-align: left; vertical-align: top; padding: .3em .6em;
-  border-bottom: 1px solid #e4e2da; overflow-wrap: anywhere; width: 35%; }
-.compared td:first-child, .compared th:first-child { width: 1.6em; font-weight: 700;
-  color: #a3280f; padding-right: 0; }
-.compared td:nth-child(2) { color: #5d6068; width: auto; }
-.compared .differs { background: #fbf0da; } .compared .differs td { font-weight: 600; }
-.diff { background: white; border: 1px solid #d4d2c8; border-radius: 6px; width: 100%;
-  margin: 0; padding: .6em 0; overflow: auto; max-height: 36rem; font-size: .8rem; }
-.diff > * { display: block; padding: 0 .8em; width: max-content; min-width: 100%;
-  text-decoration: none; }
-.diff ins { background: #e3f5ec; color: #075e3d; }
-.diff del { background: #fcebe4; color: #9a2c05; }
-.diff b { color: #6a61b8; background: #f2f1fa; font-weight: 400; }
-#lost:not([hidden]) { position: fixed; inset: auto 0 0 0; z-index: 9999;
-  padding: .8em 1.2em; background: #a3280f; color: white; overflow-wrap: anywhere; }
-#popup { display: none; } /* NiceGUI's own word about it */
-pre.output { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .8rem;
-  max-height: 16rem; overflow: auto; width: 100%; margin: 0; }
-"""
 PATIENCE = 120.0
 """Seconds that a browser may need to show a page."""
 LINKS = {
@@ -92,16 +28,47 @@ LINKS = {
 
 
 @contextmanager
-def framed(title: str) -> Generator[None]:
-    """The frame of a page, with links to the others."""
+def framed(title: str, *, headed: bool = True) -> Generator[None]:
+    """The frame of a page, with links to the others.
+
+    Args:
+        title: What the page is about.
+        headed: Whether the title stands as a heading; otherwise the page has its own.
+    """
     ui.add_css(STYLE)
+    ui.add_body_html(NAMED)
+    ui.add_body_html(FITTED)
+    ui.colors(primary=PRIMARY)
     ui.page_title(f"{title} – tdac studio")
     with ui.header().classes("items-center gap-4 py-2"):
         ui.label("tdac studio").classes("text-lg font-bold max-sm:hidden")
         for name, address in LINKS.items():
-            ui.link(name, address).classes("text-white no-underline")
+            link = ui.link(name, address)
+            if name == title:
+                link.props("aria-current=page")
     with ui.column().classes("w-full gap-3 px-1"):
+        if headed:
+            heading(title, 1)
         yield
+
+
+def heading(text: str, level: int = 2) -> None:
+    """A heading, of level 1 for what the page is about."""
+    ui.html(escape(text), sanitize=False, tag=f"h{level}")
+
+
+def say_missing(kind: str, at: str, page: str) -> None:
+    """Says that there is no such thing in the folder, with a way back.
+
+    Args:
+        kind: What it would be, such as `run`.
+        at: Its path from the address.
+        page: The page of `LINKS` that lists what there is.
+    """
+    heading(f"There is no {kind} {at!r}" if at else f"No {kind} is chosen", 1)
+    with ui.row().classes("items-baseline gap-1"):
+        ui.label("It may have been moved or deleted.")
+        ui.link(f"To all {kind}s", LINKS[page])
 
 
 async def shown_first() -> None:
@@ -175,7 +142,7 @@ class JobPage:
 
     def _build_heading(self) -> None:
         with ui.row().classes("w-full items-center gap-3"):
-            ui.label(self._at).classes("text-xl font-bold")
+            heading(self._at, 1)
             self._badge = ui.label()
             self._now = ui.label().classes("note").props("role=status")
 

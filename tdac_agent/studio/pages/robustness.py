@@ -10,6 +10,7 @@ from nicegui import ui
 from tdac_agent.studio.folder import STATE, as_word, made_within
 from tdac_agent.studio.jobs import job_of, start, stop_job
 from tdac_agent.studio.pages.films import show_film
+from tdac_agent.studio.pages.layout import heading
 from tdac_agent.studio.run_status import readable_run
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_envs.core.intake import RECORD_BYTES, read_file
@@ -30,7 +31,7 @@ class Robustness:
         self._place, self._at, self._seen = place, at, ""
         self._out = f"{STATE}/robust/{at.replace('/', '-')}"
         with ui.card().classes("w-full") as self._card:
-            ui.label("Robustness").classes("font-bold")
+            heading("Robustness")
             with ui.row().classes("items-center"):
                 self._count = ui.number("disturbed episodes", value=EPISODES, min=1)
                 self._go = ui.button("Measure", on_click=self._begin)

@@ -20,6 +20,7 @@ from tdac_agent.studio.pages.layout import (
     ShownCommand,
     framed,
     report_frame,
+    say_missing,
     shown_first,
 )
 from tdac_agent.studio.pages.questions import Questions
@@ -34,6 +35,7 @@ from tdac_agent.studio.run_status import (
     progress_of,
     readable_run,
 )
+from tdac_agent.verification.evidence import evidence_of, failed_last
 from tdac_envs.core.errors import TdacError
 
 ELSEWHERE = "{}: its verdict is only what its files claim."
@@ -49,11 +51,11 @@ def add(place: Path) -> None:
 
     @ui.page("/run")
     async def page(at: str = "") -> None:
-        with framed(at):
+        with framed(at or "Run", headed=False):
             folder = within(place, at)
             known = folder is not None and (folder.is_dir() or job_of(place, at))
             if folder is None or not at or not known:
-                ui.label(f"There is no run {at!r} in this folder.").classes("problem")
+                say_missing("run", at, "Runs")
                 return
             await RunPage(place, at, folder).show()
 
@@ -233,6 +235,11 @@ def _remarks(state: RunState, job: StudioJob | None) -> Iterator[tuple[str, bool
         yield failed, True
     if state.status == "selected":
         yield SELECTED, False
+    elif state.run and not state.run.on_set and not state.running:
+        run = state.run
+        told = evidence_of(run) if run.passed else failed_last(run)
+        if told:
+            yield f"{told[0].upper()}{told[1:]}", not run.passed
     if state.run and (remark := from_elsewhere(state.run)):
         yield ELSEWHERE.format(remark), False
     if not state.running and not state.row and job is not None:

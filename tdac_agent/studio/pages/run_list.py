@@ -21,7 +21,9 @@ from tdac_agent.studio.pages.bench import show_benches
 from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
+    heading,
     report_frame,
+    say_missing,
     shown_first,
 )
 from tdac_envs.core.intake import read_zip
@@ -40,14 +42,14 @@ COLUMNS = [
 # On a narrow page each run is a card, so that no column is hidden.
 CARDS = """
 .runs tbody tr { display: grid; grid-template-columns: 2.6rem 1fr 1fr; padding: .5rem;
-  border-bottom: 1px solid #e4e2da; }
+  border-bottom: 1px solid var(--idle); }
 .runs thead { display: none; }
 .runs tbody td { border: none; height: auto; padding: .15rem .3rem;
   white-space: normal; overflow-wrap: anywhere; }
 .runs tbody td:nth-child(1) { grid-row: 1 / 5; }
 .runs tbody td:nth-child(2) { grid-column: 2 / 4; font-weight: 600; }
 .runs tbody td:nth-child(n+3)::before { position: static; display: block;
-  background: none; font-size: .75rem; color: #5d6068; }
+  background: none; font-size: .75rem; color: var(--soft); }
 """ + "".join(
     f'.runs tbody td:nth-child({number})::before {{ content: "{column["label"]}"; }}\n'
     for number, column in enumerate(COLUMNS[1:], 3)
@@ -69,12 +71,12 @@ def add(place: Path) -> None:
 
     @ui.page("/campaign")
     async def campaign(at: str = "") -> None:
-        with framed(at or "Campaign"):
+        with framed(at or "Campaign", headed=False):
             folder = within(place, at)
             if folder is None or not (folder / CONFIG_FILE).is_file():
-                ui.label(f"There is no campaign {at!r} here.").classes("problem")
+                say_missing("campaign", at, "Runs")
                 return
-            ui.label(at).classes("text-xl font-bold")
+            heading(at, 1)
             report_frame(at, str(time.time_ns()))
 
 
@@ -211,12 +213,12 @@ def _show_others(place: Path, at_work: list[StudioJob]) -> None:
     """Campaigns and benches, and commands that still run."""
     campaigns = folders_with(place, CONFIG_FILE)
     if campaigns:
-        ui.label("Campaigns").classes("text-lg font-bold")
+        heading("Campaigns")
     for at in campaigns:
         ui.link(at, address_of("/campaign", at))
     show_benches(place, "Benches")
     if at_work:
-        ui.label("Running now").classes("text-lg font-bold")
+        heading("Running now")
     for job in at_work:
         with ui.row().classes("items-center"):
             page = {"synth": "/run", "bench": "/bench"}.get(job.file.words[0])
@@ -236,7 +238,7 @@ def _show_upload(place: Path) -> None:
             return
         ui.navigate.to(address_of("/run", str(folder.relative_to(place))))
 
-    ui.label("A run from elsewhere").classes("text-lg font-bold")
+    heading("A run from elsewhere")
     ui.label(
         "A run folder as a .zip file is shown as data: nothing in it runs unless you "
         "continue it and agree to what it asks for."

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from nicegui import events, ui
 
-from tdac_agent.studio.pages.layout import keep_upload
+from tdac_agent.studio.pages.layout import heading, keep_upload
 from tdac_agent.studio.sources import OWN, is_source, source_of, sources_in
 
 MOST_BYTES = 64 << 20
@@ -45,7 +45,7 @@ class SourceChoice:
     ) -> None:
         self._place, self._opened = place, opened
         ui.add_body_html(DROP)
-        ui.label("1. Map or world").classes("text-lg font-bold")
+        heading("1. Map or world")
         options = sources_in(place)
         if source not in options:
             options.append(source)

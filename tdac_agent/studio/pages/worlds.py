@@ -22,6 +22,7 @@ from tdac_agent.studio.pages.layout import (
     ShownCommand,
     address_of,
     framed,
+    heading,
     shown_first,
 )
 from tdac_agent.studio.pages.writers import Writers
@@ -82,6 +83,7 @@ class WorldsPage:
         self._about = ui.label().classes("note text-sm")
         with ui.row().classes("w-full gap-6 items-start"):
             self._image = ui.interactive_image().classes("board world")
+            self._image.props('alt="The world with its shortest path"')
             with ui.column().classes("gap-3 w-80"):
                 self._facts = ui.column().classes("gap-0")
                 self._build_driving()
@@ -93,13 +95,13 @@ class WorldsPage:
         await self._open()
 
     def _build_driving(self) -> None:
-        ui.label("Drive it yourself").classes("font-bold")
+        heading("Drive it yourself")
         self._keys = ui.label(KEYS).classes("note text-sm")
         ui.button("Drive", on_click=self._begin_drive).props("outline")
         self._status = ui.label().props("role=status")
 
     def _build_use(self) -> None:
-        ui.label("Use it").classes("font-bold")
+        heading("Use it")
         self._one_map = ui.button(on_click=self._as_map).props("outline no-caps")
         self._one_map.bind_enabled_from(
             self._name, "value", lambda name: name != "epuck"
@@ -108,7 +110,7 @@ class WorldsPage:
         ui.button(whole, on_click=self._ask_writer).props("outline no-caps")
 
     def _build_watching(self) -> None:
-        ui.label("Watch two policies on this world").classes("text-lg font-bold")
+        heading("Watch two policies on this world")
         options = ["builtin", *planner_names(), *policies_in(self._place)]
         with ui.row().classes("items-end gap-3"):
             self._one = ui.select(options, value="builtin", label="left").classes(
@@ -211,9 +213,7 @@ class WorldsPage:
         folder = free_folder(name, self._place)
         self._timer.deactivate()  # no robot drives behind the question
         with ui.dialog(value=True) as dialog, ui.card().classes("w-[40rem] max-w-full"):
-            ui.label(f"A controller for all worlds of {name}").classes(
-                "text-lg font-bold"
-            )
+            heading(f"A controller for all worlds of {name}")
             ui.label(
                 "Candidates drive on worlds of the split dev: half of the episodes are "
                 "for tests, half for the selection. 128 episodes take minutes."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -165,6 +166,14 @@ _OURS: dict[str, Callable[[PolicySpec, JudgedEnv, int], Driver]] = {
     "follow-waypoints": lambda _, env, __: WaypointDriver(env),
     "sb3": _learned,
 }
+
+
+def load(policy: PolicySpec) -> None:
+    """Imports what the drivers of a policy need, for all processes that are forked."""
+    if policy.kind == "sb3":
+        # Without it, the driver of an episode tells what to install.
+        with suppress(ImportError):
+            import stable_baselines3.common.policies  # noqa: F401
 
 
 def driver_of(policy: PolicySpec, env: JudgedEnv, seed: int) -> Driver:

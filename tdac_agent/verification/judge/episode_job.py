@@ -274,6 +274,10 @@ def _in_order(
     run: EpisodeRun, numbers: Sequence[int], late: int
 ) -> Generator[EpisodeSummary]:
     if numbers:
+        if run.job.policy.kind != "controller":
+            from tdac_agent.verification.judge.drivers import load
+
+            load(run.job.policy)
         work, end = partial(_work, run), run.child_pool.close
         with closing(in_order(work, end, numbers, late, run.job.patience)) as episodes:
             yield from episodes

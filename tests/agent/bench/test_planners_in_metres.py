@@ -56,6 +56,7 @@ class Driver:
         return self.view.seen(whole, pose, self.anchor)
 
 
+@pytest.mark.slow_after(4)
 @pytest.mark.parametrize("seen", SEEN)
 @pytest.mark.parametrize("name", planner_names())
 def test_the_unit_makes_no_difference(name, seen, task, tmp_path, monkeypatch):

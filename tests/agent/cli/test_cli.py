@@ -492,7 +492,7 @@ def test_usage_names_arguments_without_braces(tdac):
     assert "px" not in text
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("command", "target"),
     [

@@ -22,10 +22,10 @@ def test_a_set_is_driven_in_its_own_worlds(few, solver, tmp_path, warm):
     file = tmp_path / "solver.py"
     file.write_text(solver)
     here, there = (
-        evaluate([file], [few], 3, split="dev", physics=name, judge=warm)
+        evaluate([file], [few], 2, split="dev", physics=name, judge=warm)
         for name in ("exact", "mujoco")
     )
-    assert endings(here) == endings(there) == [(n, "reached") for n in range(3)]
+    assert endings(here) == endings(there) == [(n, "reached") for n in range(2)]
     steps = [[each.steps for each in f.results[0].episodes] for f in (here, there)]
     assert steps[0] != steps[1]
     assert np.allclose(*steps, atol=3)

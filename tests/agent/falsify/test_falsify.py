@@ -76,6 +76,7 @@ def test_a_gap_that_is_ignored_is_named_within_a_tenth(search):
     assert -parts["pose_y"] * RADIUS == pytest.approx(GAP, rel=0.1)
 
 
+@pytest.mark.slow
 def test_nobody_is_accused_without_a_failure(search):
     found = search(CAREFUL, replace(PLAN, space=OTHERS))
     assert found.counterexample is None

@@ -39,6 +39,7 @@ def test_the_failure_is_told_drawn_and_played(corridor, done, rejected, tmp_path
     assert "reached" in done("play", file, "--deviation", "delay=2", "--video", video)
 
 
+@pytest.mark.slow
 def test_json_has_the_record_alone(corridor, done):
     found = json.loads(done("falsify", corridor / "controller.py", *SMALL, "--json"))
     assert found["envelopes"][0]["counterexample"]["deviation"]["delay"] == 3

@@ -126,6 +126,19 @@ def test_verified_or_not(page, outline):
     assert "Clopper-Pearson: independent trials" in shown
 
 
+def test_many_runs_are_folded(runs, hostile, tmp_path):
+    """Each is a line that can be opened; those that are not verified come first."""
+    for name in "abcd":
+        shutil.copytree(runs / "verified", tmp_path / name)
+    shutil.copytree(hostile, tmp_path / "z")
+    text = make_page(tmp_path).html.decode()
+    folded = re.findall(r'id="run-\d">\n<details class="whole"><summary>', text)
+    assert len(folded) == 5
+    first = text[text.index('id="run-1"') : text.index('id="run-2"')]
+    assert "<h2>z " in first
+    assert Outline(text).open == []
+
+
 def test_where_it_is_from(outline, runs):
     """Hashes, versions, seeds, sandbox and commands are those on record."""
     shown = "".join(outline.shown)

@@ -8,8 +8,12 @@ STILL = "\n\ndef policy(obs):\n    return 0.0, 0.0\n"
 
 
 @pytest.mark.slow_after(2)
-@pytest.mark.parametrize(("more", "code"), [("", 0), (STILL, 1)], ids=["good", "bad"])
-def test_every_tier_gives_the_verdict_that_is_due(tdac, good, tier, more, code):
+@pytest.mark.parametrize(
+    ("more", "code", "flags"),
+    [("", 0, ["--no-confirm"]), (STILL, 1, []), ("", 0, [])],
+    ids=["good", "bad", "confirmed"],
+)
+def test_every_tier_gives_the_verdict_that_is_due(tdac, good, tier, more, code, flags):
     """Named on the command line, it is the one used, and its verdict is the right one.
 
     The good controller passes each test; the bad one, which stands still, fails those
@@ -17,7 +21,7 @@ def test_every_tier_gives_the_verdict_that_is_due(tdac, good, tier, more, code):
     """
     file = good / "controller.py"
     file.write_text(file.read_text() + more)
-    ended, said, _ = tdac("verify", good, "--tier", tier, "--json")
+    ended, said, _ = tdac("verify", good, "--tier", tier, "--json", *flags)
     report = json.loads(said)
     failed = {test for test, outcome in report["tests"].items() if outcome != "passed"}
     assert ended == code

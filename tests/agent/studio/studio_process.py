@@ -1,5 +1,6 @@
 """A studio in a process of its own."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -8,6 +9,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 SECONDS = 90
+
+
+@contextlib.contextmanager
+def running_studio(place):
+    """A studio that runs in a folder until the end of the block."""
+    running = Studio(place)
+    running.start()
+    yield running
+    running.kill()
 
 
 @dataclass

@@ -10,6 +10,7 @@ pytest.importorskip("nicegui", reason="needs tdac[studio]")
 
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
+from studio_process import running_studio
 
 from tdac_agent.html_report.page import make_page, own_script
 from tdac_agent.runs.replay import DEMO
@@ -47,6 +48,15 @@ def hostile_run(folder):
     file.write_text(json.dumps(known))
     (folder / "controller.py").write_text(SCRIPT)
     (folder / "task.yaml").write_text(json.dumps({SCRIPT: SCRIPT}))
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    """One whose folder no other test uses."""
+    place = tmp_path_factory.mktemp("hostile") / "place"
+    place.mkdir()
+    with running_studio(place) as running:
+        yield running
 
 
 @pytest.fixture(scope="module")

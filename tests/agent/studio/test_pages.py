@@ -494,6 +494,7 @@ def test_an_address_has_the_chosen_task(page, plan):
     assert number(page, "goal y").get_attribute("value") == "60"
 
 
+@pytest.mark.slow
 def test_a_map_that_may_be_read_in_two_ways(page, studio, tmp_path):
     """The user sees it, and says which pixels are the obstacles."""
     picture = np.full((300, 400), 128, np.uint8)

@@ -27,7 +27,7 @@ def suite(tmp_path):
 
 
 @pytest.mark.slow_after(1)
-@pytest.mark.parametrize("name", ["on_set", "on_task"])
+@pytest.mark.parametrize("name", ["on_task", "on_set"])
 def test_a_failed_test_is_repaired(write, request, name, suite, out):
     """The failure is told in the words of a task, and nothing else was driven."""
     ground = request.getfixturevalue(name)

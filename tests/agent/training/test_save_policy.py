@@ -60,7 +60,7 @@ def driven(model, make, worlds):
     return found
 
 
-def test_statistics_and_stacked_frames_go_with_it(level, tmp_path):
+def test_statistics_and_stacked_frames_go_with_it(level, tmp_path, warm):
     """The judge drives as SB3 does, to the step."""
     from stable_baselines3.common.vec_env import (
         DummyVecEnv,
@@ -84,12 +84,13 @@ def test_statistics_and_stacked_frames_go_with_it(level, tmp_path):
         own.obs_rms = envs.obs_rms
         return own
 
-    found = evaluate([tmp_path / "mine.zip"], [load_set(level)], 4, split="dev")
+    tasks = load_set(level)
+    found = evaluate([tmp_path / "mine.zip"], [tasks], 4, split="dev", judge=warm)
     rows = [(each.steps, each.success) for each in found.results[0].episodes]
     assert rows == driven(model, make, 4)
 
 
-def test_a_policy_of_single_environments(level, tmp_path):
+def test_a_policy_of_single_environments(level, tmp_path, warm):
     """Wrappers are found by their classes; observations in a Dict, with statistics."""
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
@@ -105,11 +106,12 @@ def test_a_policy_of_single_environments(level, tmp_path):
     saved = save_policy(model, tmp_path / "mine.zip")
     assert saved.wrappers == tuple(names)
     assert list(saved.after[0].mean) == ["ranges"]
-    found = evaluate([tmp_path / "mine.zip"], [load_set(level)], 2, split="dev")
+    tasks = load_set(level)
+    found = evaluate([tmp_path / "mine.zip"], [tasks], 2, split="dev", judge=warm)
     assert found.rows[0].episodes == 2
 
 
-def test_noise_is_the_same_again(level, tmp_path):
+def test_noise_is_the_same_again(level, tmp_path, warm):
     """It is drawn from the world's number; without it, the drive is another."""
     model = learned(batch(level))
     files = [tmp_path / name for name in ("noisy.zip", "likely.zip")]
@@ -117,7 +119,7 @@ def test_noise_is_the_same_again(level, tmp_path):
     save_policy(model, files[1])
     tasks = load_set(level)
     runs = [
-        evaluate([file], [tasks], 3, split="dev").results[0].episodes
+        evaluate([file], [tasks], 3, split="dev", judge=warm).results[0].episodes
         for file in (files[0], files[0], files[1])
     ]
     first, again, likely = ([(e.steps, e.driven) for e in run] for run in runs)
@@ -239,18 +241,19 @@ def policy(obs):
 """
 
 
-def test_another_trainers_policy_has_its_weights_beside_it(level, tmp_path):
+def test_another_trainers_policy_has_its_weights_beside_it(level, tmp_path, warm):
     """They are in the sandbox as weights.npz; the table calls it learned."""
     file = tmp_path / "mine.py"
     file.write_text(WEIGHTED)
     np.savez(tmp_path / "mine.npz", scale=0.5)
     tasks = load_set(level)
-    one = evaluate([file], [tasks], 2, split="dev")
-    (row,) = bench([str(file)], [level], "dev", 2, out=tmp_path / "bench").rows
+    one = evaluate([file], [tasks], 2, split="dev", judge=warm)
+    out = tmp_path / "bench"
+    (row,) = bench([str(file)], [level], "dev", 2, out=out, judge=warm).rows
     assert (row.kind, row.worlds) == ("learned", 2)
     assert row.trained_here is False
     np.savez(tmp_path / "mine.npz", scale=-0.5)
-    other = evaluate([file], [tasks], 2, split="dev")
+    other = evaluate([file], [tasks], 2, split="dev", judge=warm)
     hashes = {found.rows[0].controller_sha256 for found in (one, other)}
     assert len(hashes) == 2
     steps = [[e.steps for e in found.results[0].episodes] for found in (one, other)]

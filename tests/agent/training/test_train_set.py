@@ -236,17 +236,21 @@ def test_the_commands_in_turn(tdac, rejected, done, tmp_path, few, config):
     assert {row["knows"] for row in rows} == {"sensors"}
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("uses", "first", "knows"),
     [("memory", "seen-map", "+ memory"), ("planner", "waypoints", "+ planner")],
 )
-def test_a_policy_with_a_map_of_its_own(few, config, tmp_path, uses, first, knows):
+def test_a_policy_with_a_map_of_its_own(
+    few, config, tmp_path, warm, uses, first, knows
+):
     """It trains and drives, and the tables say what it uses."""
     level = few()
     plan = make_set_plan(level, steps=128, episodes=2, config=config(), uses=uses)
     assert plan.wrappers == (first, "goal-relative", "closeness", "flatten")
     train(plan, tmp_path / "out")
-    found = evaluate([tmp_path / "out"], [load_set(level)], 2, split="dev")
+    tasks = load_set(level)
+    found = evaluate([tmp_path / "out"], [tasks], 2, split="dev", judge=warm)
     assert found.rows[0].knows == knows
 
 
@@ -292,6 +296,7 @@ def test_a_training_begins_with_the_weights_of_a_policy(few, config, tmp_path):
         train(plan, tmp_path / "fourth")
 
 
+@pytest.mark.slow
 def test_seeds_are_trained_side_by_side(few, config, tmp_path):
     """Each as alone, to the last digit; the same call again leaves them as they are."""
     level = few()
@@ -310,8 +315,8 @@ def test_seeds_are_trained_side_by_side(few, config, tmp_path):
         train_seeds(plan, range(3, 5), tmp_path / "s", lambda *_: None)
 
 
-def test_seeds_end_together_and_are_checked_first(few, config, tmp_path):
-    """A seed that fails stops no other; what is wrong at once is told at once."""
+def test_seeds_are_checked_first(few, config, tmp_path):
+    """What is wrong at once is told at once."""
     plan = make_set_plan(few(), steps=128, episodes=2, config=config())
     with pytest.raises(TaskError, match="expected seed to be a whole number from 0"):
         train_seeds(plan, range(2**31, 2**31 + 2), tmp_path / "s", lambda *_: None)
@@ -325,11 +330,25 @@ def test_seeds_end_together_and_are_checked_first(few, config, tmp_path):
     with pytest.raises(NotTrustedError, match=CHECKPOINT) as told:
         train_seeds(plan, range(1, 3), tmp_path / "s", lambda *_: None)
     assert pickle.loads(pickle.dumps(told.value)).lines == told.value.lines
-    (folder / CHECKPOINT).unlink()
+
+
+@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_a_seed_that_fails_stops_no_other(few, config, tmp_path, count):
+    """The others train as alone, to the last digit; their progress is told."""
+    plan = make_set_plan(few(), steps=128, episodes=2, config=config())
+    folder, told = seed_folder(tmp_path / "s", 1), []
+    folder.mkdir(parents=True)
+    write_plan(folder, plan.model_copy(update={"seed": 1}))
+    seeds = range(1, 2 + count)
     with hold(folder / LOCK_FILE), pytest.raises(RunError, match="another process tr"):
-        train_seeds(plan, range(1, 4), tmp_path / "s", lambda *_: None)
-    for seed in (2, 3):
-        assert (seed_folder(tmp_path / "s", seed) / POLICY).is_file()
+        train_seeds(plan, seeds, tmp_path / "s", lambda *a: told.append(a))
+    assert {seed for seed, _, _ in told} == set(seeds[1:])
+    for seed in seeds[1:]:
+        folder = seed_folder(tmp_path / "s", seed)
+        assert (folder / POLICY).is_file()
+        alone = train(plan.model_copy(update={"seed": seed}), tmp_path / f"{seed}")
+        plain = [replace(point, seconds=0.0) for point in alone]
+        assert [replace(point, seconds=0.0) for point in read_curve(folder)] == plain
 
 
 @pytest.mark.slow

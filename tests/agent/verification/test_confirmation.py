@@ -1,6 +1,7 @@
 """Blind confirmations: what they accept, and that nobody can know their starts."""
 
 import json
+import shutil
 import xml.etree.ElementTree as ET
 
 import pytest
@@ -9,6 +10,7 @@ from script import Script, code
 
 import tdac_agent
 from tdac_agent import load_task
+from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.hashes import sha256_of
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import lay_out
@@ -200,11 +202,19 @@ def test_a_run_goes_on_after_a_failed_confirmation(small_task, good_source, warm
     assert delivered_text(run) == "in iteration 1 (2 candidates, 2 confirmations)"
 
 
-def test_a_run_that_is_never_confirmed(small_task, good_source, warm, out):
-    """It delivers what passed, and says what the blind drives showed."""
+@pytest.fixture(scope="module")
+def unconfirmed(small_task, good_source, warm, tmp_path_factory):
+    """The folder of a run whose controller passed, and failed its blind drives."""
+    folder = tmp_path_factory.mktemp("unconfirmed") / "run"
     model = Script(code(good_source + UNLESS_IT_SLIPS))
     once = {"iterations": 1, "patience": 0, "refine": False}
-    run = tdac_agent.synthesize(small_task, model, out=out, judge=warm, **once)
+    tdac_agent.synthesize(small_task, model, out=folder, judge=warm, **once)
+    return folder
+
+
+def test_a_run_that_is_never_confirmed(unconfirmed):
+    """It delivers what passed, and says what the blind drives showed."""
+    run = load_run(unconfirmed)
     assert (run.status, run.verified, run.passed) == ("not verified", False, True)
     assert run.reason == "2 of 2 blind drives failed; at most 1 of 110 may"
     assert run.controller.is_file()
@@ -223,13 +233,10 @@ def test_what_passed_is_confirmed_later(small_task, good_source, warm, out):
 
 
 @pytest.mark.parametrize("change", ["bound", "words", "other"])
-def test_a_changed_confirmation_is_not_shown(
-    small_task, good_source, warm, out, change
-):
+def test_a_changed_confirmation_is_not_shown(unconfirmed, good_source, out, change):
     """Not with another bound, nor what is none, nor that of another controller."""
-    once = {"iterations": 1, "patience": 0, "refine": False}
-    model = Script(code(good_source + UNLESS_IT_SLIPS))
-    run = tdac_agent.synthesize(small_task, model, out=out, judge=warm, **once)
+    shutil.copytree(unconfirmed, out)
+    run = load_run(out)
     found = read_confirmation(run)
     assert found is not None
     assert not found.passed

@@ -409,6 +409,7 @@ def test_the_episode_of_a_suite_is_played_by_its_name(done, good):
     assert "jitter 2: reached after" in out
 
 
+@pytest.mark.slow
 def test_robust_json(tdac, good):
     """One object on stdout, with both reports, and in `--out` a file of each."""
     words = ["verify", good, "--profile", "policy", "--robust", 3, "--json"]

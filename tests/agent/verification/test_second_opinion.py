@@ -109,7 +109,8 @@ def test_a_task_with_movers_is_refused_before_anything_is_driven(good_source, tm
         verify(good_source, task, physics="mujoco")
 
 
-def test_a_run_asks_for_it_and_its_page_says_so(tmp_path, good_source):
+@pytest.mark.slow
+def test_a_run_asks_for_it_and_its_page_says_so(tmp_path, good_source, warm):
     """Each candidate that arrives here has the line; one that does not has none."""
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))
     run = synthesize(
@@ -119,6 +120,7 @@ def test_a_run_asks_for_it_and_its_page_says_so(tmp_path, good_source):
         iterations=2,
         patience=1,
         physics="mujoco",
+        judge=warm,
     )
     assert run.passed
     page = make_page(tmp_path / "run").html.decode()

@@ -54,6 +54,7 @@ def succeeded(line):
     return json.dumps({**json.loads(line), "outcome": "reached", "collisions": 0})
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("problem", ["task", "set"], indirect=True)
 def test_edited_rows_are_driven_again(problem, tmp_path, warm):
     """Rows with a mark are not driven again; edited, added or copied ones are."""

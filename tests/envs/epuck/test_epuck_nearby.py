@@ -44,14 +44,15 @@ def poses(ground, count):
 
 
 @pytest.mark.slow_after(1)
+@pytest.mark.parametrize("count", [60, 300])
 @every_world
-def test_they_change_nothing(name, place):
+def test_they_change_nothing(name, place, count):
     """Readings, distances and contacts are those with all parts, to the last bit."""
     ground, around = place
     solid, seen = ground.solid, around.visible
     random = np.random.default_rng(4)
     hits, readings = np.zeros((2, 8, 3)), np.zeros((2, 8), np.float32)
-    for x, y, heading in poses(ground, 300).tolist():
+    for x, y, heading in poses(ground, count).tolist():
         cell = (*ground.bounds[:2], around.width, x, y)
         begin, end = listed_at(around.seen.cells, len(seen.extent), *cell)
         state = np.array([x, y, heading])

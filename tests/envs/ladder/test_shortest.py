@@ -74,14 +74,16 @@ def are_free(cells, begin, ends, body):
     corners = np.stack([i - 1, j - 1], 1)[:, None] + np.array(
         [[-0.5, -0.5], [-0.5, 0.5], [0.5, -0.5], [0.5, 0.5]]
     )
-    corners = np.unique(corners.reshape(-1, 2), axis=0)
+    corners, squares = np.unique(corners.reshape(-1, 2), axis=0, return_counts=True)
+    # A line meets others only after these: they are inside of a wall.
+    off = corners[squares < 4] - begin
+    along = ends - begin
+    square = np.maximum((along**2).sum(axis=1), 1e-12)
     free = np.ones(len(ends), bool)
-    for number, end in enumerate(ends):
-        along = end - begin
-        square = max(float(along @ along), 1e-12)
-        part = np.clip((corners - begin) @ along / square, 0.0, 1.0)
-        near = np.hypot(*(corners - begin - part[:, None] * along).T)
-        free[number] = near.min() >= body
+    for few in np.array_split(np.arange(len(ends)), len(ends) // 64 + 1):
+        part = np.clip(off @ along[few].T / square[few], 0.0, 1.0)
+        x, y = (off[:, axis, None] - part * along[few, axis] for axis in (0, 1))
+        free[few] = (x * x + y * y >= body * body).all(axis=0)
     return free
 
 

@@ -33,6 +33,7 @@ def make(name, options, *wrappers):
     return wrap(gym.make(name, **options), wrappers)
 
 
+@pytest.mark.slow_after(3)
 @both
 @pytest.mark.parametrize(
     "wrappers",
@@ -142,14 +143,19 @@ def test_way_points_in_a_world_hold_the_body():
         assert min(task.ground.gap(x, y) for x, y in places) >= task.body_radius
 
 
-@given(st.floats(-3.1, 3.1), st.integers(0, 2**20))
-def test_guidance_turns_with_the_robot(turn, number):
-    """The same waypoint, whatever the heading; turned by it in the robot's frame."""
+@pytest.fixture(scope="module")
+def clutter():
+    """A robot on a map, and its way to the goal."""
     env = gym.make(MAP, map="clutter").unwrapped
-    task, frame = env.nominal, Frame.of(env)
+    return env.nominal, Frame.of(env), route_to_goal(env.nominal)
+
+
+@given(st.floats(-3.1, 3.1), st.integers(0, 2**20))
+def test_guidance_turns_with_the_robot(clutter, turn, number):
+    """The same waypoint, whatever the heading; turned by it in the robot's frame."""
+    task, frame, route = clutter
     rows, columns = np.nonzero(np.isfinite(task.field))
     at = number % rows.size
-    route = route_to_goal(task)
     ahead = np.array([[columns[at], rows[at], 0.0]])
     turned = np.array([[columns[at], rows[at], turn]])
     (x, left), (u, v) = (

@@ -128,9 +128,9 @@ class Pair:
 
 def test_the_first_contact_is_that_of_dense_samples():
     """In place to 1e-6 px; pairs that miss each other by less may go either way."""
-    found = [Pair(seed).check() for seed in range(300)]
-    assert found.count(True) > 60
-    assert found.count(False) > 60
+    found = [Pair(seed).check() for seed in range(100)]
+    assert found.count(True) > 20
+    assert found.count(False) > 20
 
 
 @pytest.mark.slow

@@ -263,7 +263,7 @@ def check_random_arc(seed):
 
 class TestFirstContact:
     @given(st.integers(0, 10**6))
-    @settings(exact, max_examples=400)
+    @exact
     def test_any_arc_on_any_map(self, seed):
         check_random_arc(seed)
 

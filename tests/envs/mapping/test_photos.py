@@ -42,6 +42,7 @@ def read(photo: Photo, **how: str) -> tuple:
     return preprocess(photo.picture, *ends, drawing.radius, **how)
 
 
+@pytest.mark.slow_after(7)
 @pytest.mark.parametrize("preset", ["default", "paper"])
 @EACH_OF_SEVEN
 def test_a_page_in_uneven_light(number: int, preset: str, pages: list) -> None:

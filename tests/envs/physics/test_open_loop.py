@@ -52,6 +52,7 @@ def errors(body, programme, speed, axle=AXLE_LENGTH):
     return 1e3 * off, abs(math.degrees(heading - wanted))
 
 
+@pytest.mark.slow_after(4)
 @pytest.mark.parametrize("version", ["1", "2"])
 @pytest.mark.parametrize("name", PROGRAMMES)
 def test_an_e_puck_drives_the_exact_arc(name, version):

@@ -38,6 +38,7 @@ def infrared_rays(x, y, heading, floor):
     return origins, np.column_stack([flat, np.full(8, math.sin(rise))])
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("name", tdac_envs.bundled_worlds())
 def test_rays_agree_with_the_infrared_sensors(name):
     """On 300 poses in each of the bundled worlds, 2,100 in all: to 1 µm."""

@@ -217,6 +217,7 @@ def test_lidars_of_the_library(opened):
     assert stage.absent == ()
 
 
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize("seed", range(4))
 def test_any_scene_as_marched_along_its_rays(opened, seed):
     """Every ray ends where a point moving along it first is inside of an object."""

@@ -57,6 +57,7 @@ def test_paragraph(number):
     assert not re.search(r"\b(nan|inf)\b|-0\.0+\b|  ", text)
 
 
+@pytest.mark.slow_after(2)
 @pytest.mark.parametrize("number", range(0, len(PLANTS), 7))
 def test_repeatable(number, tmp_path):
     """The same record gives the same paragraph, also when it was read from a file."""

@@ -358,7 +358,7 @@ def test_it(rollout):
 BROKEN_HOOK = "def pytest_runtest_logreport():\n    raise KeyError('a hook')\n"
 
 
-@pytest.mark.slow_after(3)
+@pytest.mark.slow_after(1)
 @pytest.mark.parametrize(
     ("text", "conftest", "reason"),
     [
