@@ -7,11 +7,12 @@ import inspect
 import re
 from collections.abc import Iterator
 from pkgutil import resolve_name
-from typing import Any
+from typing import Any, get_type_hints
 
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
+from sphinx.util.typing import stringify_annotation
 
 project, author = "tdac", "the tdac authors"
 release = importlib.metadata.version("tdac")
@@ -44,7 +45,11 @@ nitpicky = True
 nitpick_ignore_regex = [("py:.*", r".*")]
 # The page of the API also has what needs this extra, which is large.
 autodoc_mock_imports = ["stable_baselines3"]
-autodoc_typehints = "none"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented_params"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+python_use_unqualified_type_names = True
 autodoc_member_order = "bysource"
 napoleon_use_ivar = True
 
@@ -81,10 +86,24 @@ def as_rst(
     app: Sphinx, what: str, name: str, obj: Any, options: Any, lines: list[str]
 ) -> None:
     """Turns the Markdown of a docstring into reStructuredText, for autodoc."""
-    del app, what, name, obj, options
+    del app, what, name, options
+    lines += _fields(obj, lines)
     lines[:] = list(
         _tables(re.sub(r"(?<!`)`([^`]+)`(?!`)", r"``\1``", line) for line in lines)
     )
+
+
+def _fields(obj: Any, lines: list[str]) -> list[str]:
+    """The fields of a record, with types, as attributes of its docstring."""
+    fields = getattr(obj, "model_fields", {})
+    if not fields or "Attributes:" in lines:
+        return []
+    rows = []
+    for name, hint in get_type_hints(obj).items():
+        if name in fields:
+            kind = re.sub(r"[a-z_]\w*\.", "", stringify_annotation(hint))
+            rows.append(f"    {name} ({kind}): {fields[name].description or ''}")
+    return ["", "Attributes:", *rows, ""]
 
 
 def _tables(lines: Iterator[str]) -> Iterator[str]:

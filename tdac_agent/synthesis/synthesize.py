@@ -77,7 +77,7 @@ def synthesize(
     Args:
         problem: What the controller is for: a task, or a task set.
         learner: LLM1 of the paper, which writes controllers: a provider, or its name
-            such as `anthropic:MODEL` (docs/models.md). By default that of `options`.
+            such as `anthropic:MODEL` (docs/models.md); by default the one of `options`.
         optimizer: LLM2, which edits code and writes rules; the learner by default.
         out: New or empty folder for the run, or one with the same run.
         options: Options; the defaults are those of `tdac synth`.
@@ -86,7 +86,7 @@ def synthesize(
         retry: Retry policy after faults.
         judge: A warm judge, to reuse in consecutive runs; None starts one.
         on_event: Called with each journal record.
-        **keywords: Fields of `SynthOptions` that replace those of `options`.
+        **keywords: Fields of `SynthOptions`, instead of the same fields of `options`.
 
     Returns:
         The run: `verified`, `passed` (on a task without `confirm`), `selected` (on a

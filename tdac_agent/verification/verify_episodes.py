@@ -96,7 +96,7 @@ def verify_episodes(
         margin: See `accept_at`.
         salt_file: File with the salt of the split `hidden`.
         lineage: Id of the run that wrote the controller, for the ledger; by default
-            that of the run folder that the file is in, if it is in one.
+            the id of the run folder that the file is in, if it is in one.
         tier: Sandbox tier; `auto` for the best one on this machine.
         limits: Limits of the controller's process in each episode.
         out: Folder for `episodes.json` and `trajectories/`; of hidden worlds, for
@@ -107,7 +107,7 @@ def verify_episodes(
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with the numbers of episodes and successes so far.
         suite: Folder of the user's own tests for a set, which may run (docs/suites.md);
-            `out` then also gets their `report.json`. Those for a task are tests of
+            `out` then also gets their `report.json`. Tests for a task belong to
             `verify`.
         seed: Seed of what these tests draw; by default derived from the controller, the
             set and a secret of this installation.

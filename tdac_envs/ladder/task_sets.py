@@ -344,7 +344,7 @@ def load_set(name: str | Path, hidden_folder: Path | None = None) -> TaskSet:
         hidden_folder: Folder of maps with the split `hidden` of a set of files.
 
     Raises:
-        TaskError: There is none, or it is not valid, or a file of its worlds is not.
+        TaskError: The set does not exist or is invalid.
     """
     file = find_set_file(name)
     if file.files is None:

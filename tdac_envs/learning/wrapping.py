@@ -53,7 +53,7 @@ def wrap_for_rl(
     Args:
         env: An environment, single or batched, with its original observations.
         names: Names in `tdac_envs.wrappers.WRAPPERS`, innermost first. By default
-            those of `default_wrappers`.
+            the names that `default_wrappers` returns.
 
     Raises:
         TaskError: `env` is not from `tdac_envs`, a name is unknown, or a

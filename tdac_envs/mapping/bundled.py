@@ -44,7 +44,7 @@ def bundled_map(name: str) -> BundledMap:
     """The bundled map of this name.
 
     Raises:
-        MapError: There is none; the message suggests the closest name.
+        MapError: No map has this name; the message suggests the closest one.
     """
     names = bundled_maps()
     if name not in names:

@@ -25,7 +25,7 @@ def load_robot(name: str | Path) -> RobotFile:
     """The robot of a bundled name, or of the path of a robot file.
 
     Raises:
-        TaskError: There is none, or the file is not valid.
+        TaskError: The robot does not exist, or its file is invalid.
     """
     if not isinstance(name, str | Path):
         raise TaskError(f"expected the name or path of a robot, got {name!r:.100}")
