@@ -229,7 +229,10 @@ def test_no_slope_is_found_where_there_is_none():
     assert dose_slope(made_up())["p"] > 0.001
 
 
-@pytest.mark.parametrize("experiment", EXPERIMENTS)
+@pytest.mark.parametrize(
+    "experiment",
+    ["race", "transfer", pytest.param("dose", marks=pytest.mark.slow)],
+)
 def test_an_experiment_has_its_own_tables(experiment, tmp_path, capsys):
     scores = made_up()
     named = scores["cell"].isin([cell.name for cell in cells_of(experiment)])

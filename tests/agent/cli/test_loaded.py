@@ -42,10 +42,11 @@ def _loaded(*words, cwd):
 
 
 def test_code_for_tasks_imports_no_task_sets_and_no_worlds(tmp_path):
-    """What a task on a map needs imports no code of other problems."""
+    """What a task on a map needs imports no code of other problems, and no pandas."""
     names = ", ".join(f"tdac_agent.{each}" for each in MODULES)
     loaded = _loaded("-c", f"import {names}", cwd=tmp_path)
     assert not [each for each in loaded if each.startswith(NOT_FOR_MAPS)]
+    assert not {"pandas", "matplotlib", "torch"} & loaded
 
 
 @pytest.mark.slow

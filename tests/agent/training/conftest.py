@@ -12,5 +12,7 @@ def threads():
     pytest.importorskip("stable_baselines3")
     torch = pytest.importorskip("torch")
     before = torch.get_num_threads()
+    # As in trainings of the product: small networks are slower with more.
+    torch.set_num_threads(1)
     yield
     torch.set_num_threads(before)
