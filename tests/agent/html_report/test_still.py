@@ -26,7 +26,14 @@ def run(tmp_path_factory, warm):
     file = place / "task.yaml"
     file.write_text("env: TDAC-EPuck-v0\nworld: crates\nprofile: policy\n")
     out = place / "run"
-    synthesize(load_task(file), Script(code(AHEAD)), out=out, iterations=1, judge=warm)
+    synthesize(
+        load_task(file),
+        Script(code(AHEAD)),
+        out=out,
+        iterations=1,
+        patience=0,
+        judge=warm,
+    )
     return out
 
 
