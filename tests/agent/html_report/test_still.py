@@ -11,6 +11,7 @@ from PIL import Image
 from script import AHEAD, Script, code
 from unconfirmed import synthesize
 
+from tdac_agent import load_task
 from tdac_agent.html_report import make_page
 from tdac_agent.html_report.still import still_of
 from tdac_agent.runs.history import gather_run
@@ -19,14 +20,21 @@ STILL = re.compile(r'class="still"><img src="data:image/jpeg;base64,([^"]+)"')
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, crates):
+def run(tmp_path_factory, warm):
     """A run whose only candidate drives ahead until it touches something."""
-    place = tmp_path_factory.mktemp("still") / "run"
+    place = tmp_path_factory.mktemp("still")
+    file = place / "task.yaml"
+    file.write_text("env: TDAC-EPuck-v0\nworld: crates\nprofile: policy\n")
+    out = place / "run"
     synthesize(
-        crates, Script(code(AHEAD)), out=place, iterations=1, patience=0,
-        profile="policy",
-    )  # fmt: skip
-    return place
+        load_task(file),
+        Script(code(AHEAD)),
+        out=out,
+        iterations=1,
+        patience=0,
+        judge=warm,
+    )
+    return out
 
 
 def test_the_page_shows_the_robot_where_it_came_nearest(run):
