@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 MODULES = {
     "tdac_agent",
     "tdac_agent.bench",
+    "tdac_agent.bench.bench",
     "tdac_agent.budget",
     "tdac_agent.html_report",
     "tdac_agent.metrics",
