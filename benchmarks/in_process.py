@@ -32,8 +32,9 @@ class Imported:
             spec.loader.exec_module(self._module)
 
     def reset(self, observation: dict[str, Any]) -> object:
+        begin = getattr(self._module, "reset", None)
         with _blamed("reset"):
-            return self._module.reset(observation)
+            return None if begin is None else begin(observation)
 
     def policy(self, observation: dict[str, Any]) -> Any:
         with _blamed("policy"):

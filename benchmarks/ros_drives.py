@@ -34,7 +34,7 @@ from tdac_agent.runs.ownership import load_task
 
 NODE_FAULTS = ("none", "killed", "frozen", "ended")
 FORKS = multiprocessing.get_context("forkserver")
-PATIENCE = 1.0
+PATIENCE = 3.0
 """Longest wait for a command in simulated time, s."""
 AWAY = 1.0
 """Time for which a node is gone or frozen, s of the drive."""

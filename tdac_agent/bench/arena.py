@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from tdac_agent.verification.store import (
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.ladder.task_sets import AnyTask, TaskSet
+from tdac_envs.physics.moved import EXACT
 
 DRIVEN = "driven"
 """Folder with what each file did on each set; of hidden worlds, it is in `sealed`."""
@@ -68,6 +69,7 @@ class Arena:
         out: Folder of the results.
         judge: A warm judge.
         watch: Called with set, entrant, episodes and successes so far.
+        physics: What moves the robots.
         driven: Scores of each set, by its name.
         rows: Rows of `worlds.csv`.
         timing: Rows of `timing.csv`.
@@ -81,6 +83,7 @@ class Arena:
     out: Path
     judge: WarmJudge
     watch: Watch | None
+    physics: str = EXACT
     driven: dict[str, list[Driven]] = field(default_factory=dict)
     rows: list[dict[str, Any]] = field(default_factory=list)
     timing: list[dict[str, Any]] = field(default_factory=list)
@@ -88,12 +91,14 @@ class Arena:
 
     def part(self, problem: Problem) -> Part:
         """The episodes of a problem."""
-        return part_of(problem, self.count, split=self.split, salt_file=self.salt_file)
+        part = part_of(problem, self.count, split=self.split, salt_file=self.salt_file)
+        return replace(part, physics=self.physics)
 
     def folder(self, problem: Problem, member: Entrant) -> Path:
         """Folder of what a file does on a problem."""
         place = SEALED if self.split == "hidden" else DRIVEN
-        return folder_of(self.out / place, problem.name, member.sha256)
+        other = "" if self.physics == EXACT else f"-{self.physics}"
+        return folder_of(self.out / place, problem.name + other, member.sha256)
 
     def kept(self, problem: Problem, member: Entrant) -> EpisodeReport | None:
         """The report of a file, if it has driven in all episodes of a problem."""
@@ -103,6 +108,7 @@ class Arena:
             **identity_of(own),
             "split": part.split or None,
             "salt_sha256": own.secret(part),
+            "physics": part.physics,
         }
         return kept_report(self.folder(problem, member), wanted, part.numbers)
 

@@ -30,7 +30,7 @@ from tdac_agent.bench.page import PAGE, write_page
 from tdac_agent.bench.record import Bench, BenchSet
 from tdac_agent.errors import RunError
 from tdac_agent.executors.executor import Executor
-from tdac_agent.problems.episodes import episodes_of
+from tdac_agent.problems.episodes import check_physics, episodes_of
 from tdac_agent.problems.part import identity_of
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.storage.csv_file import TABLE_BYTES, read_rows
@@ -45,6 +45,7 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 from tdac_envs.core.salt import read_salt
 from tdac_envs.ladder.task_sets import TaskSet, load_set
+from tdac_envs.physics.moved import EXACT
 
 WORLDS = 100
 RESULTS, WORLD_TABLE, TIMING = "bench.json", "worlds.csv", "timing.csv"
@@ -67,6 +68,7 @@ def bench(
     out: Path,
     tasks: Sequence[str | Path] = (),
     salt_file: Path | None = None,
+    physics: str = EXACT,
     tier: str = "auto",
     judge: WarmJudge | None = None,
     watch: Watch | None = None,
@@ -90,6 +92,7 @@ def bench(
             this user can read.
         salt_file: File with the salt of hidden worlds, which stay sealed. By default a
             salt is drawn when all entrants are on record, and revealed at the end.
+        physics: What moves the robots: `exact`, or `mujoco`.
         tier: Sandbox tier.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with set, entrant, episodes and successes so far.
@@ -112,9 +115,16 @@ def bench(
         read_salt(salt_file)  # fails here, before there is a folder
     if tasks and split == "hidden":
         raise TaskError("tasks have no hidden worlds: leave them out")
+    if physics != EXACT and split == "hidden":
+        raise TaskError(
+            f"hidden worlds are driven with the exact step alone: leave out physics "
+            f"{physics!r}, or take the split test"
+        )
     wanted, words = named(entrants), [*sets, *tasks]
     problems: list[Problem] = [*map(load_set, sets), *map(load_task, tasks)]
     _check_problems(problems, split, worlds)
+    for each in problems:
+        check_physics(each, physics)
     entries = [entry_of(each, own) for own in problems for each in wanted]
     with contextlib.ExitStack() as stack:
         stack.enter_context(own_folder(out, *WRITTEN, who="bench"))
@@ -125,7 +135,7 @@ def bench(
         if split == "hidden":
             (out / SEALED).mkdir(0o700, exist_ok=True)
         warm = judge or stack.enter_context(WarmJudge())
-        arena = Arena(split, worlds, salt_file, tier, out, warm, watch)
+        arena = Arena(split, worlds, salt_file, tier, out, warm, watch, physics)
         for own in problems:
             runs_of(own, arena)  # fails before anything is driven
         if executor is not None:
@@ -223,4 +233,5 @@ def _set_of(arena: Arena, problem: Problem) -> BenchSet:
         split=part.split or part.variation,
         worlds=arena.count,
         salt_sha256=own.secret(part),
+        physics=part.physics,
     )

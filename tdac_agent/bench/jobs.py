@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +99,7 @@ def drive_all(
         "count": arena.count,
         "salt_file": None if salt is None else str(salt.resolve()),
         "tier": arena.tier,
+        "physics": arena.physics,
     }
     work = Work(
         module=__name__,
@@ -134,11 +135,14 @@ def perform_job(
     def watch(episodes: int, successes: int) -> None:
         tell({"episodes": episodes, "reached": successes})
 
-    part = part_of(
-        problem,
-        terms["count"],
-        split=terms["split"],
-        salt_file=None if salt is None else Path(salt),
+    part = replace(
+        part_of(
+            problem,
+            terms["count"],
+            split=terms["split"],
+            salt_file=None if salt is None else Path(salt),
+        ),
+        physics=terms["physics"],
     )
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -9,6 +9,7 @@ from pydantic import Field
 from tdac_agent.metrics.paired import Estimate
 from tdac_agent.storage.printable_record import StrictRecord
 from tdac_envs.ladder.frozen import dynamics_of, ladder_of
+from tdac_envs.physics.moved import EXACT
 
 Kind = Literal["builtin", "planner", "controller", "learned", "baseline", "privileged"]
 """What an entrant is."""
@@ -38,6 +39,7 @@ class BenchSet(StrictRecord):
     split: str
     worlds: int
     salt_sha256: str | None = Field(description="Of hidden worlds.")
+    physics: str = Field(EXACT, description="What moved the robots.")
 
     @property
     def driven_on(self) -> str:
@@ -53,9 +55,10 @@ class BenchSet(StrictRecord):
     def which(self) -> str:
         """The worlds in words; of a task, its starts."""
         last = self.worlds - 1
+        other = "" if self.physics == EXACT else f", moved by {self.physics}"
         if self.split == "jitter":
-            return f"jittered starts 0 to {last}"
-        return f"worlds 0 to {last} of {self.split}"
+            return f"jittered starts 0 to {last}{other}"
+        return f"worlds 0 to {last} of {self.split}{other}"
 
 
 class BenchFile(StrictRecord):

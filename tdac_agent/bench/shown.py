@@ -30,6 +30,7 @@ _COMPARED = {
     "split": "split",
     "worlds": "number of worlds",
     "salt_sha256": "salt",
+    "physics": "physics",
 }
 """What all benches of a set have in common, and its name in messages."""
 

@@ -61,6 +61,7 @@ def run(options: BenchOptions) -> int:
                 out=folder,
                 tasks=tasks,
                 salt_file=options.salt_file,
+                physics=options.physics,
                 tier=options.tier,
                 judge=judge,
                 watch=watch,

@@ -8,7 +8,12 @@ from typing import Literal
 
 import typer
 
-from tdac_agent.cli.shared_options import json_option, out_option, tier_option
+from tdac_agent.cli.shared_options import (
+    json_option,
+    out_option,
+    physics_option,
+    tier_option,
+)
 from tdac_agent.cli.typed_options import typed_options
 from tdac_agent.option_fields import option
 from tdac_agent.planners.names import planner_list
@@ -65,6 +70,7 @@ class BenchOptions:
         "reveal`.  [default: drawn, and revealed at the end]",
         metavar="FILE",
     )
+    physics: Literal["exact", "mujoco", "mujoco-varied"] = physics_option()
     tier: str = tier_option()
     executor: Literal["local", "ray"] | None = option(
         None,

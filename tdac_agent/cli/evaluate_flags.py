@@ -60,7 +60,7 @@ class EvaluateOptions:
         0, "Seed of the episodes, the same for all policies.", least=0, scope="task"
     )
     variation: Variation = option("jitter", VARIATION, scope="task")
-    physics: Literal["exact", "mujoco"] = physics_option()
+    physics: Literal["exact", "mujoco", "mujoco-varied"] = physics_option()
     wrappers: tuple[str, ...] | None = wrappers_option(
         f"{WRAPPER}  [default: as the .zip file records]", "--wrapper"
     )

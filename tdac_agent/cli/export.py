@@ -54,8 +54,9 @@ def run_ros2(options: ExportRos2Options) -> int:
         return 0
     console = Console()
     print_plain(console, f"wrote {made.folder} (ROS 2 package {made.name})")
-    console.print(escape(made.verdict), soft_wrap=True)
-    if not made.verified:
+    if made.verified:
+        console.print(escape(made.verdict), soft_wrap=True)
+    else:
         console.print("[bold red]not verified[/]: the package says so")
     longest = max(made.stops.values())
     console.print(f"stops within {longest:.3f} m (README.md lists the causes)")

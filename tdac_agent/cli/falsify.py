@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,17 +25,19 @@ from tdac_agent.falsify.curves import draw_curves
 from tdac_agent.falsify.falsify import SearchPlan, falsify, space_on
 from tdac_agent.problems.part import Part
 from tdac_agent.runs.falsification import PICTURE, Counterexample, Falsification
+from tdac_agent.runs.falsify_text import failure_text
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.tasks.deviation import Deviation, parsed
 from tdac_agent.tasks.deviation import words_of as deviation_words
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Points
-from tdac_agent.verification.diagnosis.figures import write_png
+from tdac_agent.verification.diagnosis.figures import contact_of, write_png
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.deviated import shifted_env
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_envs.drawing.canvas import Image
+from tdac_envs.drawing.closeup import Event, with_close_up
 from tdac_envs.ladder.task_sets import TaskSet, load_set
 from tdac_envs.map2d.task import Map2DTask
 
@@ -85,11 +88,24 @@ def search(
     tier: str,
     out: Path | None,
     judge: WarmJudge | None = None,
+    go_on: str = "",
 ) -> Falsification:
-    """Searches with a progress bar; arguments as for `falsify`."""
-    cut = "no envelope"
+    """Searches with a progress bar; arguments as for `falsify`.
+
+    Args:
+        entrant: The policy.
+        problem: Where it drives.
+        plan: What is searched.
+        console: Console to print to.
+        tier: Sandbox tier.
+        out: Folder of the record.
+        judge: A warm judge.
+        go_on: The command that goes on after an interruption; by default the same one.
+    """
+    cut = "nothing of it is kept; with --out DIR, the same command could go on"
     if out is not None:
-        cut = f"the same command goes on from {out}"
+        cut = f"what was driven is kept: {go_on or 'the same command'} goes on from "
+        cut += f"{out}"
     bar = DrivingBar(
         console, plan.episodes, "episodes", is_long=True, cut=cut, reaching=False
     )
@@ -125,15 +141,17 @@ def show_envelope(
     """
     entrant = _ready(controller, problem, tier)
     plan = SearchPlan(episodes=episodes)
-    found = search(entrant, problem, plan, console, tier, out)
+    # Where the task is another one than the controller's own, flags are missing.
+    own = isinstance(problem, TaskSet) or Path(controller).is_dir()
+    words = ["tdac", "falsify", controller, "-n", str(episodes), "--out", str(out)]
+    go_on = shlex.join(words) if own else ""
+    found = search(entrant, problem, plan, console, tier, out, go_on=go_on)
     if out is not None:
         write_pictures(found, entrant, problem, out, tier)
     if not console.stderr:
         console.print()
         options = FalsifyOptions(controller, tier=tier)
         replay = _replay(found, entrant, TaskFlags(), options)
-        # Where the task is another one than the controller's own, flags are missing.
-        own = isinstance(problem, TaskSet) or Path(controller).is_dir()
         show_falsification(found, console, replay if own else ())
     return found
 
@@ -195,20 +213,27 @@ def _picture(
     problem: Task | TaskSet,
     tier: str,
 ) -> Image:
-    runs: list[Points] = []
-    outcomes, labels = [], []
+    rollouts, labels = [], []
     chosen = [failed.deviation]
     if failed.deviation.parts():  # what fails is drawn on top
         chosen.insert(0, Deviation())
     for deviation in chosen:
         part = part_of(problem, failed.number, found.split)
-        rollout = drive_episode(entrant, problem, part, tier, deviation).rollout
-        runs.append(rollout.trajectory.poses)
-        outcomes.append(rollout.outcome)
+        driven = drive_episode(entrant, problem, part, tier, deviation)
+        rollouts.append(driven.rollout)
         labels.append(found.in_words(deviation).encode("ascii", "replace").decode())
     pictures = pictures_of(problem, failed.deviation, found.split, failed.number)
-    image: Image = pictures.trajectories(runs, outcomes, labels)
-    return image
+    runs: list[Points] = [each.trajectory.poses for each in rollouts]
+    whole: Image = pictures.trajectories(runs, [r.outcome for r in rollouts], labels)
+    last = rollouts[-1]
+    text = failure_text(failed, found).replace("°", " deg")
+    event = Event(
+        title=failed.row.cause or last.outcome,
+        facts=(text.encode("ascii", "replace").decode(),),
+        where=runs[-1][-1:, :2],
+        contact=contact_of(pictures.nominal, last.trajectory, last.outcome),
+    )
+    return with_close_up(whole, pictures.backdrop(), runs[-1], event)
 
 
 def part_of(problem: Task | TaskSet, number: int, split: str | None) -> Part:

@@ -56,7 +56,7 @@ class FalsifyOptions:
     out: Path | None = out_option(
         "Folder for falsify.json, counterexample.png, and curves.png."
     )
-    physics: Literal["exact", "mujoco"] = physics_option()
+    physics: Literal["exact", "mujoco", "mujoco-varied"] = physics_option()
     tier: str = tier_option()
     as_json: bool = json_option()
     worlds: int = option(

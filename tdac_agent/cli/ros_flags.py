@@ -55,8 +55,8 @@ class SimOptions:
     fault: tuple[str, ...] = option(
         (),
         "What goes wrong, as KIND@BEGIN+SECONDS after the first motion; repeatable: "
-        "no-scans, late-scans, old-scans, nan-scans, some-nan, no-poses, pose-jump, "
-        "second-publisher.",
+        "no-scans, late-scans, old-scans, nan-scans, zero-scans, some-nan, no-poses, "
+        "pose-jump, unsure-pose, second-publisher.",
         metavar="FAULT",
     )
     disturbed: bool = option(

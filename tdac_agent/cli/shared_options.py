@@ -76,8 +76,8 @@ physics_option = partial(
     option,
     "exact",
     "What moves the robot: the exact step, or MuJoCo, a 3D contact solver (extra "
-    "`physics`).",
-    metavar="exact|mujoco",
+    "`physics`); mujoco-varied varies mass, friction, axle and wheels a little.",
+    metavar="exact|mujoco|mujoco-varied",
 )
 profile_option = partial(
     option,

@@ -43,7 +43,7 @@ from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
 
 RECORDED = ("learner", "optimizer", "base_url", "max_cost", "max_tokens")
-WITH_RESUME = frozenset({"resume", "trust", "as_json", "envelope"})
+WITH_RESUME = frozenset({"resume", "trust", "as_json"})
 """Flags of a run as a whole that may be given with --resume; options of the synthesis
 may unless they are part of the run's identity."""
 _EXIT = {"verified": 0, "passed": 0, "selected": 0, "budget": 4}
@@ -71,7 +71,7 @@ def run(
     check_omitted(options, typed, on_set=problem.has_hidden)
     folder = run_flags.out or next_folder(problem.name)
     code = write(problem, folder, options, console)
-    return _with_envelope(code, folder, problem, options, run_flags, console)
+    return _with_envelope(code, folder, problem, options, console)
 
 
 def _with_envelope(
@@ -79,18 +79,17 @@ def _with_envelope(
     folder: Path,
     problem: Problem,
     options: SynthOptions,
-    run_flags: RunFlags,
     console: Console,
 ) -> int:
     """Searches for the smallest failure of what a run delivered; returns its code."""
-    if run_flags.envelope is None or code != 0:
+    if not options.envelope or code != 0:
         return code
     from tdac_agent.cli.falsify import show_envelope  # slow to import
 
     own = problem.task if problem.tasks is None else problem.tasks
     assert own is not None
-    episodes = run_flags.envelope
-    show_envelope(str(folder), own, episodes, console, options.tier, folder)
+    where = console, options.tier, folder
+    show_envelope(str(folder), own, options.envelope, *where)
     return code
 
 
@@ -163,7 +162,7 @@ def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -
     problem, folder, index = (wanted.pop(n) for n in ("problem", "out", "index"))
     settings = _restored(options, before).changed(**wanted)
     code = write(problem, folder, settings, console, index)
-    return _with_envelope(code, folder, problem, settings, run_flags, console)
+    return _with_envelope(code, folder, problem, settings, console)
 
 
 def _restored(options: SynthOptions, before: Run) -> SynthOptions:

@@ -39,13 +39,6 @@ class RunFlags:
     )
     trust: bool = trust_option()
     as_json: bool = json_option()
-    envelope: int | None = option(
-        None,
-        "At the end, search for the smallest deviation with which the controller "
-        "fails, with at most E episodes; see tdac falsify.",
-        metavar="E",
-        least=16,
-    )
 
 
 @app.command(

@@ -65,11 +65,12 @@ class VerifyOptions:
         "each failed episode."
     )
     as_json: bool = json_option()
-    physics: Literal["exact", "mujoco"] = option(
+    physics: Literal["exact", "mujoco", "mujoco-varied"] = option(
         "exact",
         "Another physics that drives what arrives again, for a second opinion (extra "
-        "`physics`); exact for none.",
-        metavar="exact|mujoco",
+        "`physics`); exact for none. mujoco-varied varies mass, friction, axle and "
+        "wheels a little.",
+        metavar="exact|mujoco|mujoco-varied",
         panel=PHYSICS,
         scope="task",
     )

@@ -97,7 +97,9 @@ class DeviatedEnv:
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """See `JudgedEnv`."""
-        self._late.append(np.clip(action, -1.0, 1.0).astype(np.float64))
+        # Faster than `np.clip`, for each step of many episodes.
+        inside = np.minimum(np.maximum(action, -1.0), 1.0)
+        self._late.append(inside.astype(np.float64))
         self._speeds += self._follow * (self._late.popleft() - self._speeds)
         wheels = self._speeds * self._wheels
         if self._own.slip:

@@ -77,6 +77,7 @@ class Record:
     _ranges: list[NDArray[np.float32]] = field(default_factory=list)
     _rooms: list[float] = field(default_factory=list)
     _movers: list[NDArray[np.float32]] = field(default_factory=list)
+    _has_movers: bool = True
     _collisions: int = 0
     _watch: GapWatch | None = None
 
@@ -170,7 +171,10 @@ class Record:
         assert self._watch is not None
         self._watch.note()
         self.contact = info.get("contact") or self.contact
-        self._movers.append(self.env.discs().astype(np.float32))
+        if self._has_movers:
+            discs = self.env.discs()
+            self._movers.append(discs.astype(np.float32))
+            self._has_movers = len(discs) > 0
         self._collisions = self.collisions_before + info["collisions"]
         return {**info, "collisions": self._collisions}
 

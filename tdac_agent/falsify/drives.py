@@ -8,19 +8,18 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from tdac_agent.evaluation.policies import Entrant
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.problems.part import Part, identity_of
 from tdac_agent.tasks.deviation import Deviation
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.tasks.provenance import versions
 from tdac_agent.tasks.task import Task
-from tdac_agent.verification.judge.deviated import shifted_env, start_of
+from tdac_agent.verification.judge.deviated import placed, shifted_env, start_of
 from tdac_agent.verification.judge.episode_job import EpisodeJob
 from tdac_agent.verification.judge.episode_row import EpisodeRow
-from tdac_agent.verification.judge.policy_spec import written
+from tdac_agent.verification.judge.policy_spec import PolicySpec, written
 from tdac_agent.verification.judge.warm import WarmJudge
 from tdac_agent.verification.judge.worlds import (
     Case,
@@ -38,6 +37,30 @@ from tdac_envs.physics.moved import EXACT
 JITTER = "jitter"
 _MOST_BYTES = 64 << 20
 Watch = Callable[[int], None]
+
+
+class Searched(Protocol):
+    """A policy that is searched for failures, ready to drive."""
+
+    @property
+    def name(self) -> str:
+        """Its name in records."""
+
+    @property
+    def policy(self) -> PolicySpec:
+        """The policy for the judge."""
+
+    @property
+    def sha256(self) -> str:
+        """Hash of its file."""
+
+    @property
+    def source(self) -> bytes | None:
+        """Source of a program; None to read its file."""
+
+    @property
+    def weights(self) -> bytes | None:
+        """Content of its weights, if it has any."""
 
 
 @dataclass(slots=True)
@@ -59,7 +82,7 @@ class Drives:
         count: Episodes so far, those of an interrupted search included.
     """
 
-    entrant: Entrant
+    entrant: Searched
     problem: Task | TaskSet
     split: str
     budget: int
@@ -98,13 +121,16 @@ class Drives:
         self._kept = self._stack.enter_context(unfinished(self.out, about))
         if self._kept is not None and (self._kept / ROWS_FILE).is_file():
             text = read_file(self._kept / ROWS_FILE, _MOST_BYTES)
-            for line in text.splitlines():
+            for line in text.splitlines(keepends=True):
+                if not line.endswith(b"\n"):  # it was not written completely
+                    break
                 kept = json.loads(line)
                 row = EpisodeRow.model_validate(kept["row"])
                 self._known[kept["case"]] = row
         return self
 
     def __exit__(self, *error: Any) -> None:
+        self.judge.end_series()
         self._stack.__exit__(*error)
 
     @property
@@ -124,13 +150,10 @@ class Drives:
         """Whether an episode can begin with shifted start and obstacles."""
         if not isinstance(self.problem, Task):
             return True
-        names = "start_x", "start_y", "heading", "obstacles_x", "obstacles_y"
-        placed = Deviation.of(
-            {n: v for n, v in deviation.parts().items() if n in names}
-        )
-        key = _key(Case(number=0, deviation=placed))
+        own = placed(deviation)
+        key = _key(Case(number=0, deviation=own))
         if key not in self._possible:
-            self._possible[key] = not placed.parts() or self._begins(placed)
+            self._possible[key] = not own.parts() or self._begins(own)
         return self._possible[key]
 
     def _begins(self, deviation: Deviation) -> bool:
@@ -147,14 +170,12 @@ class Drives:
         self,
         cases: Sequence[Case],
         variation: str = "nominal",
-        trajectories: Path | None = None,
     ) -> list[EpisodeRow | None]:
         """The rows of some cases, which must be possible; None beyond the budget.
 
         Args:
             cases: The cases.
             variation: Variation of the start of a task.
-            trajectories: Folder for `NUMBER.npz`; then all of them are driven.
         """
         keys = [f"{variation} {_key(each)}" for each in cases]
         new = [key for key in dict.fromkeys(keys) if key not in self._asked]
@@ -164,17 +185,15 @@ class Drives:
         wanted = {
             key: case
             for key, case in zip(keys, cases, strict=True)
-            if key in self._asked and (trajectories or key not in self._known)
+            if key in self._asked and key not in self._known
         }
         if wanted:
-            self._run(wanted, variation, trajectories)
+            self._run(wanted, variation)
         if self.watch is not None:
             self.watch(self.count)
         return [self._known[key] if key in self._asked else None for key in keys]
 
-    def _run(
-        self, wanted: dict[str, Case], variation: str, trajectories: Path | None
-    ) -> None:
+    def _run(self, wanted: dict[str, Case], variation: str) -> None:
         own, cases = episodes_of(self.problem), tuple(wanted.values())
         job = EpisodeJob(
             worlds=DeviatedWorlds(within=self._within(variation), cases=cases),
@@ -187,14 +206,15 @@ class Drives:
             numbers=tuple(range(len(cases))),
             tier=self.tier,
             limits=own.limits,
-            out=self._folder / f"results-{len(self._known)}-{bool(trajectories)}",
-            trajectories=trajectories,
+            out=self._folder / f"results-{len(self._known)}",
+            series=True,
         )
-        rows, ending = run_episodes(job, own.longest, self.judge)
+        series = f"{variation} of {self._folder}"
+        rows, ending = run_episodes(job, own.longest, self.judge, series=series)
         self.used = ending.tier
         for key, row in zip(wanted, rows, strict=True):
             self._known[key] = row
-        if self._kept is not None and trajectories is None:
+        if self._kept is not None:
             with (self._kept / ROWS_FILE).open("a", encoding="utf-8") as file:
                 for key in wanted:
                     kept = self._known[key].model_dump(mode="json")

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tdac_agent.evaluation.policies import Entrant
-from tdac_agent.falsify.drives import JITTER, Drives
+from tdac_agent.falsify.drives import JITTER, Drives, Searched
 from tdac_agent.falsify.search import Search, near
 from tdac_agent.problems.episodes import check_physics
 from tdac_agent.runs.falsification import (
@@ -55,6 +54,7 @@ class SearchPlan:
             None for all parts that the problem has.
         split: Split of a set.
         worlds: Number of worlds of a set, from the first one; they share the episodes.
+        chosen: Numbers of worlds of a set, instead of the first ones.
         curves: Jittered starts, or worlds, at each point of the curves of success; 0
             for none. These episodes come on top.
         physics: What moves the robot.
@@ -65,6 +65,7 @@ class SearchPlan:
     space: Mapping[str, float | None] | None = None
     split: str = "dev"
     worlds: int = WORLDS
+    chosen: tuple[int, ...] = ()
     curves: int = 0
     physics: str = EXACT
 
@@ -77,7 +78,7 @@ class SearchPlan:
 
 
 def falsify(
-    entrant: Entrant,
+    entrant: Searched,
     problem: Task | TaskSet,
     plan: SearchPlan | None = None,
     *,
@@ -92,7 +93,8 @@ def falsify(
     interrupted search has driven is taken from `out` by the next one.
 
     Args:
-        entrant: The policy, from `fitted` and `prepared`.
+        entrant: The policy; of those in `evaluation.policies`, one that is `fitted`
+            and `prepared`.
         problem: A task; or a task set, on whose worlds start and obstacles stay.
         plan: What is searched.
         tier: Sandbox tier.
@@ -161,14 +163,16 @@ def _numbers(problem: Task | TaskSet, plan: SearchPlan) -> list[tuple[int, int]]
     """Worlds, or the seed of a task, and the episodes of each."""
     if isinstance(problem, Task):
         return [(plan.seed, plan.episodes)]
-    problem.check_count(plan.split, max(plan.worlds, plan.curves), "worlds")
-    share = plan.episodes // plan.worlds
+    numbers = plan.chosen or tuple(range(plan.worlds))
+    least = max(*numbers, plan.curves - 1)
+    problem.check_count(plan.split, 1 + least, "worlds")
+    share = plan.episodes // len(numbers)
     if share < LEAST:
         raise TaskError(
-            f"{plan.episodes} episodes are too few for {plan.worlds} worlds: expected "
+            f"{plan.episodes} episodes are too few for {len(numbers)} worlds: expected "
             f"at least {LEAST} for each"
         )
-    return [(number, share) for number in range(plan.worlds)]
+    return [(number, share) for number in numbers]
 
 
 def steps_on(problem: Task | TaskSet, space: Mapping[str, float]) -> dict[str, float]:
@@ -217,7 +221,7 @@ def _curves(
 
 
 def _record(
-    entrant: Entrant,
+    entrant: Searched,
     problem: Task | TaskSet,
     plan: SearchPlan,
     space: dict[str, float],

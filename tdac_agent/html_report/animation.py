@@ -55,7 +55,7 @@ def animations(
     entries = [
         (one, *pair)
         for one in history.tried
-        for pair in _episodes(one)
+        for pair in recorded_episodes(one)
         if not brief or pair[0].outcome != "reached" or pair[0].name == NOMINAL
     ]
     most = shares([each[-1] for each in entries])
@@ -142,7 +142,7 @@ def _movers(
     return encoded
 
 
-def _episodes(one: CandidateHistory) -> Iterator[tuple[Episode, Trajectory]]:
+def recorded_episodes(one: CandidateHistory) -> Iterator[tuple[Episode, Trajectory]]:
     """The episodes of a candidate that have a stored trajectory."""
     if one.report is None:
         return

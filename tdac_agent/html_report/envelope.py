@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 from tdac_agent.html_report.scene import data_address
 from tdac_agent.runs.falsification import (
     PICTURE,
+    RECORD_FILE,
     Envelope,
     Falsification,
-    read_falsification,
+    load_falsification,
 )
 from tdac_agent.runs.falsify_text import (
     NO_PROOF,
@@ -19,17 +21,26 @@ from tdac_agent.runs.falsify_text import (
     rows_of,
     summary_of,
 )
+from tdac_agent.storage.files import read_inside
 from tdac_agent.storage.hashes import sha256_of
-from tdac_envs.core.intake import TEXT_BYTES, read_file
+from tdac_envs.core.intake import TEXT_BYTES
 
 _MOST_BYTES = 16 << 20
 
 
 def envelope_of(folder: Path) -> dict[str, Any] | None:
-    """Values for the template; None if the run has no record of this search."""
-    found = read_falsification(folder)
-    if found is None or found.policy_sha256 != _controller_sha256(folder):
+    """Values for the template; None if the run has no record of this search.
+
+    Of a record that says nothing of the run's controller, only why it does not.
+    """
+    if not os.path.lexists(folder / RECORD_FILE):
         return None
+    try:
+        found = load_falsification(folder)
+    except (OSError, ValueError):
+        return {"left_out": f"{RECORD_FILE} cannot be read, or is damaged"}
+    if found.policy_sha256 != _controller_sha256(folder):
+        return {"left_out": f"{RECORD_FILE} is of another controller"}
     failed, summary = found.counterexample, summary_of(found)
     return {
         "summary": summary[:1].upper() + summary[1:],
@@ -50,7 +61,7 @@ def _world(envelope: Envelope, found: Falsification) -> dict[str, Any]:
 def _controller_sha256(folder: Path) -> str:
     """Hash of the run's controller: a search for another one says nothing of it."""
     try:
-        return sha256_of(read_file(folder / "controller.py", TEXT_BYTES))
+        return sha256_of(read_inside(folder, "controller.py", TEXT_BYTES))
     except (OSError, ValueError):
         return ""
 
@@ -58,7 +69,7 @@ def _controller_sha256(folder: Path) -> str:
 def _picture(folder: Path) -> str | None:
     """The picture of the counterexample as a data URL; None if there is none."""
     try:
-        picture = read_file(folder / PICTURE, _MOST_BYTES)
+        picture = read_inside(folder, PICTURE, _MOST_BYTES)
     except (OSError, ValueError):
         return None
     return data_address(picture, "image/png")

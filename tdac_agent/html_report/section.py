@@ -15,6 +15,7 @@ from tdac_agent.html_report.figures import drawn
 from tdac_agent.html_report.overview import format_seconds
 from tdac_agent.html_report.scene import TaskPicture
 from tdac_agent.html_report.set_part import set_part_of
+from tdac_agent.html_report.still import MOST_STILLS, still_of
 from tdac_agent.html_report.story import story_of
 from tdac_agent.models.budget import format_usd
 from tdac_agent.plots import plot_breakdown
@@ -99,6 +100,7 @@ def section_of(
         "episodes": episodes,
         "story": story_of(history, episodes),
         "confirmed": read_confirmation(run) if run.confirmations else None,
+        "still": still_of(history) if number <= MOST_STILLS else None,
         "watchable": {(e["candidate"], e["name"]): n for n, e in enumerate(episodes)},
         "most_lines": max(least, min(most, share)),
         "most_new": NEW_LINES,

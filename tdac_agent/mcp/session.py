@@ -172,14 +172,14 @@ class Session:
     def _envelope(self, submission: Candidate, episodes: int) -> str:
         """The smallest failure that a search finds, in words."""
         # Only for agents that ask for it: slow to import.
-        from tdac_agent.evaluation.policies import entrant_of
-        from tdac_agent.falsify.falsify import LEAST, SearchPlan, falsify
+        from tdac_agent.falsify.falsify import LEAST, SearchPlan
+        from tdac_agent.synthesis.counterexample import searched
 
         if episodes < LEAST:
             raise Refused(f"envelope: expected 0, or {LEAST} and more, got {episodes}")
         assert self.problem.task is not None
-        entrant = entrant_of(str(submission.folder / "controller.py"))
-        found = falsify(entrant, self.problem.task, SearchPlan(episodes=episodes))
+        plan, terms = SearchPlan(episodes=episodes), self.trials.terms
+        found = searched(submission, self.problem.task, plan, terms)
         text, failed = summary_of(found), found.counterexample
         if failed is not None:
             text += f"\n{failure_text(failed, found)}"

@@ -22,6 +22,8 @@ LOOPBACK = """<CycloneDDS><Domain>
 <Peers><Peer Address="127.0.0.1"/></Peers></Discovery>
 </Domain></CycloneDDS>"""
 """Configuration that reaches this machine alone, with up to 60 participants."""
+MOST_TAKEN = 200
+"""Most messages of a topic that are taken at once."""
 MOST_DOMAIN = 101
 """Largest domain whose ports are free for it on all systems, as ROS 2 says."""
 
@@ -43,11 +45,12 @@ TOPICS: dict[str, tuple[type, Qos]] = {
     "odom": (msg.Odometry, STATE),
     "tf": (msg.TFMessage, TRANSFORMS),
     "tf_static": (msg.TFMessage, LATCHED),
+    "amcl_pose": (msg.PoseWithCovarianceStamped, LATCHED),
     "clock": (msg.Clock, NEWEST),
     "cmd_vel": (msg.Twist, STATE),
 }
 """Topics of a drive; their quality of service is that of ROS 2's profiles for sensor
-data, odometry, tf, the clock and commands."""
+data, odometry, tf, AMCL, the clock and commands."""
 
 
 class Bus:
@@ -104,10 +107,23 @@ class Reader:
         self._reader = reader
 
     def take(self) -> list[Any]:
-        """The messages that have arrived since the last call, oldest first."""
-        # A sample without data says that its writer is gone.
-        found = self._reader.take(200)
-        return [each for each in found if each.sample_info.valid_data]
+        """The messages that have arrived since the last call, oldest first.
+
+        What is none, such as a text that is not UTF-8, is left out: any process on the
+        network may have sent it.
+        """
+        found: list[Any] = []
+        for _ in range(MOST_TAKEN):
+            try:
+                taken = self._reader.take(1)
+            # Whatever the decoder of Cyclone DDS raises.
+            except Exception:
+                continue
+            if not taken:
+                break
+            # A sample without data says that its writer is gone.
+            found += [each for each in taken if each.sample_info.valid_data]
+        return found
 
 
 _DOMAINS: dict[int, Any] = {}

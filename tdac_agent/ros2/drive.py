@@ -5,6 +5,7 @@ from __future__ import annotations
 import hmac
 import importlib
 import math
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -30,12 +31,16 @@ from tdac_agent.ros2.package.ending import send_last
 from tdac_agent.storage.files import read_inside
 from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_json
 
-TOGETHER, MISSING = 0.5, 0.05
+OURS = "tdac_agent.ros2.package"
+"""The package of the modules that are exported."""
+MOST_FRAMES = 100
+"""Most frames of tf that are kept; a robot and its map have fewer."""
+TOGETHER, MISSING = 1.0, 0.05
 """Longest wait for scan and pose of a tick of the clock, s of the wall clock; the same
 after a tick that had none."""
 SHARE = 0.6
 """Share of a period in which the controller may answer in real time."""
-ANSWER = 1.0
+ANSWER = 2.0
 """Longest wait for an answer in simulated time, s of the wall clock."""
 CLOCK_STANDS = 10.0
 """Time after which a clock that stands still ends the drive, s of the wall clock."""
@@ -63,7 +68,11 @@ class Opened:
 
 
 def open_package(folder: Path, *, trust: bool = False) -> Opened:
-    """Imports the modules of a package, which run with the rights of this process.
+    """The modules of a package, which run with the rights of this process.
+
+    Those of a package that this installation exported are the same as tdac's own, byte
+    for byte, and tdac's own are taken: nothing else in its folder runs but the
+    controller, whose folder the mark covers.
 
     Args:
         folder: Folder of the package.
@@ -76,6 +85,8 @@ def open_package(folder: Path, *, trust: bool = False) -> Opened:
         text = read_inside(folder, f"{CONTROLLER}/{SETTINGS}", TEXT_BYTES)
         settings = parse_json(text)
         name = settings["package"]
+        if re.fullmatch(r"[a-z][a-z0-9_]*", name) is None:
+            raise ValueError("package: expected the name of a package")
     except FileNotFoundError:
         raise RunError(
             f"{folder} is not a package of tdac export ros2: it has no "
@@ -83,22 +94,25 @@ def open_package(folder: Path, *, trust: bool = False) -> Opened:
         ) from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise RunError(f"{folder}: {CONTROLLER}/{SETTINGS}: {error}") from None
-    if not trust and not is_own(folder, str(name)):
+    if is_own(folder, name):
+        return Opened(folder, settings, *_modules(OURS))
+    if not trust:
         raise RunError(
             f"{folder} was not exported by this installation, or was changed since: "
             "its code would run with your rights; read it, then give --trust"
         )
     sys.path.insert(0, str(folder.resolve()))
     try:
-        found = [
-            importlib.import_module(f"{name}.{part}")
-            for part in ("core", "motion", "scans", "worker")
-        ]
+        return Opened(folder, settings, *_modules(name))
     except ImportError as error:
         raise RunError(f"{folder}: cannot import its modules: {error}") from None
     finally:
         sys.path.pop(0)
-    return Opened(folder, settings, *found)
+
+
+def _modules(package: str) -> list[ModuleType]:
+    parts = "core", "motion", "scans", "worker"
+    return [importlib.import_module(f"{package}.{part}") for part in parts]
 
 
 def is_own(folder: Path, name: str) -> bool:
@@ -158,7 +172,8 @@ class Node:
         self.dt = settings.dt
         self._package, self._bus, self._say = package, bus, say
         self._sim_time, self._origin = sim_time, origin
-        self._in = {name: bus.reader(name) for name in ("scan", "odom", "tf", "clock")}
+        names = ("scan", "odom", "tf", "amcl_pose", "clock")
+        self._in = {name: bus.reader(name) for name in names}
         self._out = bus.writer("cmd_vel")
         self._frames: dict[str, tuple[str, tuple[float, float, float]]] = {}
         self._said = ""
@@ -172,15 +187,19 @@ class Node:
         """
         end = math.inf if seconds is None else time.monotonic() + seconds
         self._end = end
-        self._send(self._package.core.Command(0.0, 0.0, "waiting"))
         try:
+            self._send(self._package.core.Command(0.0, 0.0, "waiting"))
             while self.core.final is None:
                 self._tick()
                 if time.monotonic() > end:
                     self.core.end("out of time")
         finally:
             last = self.core.end("the node was told to end")
-            send_last(self._send, last, PERIODS * self.dt)
+            try:
+                send_last(self._send, last, PERIODS * self.dt)
+            except KeyboardInterrupt:  # a second signal ends it at once
+                self._send(last)
+                raise
         return last
 
     def _tick(self) -> None:
@@ -229,7 +248,11 @@ class Node:
                 pose = self._package.motion.compose(
                     self._origin, self._pose_of(message.pose.pose, "position")
                 )
+                self.core.localised(_variances(message))
                 self.core.pose(seconds_of(message.header.stamp), *pose)
+        for message in self._in["amcl_pose"].take():
+            if self._origin is None:
+                self.core.localised(_variances(message))
         for message in self._in["scan"].take():
             layout = self._package.scans.Layout(
                 len(message.ranges),
@@ -243,6 +266,9 @@ class Node:
     def _place(self, each: Any) -> None:
         """Takes a transform; the pose is map to odom to base_link."""
         pose = self._pose_of(each.transform, "translation")
+        is_new = each.child_frame_id not in self._frames
+        if is_new and len(self._frames) >= MOST_FRAMES:
+            self._frames.clear()
         self._frames[each.child_frame_id] = each.header.frame_id, pose
         if each.child_frame_id == "base_link" and self._origin is None:
             parent, own = self._frames["base_link"]
@@ -266,8 +292,16 @@ class Node:
             twist = msg.TwistStamped(
                 msg.Header(time_of(max(now, 0.0)), "base_link"), twist
             )
-        self._out.write(twist)
+        # By this time of the sample a simulation knows which tick it answers.
+        tick = round(max(self._clock, 0.0) * 1e9) + 1 if self._sim_time else None
+        self._out.write(twist, tick)
         text = f"{command.state}: {command.reason}".rstrip(": ")
         if text != self._said:
             self._said = text
             self._say(text)
+
+
+def _variances(message: Any) -> tuple[float, float, float]:
+    """Variances of x, y and yaw of a message with a pose and its covariance."""
+    own = message.pose.covariance
+    return own[0], own[7], own[35]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import keyword
 import math
+import platform
 import re
-import shlex
 import shutil
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +40,9 @@ CONTROLLER = "controller"
 SETTINGS = "settings.json"
 MARK = "tdac.mark"
 NOT_RUN = "The core was driven over DDS; the rclpy wrapper was not run."
+UNVERIFIED = "The controller is not verified."
+FOLDERS = "controller", "config", "launch", "maps", "resource", "rviz", "test"
+"""Folders of a package beside that of its modules."""
 MAINTAINER = {"maintainer": "maintainer", "email": "maintainer@example.com"}
 
 
@@ -79,9 +84,10 @@ def export_ros2(
     run, task = load_run(run_folder), load_task(run_folder)
     if run.tau is None or not run.controller.is_file():
         raise RunError(f"{run_folder} has no controller that passed ({run.status})")
-    is_verified, verdict = _verdict(run)
+    verdict, why = _verdict(run)
+    is_verified = bool(verdict)
     if not is_verified and not unverified:
-        raise RunError(f"{verdict}; give --unverified to export it all the same")
+        raise RunError(f"{why}; give --unverified to export it all the same")
     settings = settings_of(task)
     own = _core_settings(settings)
     package = package_name(task.name) if name is None else _checked(name)
@@ -93,13 +99,15 @@ def export_ros2(
             "package": package,
             "controller_sha256": sha256_of(source),
             "verified": is_verified,
-            "verdict": verdict,
+            "verdict": verdict or UNVERIFIED,
         }
     )
-    made = RosPackage(out, package, is_verified, verdict, own.stops_within())
+    made = RosPackage(
+        out, package, is_verified, verdict or UNVERIFIED, own.stops_within()
+    )
     existed = out.exists()
     try:
-        _write(made, task, settings, source, run_folder)
+        _write(made, task, settings, source)
     except BaseException:
         if not existed:
             shutil.rmtree(out, ignore_errors=True)
@@ -223,17 +231,23 @@ def _checked(name: str) -> str:
             f"--name {name!r}: a ROS package has lower-case letters, digits and single "
             "underscores, and begins with a letter"
         )
+    taken = {*FOLDERS, *sys.stdlib_module_names, *keyword.kwlist, "numpy", "rclpy"}
+    if name in taken:
+        raise RunError(
+            f"--name {name}: Python, or the package itself, has this name; try "
+            f"tdac_{name}"
+        )
     return name
 
 
-def _verdict(run: Run) -> tuple[bool, str]:
-    """Whether the controller of a run is verified, and what to say about it."""
+def _verdict(run: Run) -> tuple[str, str]:
+    """The verdict of a run, or else an empty text and why there is none."""
     if remark := remark_on(run):
-        return False, f"{remark}: its verdict is only what its files claim"
+        return "", f"{remark}: its verdict is only what its files claim"
     report = read_confirmation(run) if run.verified else None
     if report is None:
-        return False, f"the controller of {run.folder} is not verified ({run.status})"
-    return True, f"Verified: {verified_text(report)}."
+        return "", f"the controller of {run.folder} is not verified ({run.status})"
+    return f"Verified: {verified_text(report)}.", ""
 
 
 def _write(
@@ -241,11 +255,9 @@ def _write(
     task: Task,
     settings: dict[str, Any],
     source: bytes,
-    run_folder: Path,
 ) -> None:
     out, name = made.folder, made.name
-    folders = (name, "controller", "config", "launch", "maps", "resource", "rviz")
-    for folder in (*folders, "test"):
+    for folder in (name, *FOLDERS):
         (out / folder).mkdir(parents=True, exist_ok=True)
     write_workdir(out / CONTROLLER, task)
     write_atomic(out / CONTROLLER / "controller.py", source)
@@ -259,7 +271,7 @@ def _write(
     grid = setting.nominal.terrain.grid
     assert grid.resolution is not None
     write_ros_map(out / "maps", grid, grid.resolution, grid.origin)
-    values = _values(made, settings, run_folder)
+    values = _values(made, settings)
     templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(PACKAGE),
         undefined=jinja2.StrictUndefined,
@@ -283,21 +295,20 @@ def _write(
     write_atomic(out / MARK, mark_of(out))
 
 
-def _values(
-    made: RosPackage, settings: dict[str, Any], run_folder: Path
-) -> dict[str, Any]:
-    """What the templates say."""
+def _values(made: RosPackage, settings: dict[str, Any]) -> dict[str, Any]:
+    """What the templates say; nothing of it names a place of this machine."""
     robot, dt = settings["robot"], settings["dt"]
     word, warning, verdict = "verified", "", made.verdict
     if not made.verified:
         word, warning = "exported", "NOT VERIFIED. "
-        verdict = f"**Not verified.** {made.verdict}."
+        verdict = f"**Not verified.** {made.verdict}"
     speed = min(robot["max_wheel_speed"], robot.get("max_speed") or math.inf)
     way = "with" if robot["is_scanner"] else "of any scanner, resampled to"
     return {
         **MAINTAINER,
         "name": made.name,
-        "task": settings["task"],
+        # A name may have any printable characters, such as those of Markdown.
+        "task": re.sub(r"[^\w .,+-]", "_", settings["task"]),
         "verdict": verdict,
         "word": word,
         "short": f"{warning}Drives {made.name} with a {word} controller",
@@ -318,8 +329,7 @@ def _values(
         f"{robot['range_max']:g} m",
         "stops": made.stops,
         "numpy": np.__version__,
-        "run": shlex.quote(run_folder.as_posix()),
-        "out": shlex.quote(made.folder.as_posix()),
+        "python": platform.python_version(),
     }
 
 

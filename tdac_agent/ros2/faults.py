@@ -15,14 +15,19 @@ KINDS = {
     "late-scans": "each scan arrives half a second late",
     "old-scans": "the last scan is sent again and again",
     "nan-scans": "all ranges are NaN",
+    "zero-scans": "all ranges are 0",
     "some-nan": "one range of ten is NaN",
     "no-poses": "no pose arrives",
     "pose-jump": "the pose is wrong by 0.3 m and 0.3 rad",
+    "unsure-pose": "the localiser states a standard deviation of 1 m",
     "second-publisher": "another node has a publisher of commands",
 }
 """Faults of the robot and its sensors; those of the node come from outside."""
-STOPPING = ("no-scans", "late-scans", "old-scans", "nan-scans", "no-poses")
-"""Faults by which scans or poses become too old, if they last."""
+STOPPING = (
+    *("no-scans", "late-scans", "old-scans", "nan-scans", "zero-scans", "no-poses"),
+    *("pose-jump", "unsure-pose"),
+)
+"""Faults that stop the robot, if they last."""
 LATE = 0.5
 """Delay of a late scan, s."""
 _FAULT = re.compile(r"([a-z-]+)@(\d+(?:\.\d+)?)\+(\d+(?:\.\d+)?)")

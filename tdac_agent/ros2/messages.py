@@ -117,6 +117,16 @@ class PoseWithCovariance(
 
 
 @dataclass
+class PoseWithCovarianceStamped(
+    IdlStruct, typename="geometry_msgs::msg::dds_::PoseWithCovarianceStamped_"
+):
+    """`geometry_msgs/msg/PoseWithCovarianceStamped`."""
+
+    header: Header = field(default_factory=Header)
+    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
+
+
+@dataclass
 class TwistWithCovariance(
     IdlStruct, typename="geometry_msgs::msg::dds_::TwistWithCovariance_"
 ):

@@ -36,9 +36,13 @@ SAME = 1e-3
 """Largest difference of equal commands, as a share of the full speeds."""
 APART = 5.0
 """Stamps that differ more from the times of recording are of another clock, s."""
+MOST = 1e6
+"""Number below which places (m), speeds (m/s) and turn rates (rad/s) are."""
 REACH = 1.0
 """Farthest obstacle of which a gap is computed, m."""
 MOST_SHOWN = 10
+MOST_HOPS = 20
+"""Most frames between a robot and its map."""
 BASES = ("base_link", "base_footprint")
 Pose = tuple[float, float, float]
 
@@ -70,7 +74,7 @@ class RecordedReport:
         same: How many of them are the controller's.
         stood: How many are zero where the controller would have driven.
         differences: The first of the others.
-        different: Number of the others.
+        different: Number of the others, with those that are not finite or huge.
         stops: How often the commands stopped the robot on the way.
         stopped: How long, s.
         way: Driven path by the poses, m.
@@ -117,7 +121,7 @@ def compare(
         TaskError: The task is not one that a robot drives.
     """
     settings = settings_of(task)
-    messages = list(read_bag(bag))
+    messages = read_bag(bag)
     topics = _topics(bag, messages)
     with Policy(source, task, tier) as policy:
         own = core_settings(settings, dead_man=PERIODS * settings["dt"], any_start=True)
@@ -149,7 +153,8 @@ def _topics(bag: Path, messages: list[Recorded]) -> _Topics:
         if end == "pose":  # other topics of poses are goals and guesses
             names = best = [name for name in best if not name.endswith("initialpose")]
         if len(best or names) > 1:
-            raise RunError(f"{bag} has several {what}: {', '.join(best or names)}")
+            few = ", ".join((best or names)[:5])
+            raise RunError(f"{bag} has several {what}: {few}")
         return next(iter(best or names), None)
 
     scan = one("scans", "scan", SCAN)
@@ -204,7 +209,7 @@ class _Drive:
         self.poses: list[tuple[float, Pose]] = []
         self._commands: list[tuple[float, float, float]] = []
         self._found: list[Difference] = []
-        self._same = self._stood = 0
+        self._same = self._stood = self._impossible = 0
         self._gap = math.inf
         self._last = ""
 
@@ -251,6 +256,8 @@ class _Drive:
     def _see(self, layout: Layout, ranges: NDArray[np.float64]) -> None:
         """Notes the smallest gap between the body and what a scan shows."""
         robot = self._settings["robot"]
+        if not np.isfinite(layout.angles()).all():
+            return
         real = (ranges >= layout.range_min) & (ranges < layout.range_max)
         turn, length = layout.angles()[real], ranges[real]
         ahead, left = robot.get("scanner_offset") or (0.0, 0.0)
@@ -268,7 +275,7 @@ class _Drive:
             return
         frame, pose = base, (0.0, 0.0, 0.0)
         moved = False
-        for _ in range(len(self._frames)):
+        for _ in range(min(len(self._frames), MOST_HOPS)):
             if frame not in self._frames:
                 return
             moved = moved or frame == child
@@ -281,6 +288,8 @@ class _Drive:
                 return
 
     def _pose(self, stamp: float, pose: Pose) -> None:
+        if not all(abs(each) < MOST for each in pose):
+            return
         self._core.pose(stamp, *pose)
         if self._began is not None:
             self.poses.append((stamp, pose))
@@ -291,6 +300,9 @@ class _Drive:
 
     def _command(self, v: float, omega: float) -> None:
         """Compares a command; before the first motion there are none."""
+        if not (abs(v) < MOST and abs(omega) < MOST):
+            self._impossible += 1
+            return
         if self._began is None and v == omega == 0.0:
             return
         if self._began is None:
@@ -329,7 +341,7 @@ class _Drive:
             same=self._same,
             stood=self._stood,
             differences=tuple(self._found[:MOST_SHOWN]),
-            different=len(self._found),
+            different=len(self._found) + self._impossible,
             stops=stops,
             stopped=round(stopped, 3),
             way=round(sum(map(math.dist, ways, ways[1:])), 4),

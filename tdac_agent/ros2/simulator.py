@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.ros2 import messages as msg
-from tdac_agent.ros2.bag import Bag
+from tdac_agent.ros2.bag import BEGIN, Bag
 from tdac_agent.ros2.dds import Bus, time_of
 from tdac_agent.ros2.faults import LATE, Course, Fault
 from tdac_agent.ros2.package.motion import compose, inverse
@@ -21,10 +21,14 @@ from tdac_agent.ros2.robot import Robot
 Pose = tuple[float, float, float]
 JUMP = (0.2, 0.22, 0.3)
 """A wrong pose: 0.3 m and 0.3 rad, in the robot's frame."""
-PATIENCE = 2.0
+SURE, UNSURE = 0.01, 1.0
+"""Variances of x and y that the localiser states, m²."""
+PATIENCE = 5.0
 """Longest wait for a command in simulated time, s of the wall clock."""
 IMPATIENCE = 0.05
 """The same after a command that did not come."""
+REPEAT = 0.3
+"""Time after which the messages of a tick without a command are sent again, s."""
 DISCOVERY = 0.3
 """Time in which other processes notice a writer, s."""
 IDLE_SECONDS = 60.0
@@ -89,7 +93,7 @@ class Simulator:
         self._courses = [Course(fault) for fault in faults]
         self._active: set[str] = set()
         self._patience, self._watch, self._bag = patience, watch, bag
-        names = ("scan", "odom", "tf", "tf_static", "clock")
+        names = ("scan", "odom", "tf", "tf_static", "amcl_pose", "clock")
         self._out = {name: bus.writer(name) for name in names}
         self._commands = bus.reader("cmd_vel")
         self._other: Any = None
@@ -97,8 +101,10 @@ class Simulator:
         self._start: Pose = x, y, yaw
         self._held: deque[tuple[float, Any]] = deque()
         self._last_scan: Any = None
-        self._clock = time.time() if real_time else 0.0
+        self._clock = time.time() if real_time else BEGIN
+        self._sent: list[tuple[str, Any]] = []
         self._is_patient = self._moves = False
+        self._answered = -1.0
         self._steps = self._received = self._stops = 0
         self._tell_static()
 
@@ -169,6 +175,7 @@ class Simulator:
             return False
         for each in taken:
             self._record("cmd_vel", each)
+        self._answered = 1e-9 * taken[-1].sample_info.source_timestamp
         twist = taken[-1].twist if self._bus.stamped else taken[-1]
         v, omega = twist.linear.x, twist.angular.z
         self._moves = self._moves or bool(v or omega)
@@ -178,15 +185,29 @@ class Simulator:
         return True
 
     def _await(self) -> None:
-        """Waits for the command of this period."""
-        patience = self._patience if self._is_patient else IMPATIENCE
-        end = time.monotonic() + patience
-        while not self._take():
+        """Waits for the command of this period.
+
+        A node of `tdac ros drive` says which tick of the clock it answers, so that a
+        late answer to an earlier tick is not taken for that of this one. The drive then
+        has the commands of the verified episode, however slow the machine is.
+        """
+        begins = not self._moves and self._bus.publishers("cmd_vel") > 0
+        is_patient = self._is_patient or begins
+        end = time.monotonic() + (self._patience if is_patient else IMPATIENCE)
+        again = time.monotonic() + REPEAT
+        while True:
+            if self._take():
+                self._is_patient = True
+                if self._answered > self._clock - 0.5 * self._robot.dt:
+                    return
+                end = time.monotonic() + self._patience
             if time.monotonic() > end:
                 self._is_patient = False
                 return
+            if time.monotonic() > again:  # a message of this tick may be lost
+                self._repeat()
+                again = time.monotonic() + REPEAT
             time.sleep(0.0003)
-        self._is_patient = True
 
     def _sleep_until(self, due: float) -> None:
         while (rest := due - time.monotonic()) > 0.0:
@@ -195,15 +216,18 @@ class Simulator:
 
     def _let_end(self) -> None:
         """Shows the robot where it stands, until the node has sent its last zero."""
-        for _ in range(LAST_TICKS):
+        received = self._received
+        for tick in range(LAST_TICKS):
             self._clock += self._robot.dt
             self._active = set()
             self._publish()
-            received = self._received
+            if tick == 0 and not self._real:
+                self._await()
             self._sleep_until(time.monotonic() + 0.02)
-            self._received = received
+        self._received = received
 
     def _publish(self) -> None:
+        self._sent = []
         now = time.time() if self._real else self._clock
         reading, stamp = self._robot.read(), time_of(now)
         x, y, yaw = map(float, reading.pose)
@@ -223,7 +247,12 @@ class Simulator:
         if not self._real:
             self._send("clock", msg.Clock(stamp))
 
+    def _repeat(self) -> None:
+        for name, message in self._sent:
+            self._out[name].write(message)
+
     def _send(self, name: str, message: Any) -> None:
+        self._sent.append((name, message))
         self._out[name].write(message)
         self._record(name, message)
 
@@ -237,6 +266,8 @@ class Simulator:
         layout, values = self._robot.layout, ranges.astype(np.float64)
         if "nan-scans" in self._active:
             values[:] = math.nan
+        elif "zero-scans" in self._active:
+            values[:] = 0.0
         elif "some-nan" in self._active:
             values[::10] = math.nan
         last = layout.first + layout.step * (layout.count - 1)
@@ -272,6 +303,13 @@ class Simulator:
         moving = [_transform(stamp, "map", "odom", begin)]
         moving.append(_transform(stamp, "odom", "base_link", own))
         self._send("tf", msg.TFMessage(moving))
+        place = compose(begin, own)
+        spread = [0.0] * 36
+        spread[0] = spread[7] = UNSURE if "unsure-pose" in self._active else SURE
+        pose = msg.Pose(msg.Point(*place[:2]), _turn(place[2]))
+        unsure = msg.PoseWithCovariance(pose, spread)
+        header = msg.Header(stamp, "map")
+        self._send("amcl_pose", msg.PoseWithCovarianceStamped(header, unsure))
 
     def _tell_static(self) -> None:
         offset = self._robot.settings["robot"].get("scanner_offset") or (0.0, 0.0)

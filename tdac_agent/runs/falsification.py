@@ -3,23 +3,39 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, ConfigDict, Field
 
 from tdac_agent.runs.deviation_text import part_text, value_text
-from tdac_agent.storage.printable_record import StrictRecord
-from tdac_agent.tasks.deviation import Deviation
+from tdac_agent.storage.printable_record import StrictRecord, load_record
+from tdac_agent.tasks.deviation import DEVIATIONS, Deviation
 from tdac_agent.tasks.units import Frame, Place, Units, units_in
 from tdac_agent.verification.judge.episode_row import EpisodeRow
-from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 RECORD_FILE, PICTURE = "falsify.json", "counterexample.png"
 
 
-class Direction(StrictRecord):
+def _known(part: str) -> str:
+    if part not in DEVIATIONS:
+        raise ValueError(f"there is no deviation {part!r:.40}")
+    return part
+
+
+PartName = Annotated[str, AfterValidator(_known)]
+Size = Annotated[float, Field(gt=0.0)]
+
+
+class FiniteRecord(StrictRecord):
+    """A record without infinite numbers."""
+
+    model_config = ConfigDict(allow_inf_nan=False)
+
+
+class Direction(FiniteRecord):
     """A part of a deviation, alone, in one direction."""
 
-    part: str
+    part: PartName
     sign: int
     survives: float = Field(description="Largest value that was survived, from 0 on.")
     fails: float | None = Field(
@@ -34,7 +50,7 @@ class Direction(StrictRecord):
     cause: str | None = Field(None, description="Cause of the smallest failure.")
 
 
-class Counterexample(StrictRecord):
+class Counterexample(FiniteRecord):
     """The smallest failure that was found."""
 
     number: int = Field(description="Seed of the task, or number of the world.")
@@ -44,16 +60,16 @@ class Counterexample(StrictRecord):
     row: EpisodeRow = Field(description="The failed episode.")
 
 
-class Point(StrictRecord):
+class Point(FiniteRecord):
     """Success at one value of one part, over jittered starts."""
 
-    part: str
+    part: PartName
     value: float
-    count: int
-    successes: int
+    count: int = Field(ge=1)
+    successes: int = Field(ge=0)
 
 
-class Envelope(StrictRecord):
+class Envelope(FiniteRecord):
     """What a policy survives in one world.
 
     Attributes:
@@ -67,7 +83,7 @@ class Envelope(StrictRecord):
     episodes: int = Field(0, description="Episodes that were driven for it.")
 
 
-class Falsification(StrictRecord):
+class Falsification(FiniteRecord):
     """A search for the smallest failure, and no proof that there is no smaller one."""
 
     schema_version: int = 1
@@ -79,9 +95,11 @@ class Falsification(StrictRecord):
     split: str | None = None
     unit: Place = "px"
     frame: Frame | None = None
-    radius: float = Field(description="Body radius, px or m.")
-    dt: float = Field(description="Duration of a step, s.")
-    space: dict[str, float] = Field(description="Parts that were searched, and sizes.")
+    radius: Size = Field(description="Body radius, px or m.")
+    dt: Size = Field(description="Duration of a step, s.")
+    space: dict[PartName, Size] = Field(
+        description="Parts that were searched, and sizes."
+    )
     seed: int
     physics: str = Field("exact", description="What moved the robot.")
     budget: int = Field(description="Most episodes of the search.")
@@ -121,7 +139,16 @@ class Falsification(StrictRecord):
 def read_falsification(folder: Path) -> Falsification | None:
     """The record in a folder; None if there is none that can be read."""
     try:
-        data = read_file(folder / RECORD_FILE, RECORD_BYTES)
-        return Falsification.model_validate_json(data)
+        return load_falsification(folder)
     except (OSError, ValueError):
         return None
+
+
+def load_falsification(folder: Path) -> Falsification:
+    """The record in a folder.
+
+    Raises:
+        OSError: There is none, it cannot be read, or a link leads out of the folder.
+        ValueError: It is damaged.
+    """
+    return load_record(Falsification, folder, RECORD_FILE)

@@ -82,7 +82,7 @@ def summary_of(found: Falsification) -> str:
     plain = [each.number for each in found.envelopes if not each.base.success]
     if plain and found.split is None:
         return "fails without a deviation: there is nothing to search for"
-    lines = [_survived(found)] if any(e.directions for e in found.envelopes) else []
+    lines = [survived_text(found)] if any(e.directions for e in found.envelopes) else []
     if plain:
         worlds = ", ".join(map(str, plain))
         lines.append(f"fails without a deviation in world {worlds}")
@@ -102,7 +102,7 @@ def summary_of(found: Falsification) -> str:
     return "; ".join(lines)
 
 
-def _survived(found: Falsification) -> str:
+def survived_text(found: Falsification) -> str:
     """What is survived of the parts that can make it fail, alone."""
     own = [d for each in found.envelopes for d in each.directions]
     texts, done = [], set()

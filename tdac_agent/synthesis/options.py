@@ -81,6 +81,16 @@ class SynthOptions:
         metavar="KINDS",
         identity=True,
     )
+    envelope: int = option(
+        0,
+        "At the end, search for the smallest deviation with which the controller "
+        "fails, with at most E episodes; see tdac falsify. A race also searches for "
+        "that of each candidate that is the best one, and tells it in its questions; "
+        "these episodes come on top.",
+        metavar="E",
+        least=16,
+        identity=True,
+    )
     start_from: str | Path | None = option(
         None,
         "Controller to begin with.",
@@ -130,11 +140,12 @@ class SynthOptions:
         "--confirm/--no-confirm",
         scope="task",
     )
-    physics: Literal["exact", "mujoco"] = option(
+    physics: Literal["exact", "mujoco", "mujoco-varied"] = option(
         "exact",
         "Another physics that drives what arrives again, for a second opinion in the "
-        "report (extra `physics`); exact for none.",
-        metavar="exact|mujoco",
+        "report (extra `physics`); exact for none. mujoco-varied varies mass, "
+        "friction, axle and wheels a little.",
+        metavar="exact|mujoco|mujoco-varied",
         scope="task",
         recorded=False,
     )

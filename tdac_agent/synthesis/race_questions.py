@@ -20,6 +20,11 @@ of the better one by this mean time score."""
 MOST_REFUSED = 3
 MOST_KNOWN = 8
 """Most candidates with a line of their own, the best ones."""
+COUNTEREXAMPLE = (
+    "Robots and worlds differ a little from what a controller is told. In these "
+    "drives, only what is named differed. It is a search: there may be smaller "
+    "failures."
+)
 AIMS = {
     "repair": "Find out what costs most, failures or time, and repair that.",
     FASTER: "Save time where it is lost: the table says in which worlds, and on what.",
@@ -71,6 +76,7 @@ class RaceQuestions:
             best, others = ranked[0].candidate, [each.candidate for each in ranked[1:]]
             parts += ["", f"### The best one, candidate {best.name}"]
             parts += self._drives(best, [], others)
+        parts += self._smallest_failure()
         for each in ranked[1:3]:
             failed, name = told.failures(each.candidate), each.candidate.name
             parts += ["", f"### Failures of candidate {name}", failed] if failed else []
@@ -80,6 +86,15 @@ class RaceQuestions:
         """What all drives show of the robot, under a heading; none if it is nothing."""
         found = self._trials.pool_feedback.robot() or nothing
         return ["### What all drives show of the robot", found] if found else []
+
+    def _smallest_failure(self) -> list[str]:
+        """What the best member survives and what not, if the run searches for it."""
+        top = self._archive.top
+        told = "" if top is None else self._trials.counterexample(top.candidate)
+        if top is None or not told:
+            return []
+        head = f"### How far candidate {top.candidate.name} carries"
+        return ["", head, COUNTEREXAMPLE, told]
 
     def _refused(self) -> list[str]:
         """Why the latest candidates that did not drive were refused."""
@@ -110,6 +125,7 @@ class RaceQuestions:
         lines += ["", *self._drives(parent.candidate, others[:2], siblings)]
         robot = self._robot()
         lines += ["", *robot] if robot else []
+        lines += self._smallest_failure()
         for each in partners:
             source = each.candidate.source.rstrip()
             lines += ["", f"### The other controller, candidate {each.candidate.name}"]

@@ -24,6 +24,7 @@ from tdac_agent.synthesis.confirming import (
     drive_blind,
     keep_confirmation,
 )
+from tdac_agent.synthesis.counterexample import counterexample_text
 from tdac_agent.synthesis.delivery import (
     compared,
     place_verified,
@@ -174,6 +175,10 @@ class SuiteTrials:
         scene = self.task.nominal, self.task.setting.units
         first = seeds_for(self.terms.recorder.run, POOL, 0).start
         return PoolFeedback("episode", first, lambda _: scene)
+
+    def counterexample(self, candidate: Candidate) -> str:
+        """See `Trials`."""
+        return counterexample_text(candidate, self.task, self.terms, 0)
 
     def admit(self, candidate: Candidate) -> Explored | None:
         """See `Trials`: only what passes all tests drives."""

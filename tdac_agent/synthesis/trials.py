@@ -71,6 +71,12 @@ class Trials(Protocol):
     def pool_feedback(self) -> PoolFeedback:
         """Tells models how candidates drove in a race."""
 
+    def counterexample(self, candidate: Candidate) -> str:
+        """The smallest deviation with which a candidate of a race fails, in lines.
+
+        Empty if the options ask for no such search.
+        """
+
     def can_explore(self, asked: int) -> bool:
         """Whether there are episodes for another candidate of a race.
 

@@ -17,6 +17,7 @@ from tdac_agent.synthesis.candidates import (
     Result,
     ToldEpisode,
 )
+from tdac_agent.synthesis.counterexample import counterexample_text
 from tdac_agent.synthesis.delivery import Compared, compared, selection_of
 from tdac_agent.synthesis.disturbed import time_of
 from tdac_agent.synthesis.driving import drive_candidate
@@ -183,6 +184,11 @@ class WorldTrials:
     def pool_feedback(self) -> PoolFeedback:
         """See `Trials`."""
         return PoolFeedback("world", self.first_for("improve"), self._scene)
+
+    def counterexample(self, candidate: Candidate) -> str:
+        """See `Trials`."""
+        first = self.first_for("improve")
+        return counterexample_text(candidate, self.tasks, self.terms, first)
 
     def _scene(self, number: int) -> tuple[Nominal, Units]:
         task = self.tasks.task("dev", number)

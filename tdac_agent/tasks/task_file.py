@@ -22,6 +22,7 @@ from tdac_envs.core.intake import TEXT_BYTES, parse_yaml, read_file
 from tdac_envs.core.strict_model import StrictModel
 from tdac_envs.mapping.params import MOST_RAYS, FrameName, Length, Place
 from tdac_envs.movers.spec import AnySpec, Spec, read_specs
+from tdac_envs.robots.robot_file import Body
 
 TASK_FILE = "task.yaml"
 """File name in the folder of a task or a run."""
@@ -97,6 +98,7 @@ class RobotSpec(StrictModel):
     stopping_distance: Length | None = Field(
         None, description="From full speed to standstill, px."
     )
+    body: Body | None = Field(None, description="For another physics, as in its file.")
     image: Path | None = Field(None, description="Picture of the robot, facing +x.")
 
 

@@ -32,6 +32,7 @@ def run_episodes(
     simulated: float,
     judge: WarmJudge | None = None,
     watch: Watch | None = None,
+    series: str = "",
 ) -> tuple[list[EpisodeRow], JobEnding]:
     """Runs a job; returns its rows and its ending.
 
@@ -40,6 +41,7 @@ def run_episodes(
         simulated: Longest simulated time of an episode, s.
         judge: A warm judge; None starts one for this call.
         watch: Called repeatedly with the numbers of episodes and successes so far.
+        series: Name of the series if the job is one of a series; see `WarmJudge.run`.
 
     Raises:
         Fault: The judge or the sandbox is broken.
@@ -52,7 +54,7 @@ def run_episodes(
     longest = SLOWEST * simulated * len(job.numbers) + DEADLINE_SECONDS
     with contextlib.ExitStack() as stack:
         warm = judge or stack.enter_context(WarmJudge())
-        warm.run(request, longest, tail.read)
+        warm.run(request, longest, tail.read, series)
     tail.read()
     return tail.rows, _ending(job.out / ENDING_FILE, request.parent / "output.txt")
 

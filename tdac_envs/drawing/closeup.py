@@ -107,6 +107,25 @@ def bounded_picture(
     return padded
 
 
+def with_close_up(
+    whole: Image, background: Backdrop, poses: Points, event: Event
+) -> Image:
+    """Another picture of a map, with the close-up and the caption of a run beside it.
+
+    Args:
+        whole: The picture, uint8 RGB.
+        background: Background of the run's task.
+        poses: Shape (T + 1, 3): x, y, heading.
+        event: The event to show.
+    """
+    window = _window(background, event, poses, background.whole().scale)
+    close = None
+    if window is not None:
+        own = background.close_up(window)
+        close = _close_up(own, poses, event, background.radius)
+    return _side_by_side(whole, _column(event, close))
+
+
 def _draw(
     background: Backdrop, chart: Chart, poses: Points, event: Event, zoom: float = 1.0
 ) -> Image:

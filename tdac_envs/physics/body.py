@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from tdac_envs.core.arguments import non_negative, positive
+from tdac_envs.core.arguments import non_negative, positive, whole_number
 from tdac_envs.core.errors import TaskError
 
 GRAVITY = 9.81
 """m/s²"""
+_MOST_SEED = 2**63 - 1
 _MAY_BE_ZERO = "bottom", "grip", "caster_friction", "friction"
 
 
@@ -33,6 +34,8 @@ class BodySpec:
         grip: Coulomb friction coefficient of the tyres on the ground.
         caster_friction: Coulomb friction coefficient of the casters on the ground.
         friction: Coulomb friction coefficient of the cylinder on what it touches.
+        varied: Seed with which mass, frictions, axle and wheels are varied at each
+            reset; None for the robot as it is described.
 
     Raises:
         TaskError: A value is not valid.
@@ -50,11 +53,15 @@ class BodySpec:
     grip: float = 1.0
     caster_friction: float = 0.02
     friction: float = 1.0
+    varied: int | None = None
 
     def __post_init__(self) -> None:
         for one in fields(self):
             value = getattr(self, one.name)
-            if value is None and one.name == "torque":
+            if value is None and one.name in {"torque", "varied"}:
+                continue
+            if one.name == "varied":
+                whole_number("physics: varied", value, 0, _MOST_SEED)
                 continue
             check = non_negative if one.name in _MAY_BE_ZERO else positive
             object.__setattr__(self, one.name, check(f"body: {one.name}", value))

@@ -15,6 +15,7 @@ from tdac_envs.physics import mjcf
 from tdac_envs.physics.body import BodySpec
 from tdac_envs.physics.moved import Moved, Pose
 from tdac_envs.physics.scene import Scene
+from tdac_envs.physics.varied import AS_DESCRIBED, Described, Variation, variation_at
 
 Array = NDArray[np.float64]
 _REST = 0.5
@@ -77,6 +78,8 @@ class MujocoBody:
             reason = " ".join(str(error).split())
             raise TaskError(f"MuJoCo refuses the world: {reason:.200}") from None
         self.data = engine.MjData(self.model)
+        self._described = Described(engine, self.model)
+        self.variation = AS_DESCRIBED
         self._hull = self.model.geom(mjcf.HULL).id
         self._ground = self.model.geom(mjcf.GROUND).id
         self._at, self._going = self._joint(mjcf.ROBOT)
@@ -114,6 +117,7 @@ class MujocoBody:
     def reset(self, pose: Pose) -> None:
         """Begins an episode at a pose; see `moved.Physics`."""
         engine, data, at = self._engine, self.data, self._at
+        self._vary(variation_at(pose, self._body.varied))
         engine.mj_resetData(self.model, data)
         data.qpos[:] = self._rest
         data.qpos[at : at + 2] = pose[:2]
@@ -124,12 +128,19 @@ class MujocoBody:
         engine.mj_forward(self.model, data)
         self._origins = self._things_now()
 
+    def _vary(self, found: Variation) -> None:
+        """Takes over how the robot differs from its description."""
+        if found != self.variation:
+            self._described.apply(found, self.data)
+            self.variation = found
+
     def step(self, left: float, right: float, dt: float) -> Moved:
         """Drives for one control step; see `moved.Physics`."""
         model, data, hull, ground = self.model, self.data, self._hull, self._ground
         count = max(math.ceil(dt / mjcf.SUBSTEP - 1e-9), 1)
         model.opt.timestep = dt / count
-        data.ctrl[:] = left / self._body.wheel_radius, right / self._body.wheel_radius
+        radius, (one, other) = self._body.wheel_radius, self.variation.wheels
+        data.ctrl[:] = one * left / radius, other * right / radius
         before = data.qpos[self._wheels]
         touched, advance, contact = False, self._engine.mj_step, data.contact
         for _ in range(count):
@@ -189,13 +200,16 @@ class MujocoBody:
         kind = self._engine.mjtState.mjSTATE_INTEGRATION.value
         state = np.zeros(self._engine.mj_stateSize(self.model, kind))
         self._engine.mj_getState(self.model, self.data, state, kind)
-        own = {"_scene": self._scene, "_body": self._body, "_rest": self._rest}
-        return {**own, "_origins": self._origins, "state": state}
+        own: dict[str, Any] = {"_scene": self._scene, "_body": self._body}
+        own["_rest"] = self._rest
+        own |= {"_origins": self._origins, "variation": self.variation}
+        return {**own, "state": state}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        now = state.pop("state")
+        now, variation = state.pop("state"), state.pop("variation")
         self.__dict__.update(state)
         self._load()
+        self._vary(variation)
         kind = self._engine.mjtState.mjSTATE_INTEGRATION.value
         self._engine.mj_setState(self.model, self.data, now, kind)
         self._engine.mj_forward(self.model, self.data)

@@ -9,9 +9,9 @@ from typing import Any
 from tdac_envs.core.arguments import positive
 from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.physics.body import BodySpec
-from tdac_envs.physics.moved import EXACT, engine_named
+from tdac_envs.physics.moved import EXACT, VARIED, engine_named
 from tdac_envs.robots.bundled import load_robot
-from tdac_envs.robots.robot_file import RobotFile
+from tdac_envs.robots.robot_file import Body
 
 BODY_KEYS = tuple(one.name for one in fields(BodySpec) if one.name != "radius")
 KEYS = "engine", "resolution", *BODY_KEYS
@@ -75,14 +75,14 @@ def engine_of(given: Any, robot: Any = None) -> Engine:
     resolution = given.get("resolution")
     if resolution is not None:
         resolution = positive("physics: resolution", resolution)
-    own = {} if robot is None else body_in(load_robot(robot))
+    own = {} if robot is None else body_in(load_robot(robot).body)
     own |= {key: given[key] for key in BODY_KEYS if given.get(key) is not None}
+    if name == VARIED:
+        own.setdefault("varied", 0)
     return Engine(name, resolution, own)
 
 
-def body_in(file: RobotFile) -> dict[str, float]:
-    """The values of a `BodySpec` that a robot file has."""
-    if file.body is None:
-        return {}
-    known = file.body.model_dump(exclude_none=True)
+def body_in(body: Body | None) -> dict[str, float]:
+    """The values of a `BodySpec` that the `body` of a robot file has."""
+    known = {} if body is None else body.model_dump(exclude_none=True)
     return {"top" if key == "height" else key: own for key, own in known.items()}

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from tdac_envs.core.errors import TaskError, hint
 
-EXACT, MUJOCO = "exact", "mujoco"
-ENGINES = EXACT, MUJOCO
+EXACT, MUJOCO, VARIED = "exact", "mujoco", "mujoco-varied"
+ENGINES = EXACT, MUJOCO, VARIED
 """Values of the argument `physics` of the environments."""
 Pose = tuple[float, float, float]
 

@@ -102,6 +102,12 @@ class Body(StrictModel):
     friction: _Amount | None = Field(None, description="Of the body on obstacles.")
 
 
+def body_written(body: Body | None) -> dict[str, Any]:
+    """The key `body` of a robot in a task file; empty without one."""
+    own = {} if body is None else body.model_dump(exclude_none=True)
+    return {"body": own} if own else {}
+
+
 class RobotFile(StrictModel):
     """Contents of a robot file, schema 1."""
 

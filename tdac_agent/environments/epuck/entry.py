@@ -29,7 +29,7 @@ class EPuckEnvironment(Environment):
     folder = Path(__file__).parent
     units = METRES
     keys = ("world", "robot", "ignore", "left_out")
-    robot_keys = frozenset({"file", "stopping_distance"})
+    robot_keys = frozenset({"file", "stopping_distance", "body"})
     names = Names(
         constants=(
             *("WORLD_FILE", "TIME_STEP", "MAX_WHEEL_SPEED", "SENSOR_RANGE"),

@@ -25,8 +25,9 @@ from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.robot_options import e_puck_of, with_version
 from tdac_envs.epuck.source import open_world
 from tdac_envs.epuck.task import TOLERANCE, EPuckTask, make_task
+from tdac_envs.physics.engine_choice import body_in
 from tdac_envs.robots.bundled import placed_robot
-from tdac_envs.robots.robot_file import RobotFile
+from tdac_envs.robots.robot_file import Body, RobotFile, body_written
 from tdac_envs.worlds.bundled import bundled_worlds, world_file
 from tdac_envs.worlds.wbt.reader import load_world
 from tdac_envs.worlds.wbt.writer import write_world
@@ -48,6 +49,7 @@ class EPuckSetting:
         left_out: Descriptions of the ignored nodes that may be solid.
         disturbances: Errors of the robot that the task names, as arguments.
         stopping_distance: Of this robot, m; None without one.
+        body: Of the robot, for another physics.
     """
 
     params: WorldParams
@@ -57,6 +59,7 @@ class EPuckSetting:
     left_out: tuple[str, ...]
     disturbances: dict[str, Any] = field(default_factory=dict)
     stopping_distance: float | None = None
+    body: Body | None = None
 
     @property
     def original(self) -> Original | None:
@@ -117,6 +120,9 @@ class EPuckSetting:
 
     def make_env(self, **options: Any) -> EPuckEnv:
         """Constructs this task's environment; `options` override its arguments."""
+        if isinstance(options.get("physics"), str):
+            own = {"engine": options["physics"], **body_in(self.body)}
+            options = {**options, "physics": own}
         return EPuckEnv(**{**self.env_kwargs(), **options})
 
     def displaced(self, x: float, y: float) -> dict[str, Any]:
@@ -178,9 +184,10 @@ class EPuckSetting:
         own: dict[str, Any] = {"world": WORLD_FILE}
         if self.left_out:
             own["left_out"] = list(self.left_out)
+        robot: dict[str, Any] = body_written(self.body)
         if self.stopping_distance is not None:
-            own["robot"] = {"stopping_distance": self.stopping_distance}
-        return own
+            robot["stopping_distance"] = self.stopping_distance
+        return own | ({"robot": robot} if robot else {})
 
 
 def world_setting(setting: Setting) -> EPuckSetting:
@@ -231,10 +238,11 @@ def _setting(
 ) -> EPuckSetting:
     dt = world.time_step / 1e3 if spec.dt is None else spec.dt
     opened = open_world(world, spec.start, spec.goal, spec.ignore)
-    stops = spec.robot.stopping_distance
+    stops, body = spec.robot.stopping_distance, spec.robot.body
     if robot is not None:
         opened = with_version(opened, robot)
         stops = robot.stopping_distance if stops is None else stops
+        body = robot.body if body is None else body
     flat = flat_world(opened, dt)
     assert flat.goal is not None
     nominal = make_task(
@@ -251,7 +259,7 @@ def _setting(
     notes = with_tolerance_note(world.notes, nominal, METRES.length_text)
     params = params_of(nominal, file.name, digest, notes)
     errors = {} if robot is None else robot.disturbances()
-    return EPuckSetting(params, nominal, text, file, left_out, errors, stops)
+    return EPuckSetting(params, nominal, text, file, left_out, errors, stops, body)
 
 
 def _describe(node: Unmodelled) -> str:

@@ -42,6 +42,8 @@ from tdac_envs.mapping.params import MapParams, ReadingOptions
 from tdac_envs.mapping.preprocessing import as_image
 from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
 from tdac_envs.movers.spec import AnySpec
+from tdac_envs.physics.engine_choice import body_in
+from tdac_envs.robots.robot_file import Body, body_written
 
 DT = 0.05
 
@@ -59,6 +61,7 @@ class Map2DSetting:
         view: What a controller observes, if it is told metres.
         disturbances: What its file says of the robot's, in units of the task.
         shown_in: Units of what the user reads; the environment's units are pixels.
+        body: Of the robot, for another physics.
     """
 
     params: MapParams
@@ -69,6 +72,7 @@ class Map2DSetting:
     shown_in: MapUnits = MAP_PIXELS
     view: MetricView | None = None
     disturbances: dict[str, Any] = field(default_factory=dict)
+    body: Body | None = None
 
     @property
     def original(self) -> Original | None:
@@ -158,8 +162,8 @@ class Map2DSetting:
     def make_env(self, **options: Any) -> Map2DEnv:
         """Constructs this task's environment; `options` override its arguments."""
         if isinstance(options.get("physics"), str):
-            known = {"engine": options["physics"], "resolution": self.params.resolution}
-            options = {**options, "physics": known}
+            own = {"resolution": self.params.resolution, **body_in(self.body)}
+            options = {**options, "physics": {"engine": options["physics"], **own}}
         return Map2DEnv(**{**self.env_kwargs(), **options})
 
     def displaced(self, x: float, y: float) -> dict[str, Any]:
@@ -233,6 +237,7 @@ class Map2DSetting:
                 "n_rays": robot.n_rays,
                 "field_of_view": robot.field_of_view_deg,
                 "range_max": length(robot.range_max),
+                **body_written(self.body),
                 "image": "robot.png",
             },
         }
@@ -320,6 +325,7 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         units,
         None if units.frame is None else MetricView(units.frame),
         disturbances,
+        spec.robot.body,
     )
     return name, setting
 

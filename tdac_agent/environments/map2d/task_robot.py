@@ -99,6 +99,7 @@ def with_robot_file(
     own = options_of(file, metric, in_metres, disturbed=False)
     dt = own.pop("dt")
     own = {_NAMES.get(key, key): value for key, value in own.items()}
+    own["body"] = file.body
     typed = spec.robot.model_dump(exclude_none=True)
     if typed.keys() & set(RAYS):
         own = {key: value for key, value in own.items() if key not in RAYS}
@@ -137,7 +138,9 @@ def with_robot(params: MapParams, spec: RobotSpec) -> MapParams:
     Raises:
         TaskError: A length of it is too large in px.
     """
-    values = spec.model_dump(exclude={"radius", "image", "file"}, exclude_none=True)
+    values = spec.model_dump(
+        exclude={"radius", "image", "file", "body"}, exclude_none=True
+    )
     fields = {"axle": "axle_length", "field_of_view": "field_of_view_deg"}
     changes = {fields.get(key, key): value for key, value in values.items()}
     if "ray_angles" in changes:

@@ -23,6 +23,10 @@ PERIODS = 3
 """Control periods after which a scan or a pose is too old."""
 LATENCY = 1
 """Control periods from a command to the wheels that are reckoned with; more is not covered."""
+STEADY = 10
+"""Control periods without a jump after which the pose counts again."""
+TURNED = 0.25
+"""Largest jump and standard deviation of the yaw, rad."""
 
 
 class SettingsError(ValueError):
@@ -43,6 +47,9 @@ class Settings:
         robot: See `settings.json`.
         dead_man: Time after which the robot stops by itself without a command.
         max_age: Largest age of a scan and of a pose; 0 for three periods.
+        max_jump: Largest distance of a pose from where the commands lead; 0 for the radius.
+        max_deviation: Largest standard deviation of x and of y, as the localiser says.
+        resample_scan: Whether a robot with a scanner takes scans with another number of rays.
         any_start: Whether to drive from a start that no verified drive had.
         start_on: When the drive begins: `pose`, as soon as the data fit, or `service`, when
             `Core.start` is called.
@@ -56,6 +63,9 @@ class Settings:
     robot: dict[str, Any]
     dead_man: float
     max_age: float = 0.0
+    max_jump: float = 0.0
+    max_deviation: float = 0.25
+    resample_scan: bool = False
     any_start: bool = False
     start_on: str = 'pose'
 
@@ -69,6 +79,9 @@ class Settings:
         if not 0.0 <= self.max_age <= limit + 1e-9:
             raise SettingsError(
                 f'max_age: expected at most {limit:g} s (three periods), got {self.max_age:g}')
+        for name in ('max_jump', 'max_deviation'):
+            if not 0.0 <= getattr(self, name) < math.inf:
+                raise SettingsError(f'{name}: expected 0 or more, got {getattr(self, name):g}')
         if self.start_on not in ('pose', 'service'):
             raise SettingsError(f'start_on: expected pose or service, got {self.start_on!r}')
         for name in ('radius', 'axle_length', 'max_wheel_speed', 'stopping_distance'):
@@ -80,6 +93,11 @@ class Settings:
     def oldest(self) -> float:
         """Largest age of a scan and of a pose."""
         return self.max_age or PERIODS * self.dt
+
+    @property
+    def largest_jump(self) -> float:
+        """Largest distance of a pose from where the commands lead."""
+        return self.max_jump or float(self.robot['radius'])
 
     @property
     def full_speed(self) -> float:
@@ -98,6 +116,7 @@ class Settings:
         own = float(self.robot['stopping_distance']) + v * self.latency
         return {
             'a scan or a pose is late, lost or old': v * (self.oldest + self.dt) + own,
+            'the pose jumps or is unsure': v * self.dt + own,
             'the controller is late, raises or is not finite': v * self.dt + own,
             'something is ahead, the goal, SIGTERM, a silent second publisher': v * self.dt + own,
             'the node is killed, frozen or unreachable': v * (self.dead_man + self.dt) + own,
@@ -138,12 +157,13 @@ class Core:
     def __init__(self, settings: Settings, policy: Policy) -> None:
         self.settings, self._policy = settings, policy
         self._wheels = Wheels(settings.robot, settings.dt)
-        self._scanner = Scanner(settings.robot)
+        self._scanner = Scanner(settings.robot, settings.resample_scan)
         self._guard = Guard(settings.robot, settings.latency)
-        self._layout: Layout | None = None
         self._ranges: np.ndarray[Any, Any] | None = None
         self._scan_stamp = self._pose_stamp = -math.inf
         self._pose = (0.0, 0.0, 0.0)
+        self._jump, self._jump_stamp, self._unsure = '', -math.inf, ''
+        self._refused = ''
         self._motion: deque[tuple[float, float, float]] = deque(maxlen=100)
         self._asked = self._planned = False
         self._held = settings.start_on == 'service'
@@ -158,17 +178,36 @@ class Core:
         try:
             self._scanner.use(layout)
         except LayoutError as error:
-            self._end('failed', str(error))
+            self._refused = f': {error}'
+            if not self.settings.resample_scan:  # the next scan may have another header
+                self._end('failed', str(error))
             return
         task, guard = self._scanner.read(ranges)
         if task is not None:
-            self._ranges, self._scan_stamp, self._layout = task, stamp, layout
-            self._guard.see(guard, layout.angles())
+            self._ranges, self._scan_stamp, self._refused = task, stamp, ''
+            self._guard.see(guard, self._scanner.guard_angles())
 
     def pose(self, stamp: float, x: float, y: float, yaw: float) -> None:
         """Take a pose in the map's frame; older ones than the last do not count."""
-        if stamp > self._pose_stamp and math.isfinite(x + y + yaw):
-            self._pose, self._pose_stamp = (x, y, wrapped(yaw)), stamp
+        if not (stamp > self._pose_stamp and math.isfinite(stamp + x + y + yaw)):
+            return
+        pose = (x, y, wrapped(yaw))
+        if self._pose_stamp > -math.inf:
+            off, turn = self._off(stamp, pose)
+            if off > self.settings.largest_jump or turn > TURNED:
+                self._jump = f'the pose jumped by {off:.2f} m and {turn:.2f} rad'
+                self._jump_stamp = stamp
+        self._pose, self._pose_stamp = pose, stamp
+
+    def localised(self, variances: tuple[float, float, float]) -> None:
+        """Take the variances of x, y and yaw that a localiser states; 0 or less says nothing."""
+        x, y, yaw = (math.inf if math.isnan(each) else each for each in variances)
+        off, turn = math.sqrt(max(x, y, 0.0)), math.sqrt(max(yaw, 0.0))
+        self._unsure = ''
+        if off > self.settings.max_deviation or turn > TURNED:
+            self._unsure = (
+                f'the pose is unsure: standard deviation {off:.2f} m and {turn:.2f} rad, at '
+                f'most {self.settings.max_deviation:g} m and {TURNED:g} rad (max_deviation)')
 
     def has(self, stamp: float) -> bool:
         """Whether scan and pose of this moment have arrived."""
@@ -257,7 +296,8 @@ class Core:
         self.commands += 1
         before = self._wheels.last
         v, omega = self._wheels.twist(*self._wheels.limited(left, right))
-        if self._guard.blocked(v, omega, self.settings.full_speed, self._moved(now)):
+        moved = self._moved(self._scan_stamp, now)
+        if self._guard.blocked(v, omega, self.settings.full_speed, moved):
             self._wheels.last = before
             return self._stand('stopped', 'something is ahead within the stopping distance')
         return Command(v, omega, 'driving')
@@ -269,9 +309,14 @@ class Core:
         oldest = self.settings.oldest
         for name, stamp in (('scan', self._scan_stamp), ('pose', self._pose_stamp)):
             if why := _unfit_stamp(name, now - stamp, oldest):
-                return why
+                return why + (self._refused if name == 'scan' else '')
         if abs(self._scan_stamp - self._pose_stamp) > oldest:
             return f'scan and pose are more than {oldest:g} s apart'
+        if self._unsure:
+            return self._unsure
+        steady = STEADY * self.settings.dt
+        if self._pose_stamp - self._jump_stamp < steady:
+            return f'{self._jump}: it must be steady for {steady:g} s'
         begins = not self._planned and not self._asked
         return self._wrong_start() if begins and not self.settings.any_start else ''
 
@@ -286,12 +331,29 @@ class Core:
             f'({x:g}, {y:g}, {yaw:g}); at most {radius:g} m and 0.5 rad are covered '
             f'(any_start)')
 
-    def _moved(self, now: float) -> tuple[float, float, float]:
-        """Return the motion since the scan by the commands, as a pose in the body's frame then."""
+    def _off(self, stamp: float, pose: tuple[float, float, float]) -> tuple[float, float]:
+        """
+        Return how far a pose is from where the commands lead since the last one: m, rad.
+
+        The wheels may have obeyed up to three periods late; the best fit counts.
+        """
+        found = []
+        for late in range(PERIODS + 1):
+            shift = late * self.settings.dt
+            moved = self._moved(self._pose_stamp - shift, stamp - shift)
+            there = compose(self._pose, moved)
+            turn = abs(wrapped(pose[2] - there[2]))
+            found.append((math.dist(pose[:2], there[:2]), turn))
+        limit = self.settings.largest_jump
+        return min(found, key=lambda each: max(each[0] / limit, each[1] / TURNED))
+
+    def _moved(self, since: float, until: float) -> tuple[float, float, float]:
+        """Return the motion by the commands in a time, as a pose in the body's first frame."""
         moved = (0.0, 0.0, 0.0)
-        steps = [*self._motion, (now, 0.0, 0.0)]
+        steps = list(self._motion)
+        steps.append((max(until, steps[-1][0] if steps else until), 0.0, 0.0))
         for (begin, v, omega), (end, _, _) in pairwise(steps):
-            lasted = end - max(begin, self._scan_stamp)
+            lasted = min(end, until) - max(begin, since)
             if lasted > 0.0:
                 half = 0.5 * omega * lasted
                 chord = v * lasted * float(np.sinc(half / math.pi))

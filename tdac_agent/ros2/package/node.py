@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import GetParameters
@@ -28,6 +28,7 @@ PACKAGE = __package__ or ''
 DEFAULTS: dict[str, Any] = {
     'scan_topic': 'scan',
     'odom_topic': 'odom',
+    'covariance_topic': 'amcl_pose',
     'command_topic': 'cmd_vel',
     'stamped': False,
     'pose_source': 'tf',
@@ -40,6 +41,9 @@ DEFAULTS: dict[str, Any] = {
     'dead_man_node': '',
     'dead_man_parameter': 'cmd_vel_timeout',
     'max_age': 0.0,
+    'max_jump': 0.0,
+    'max_deviation': 0.25,
+    'resample_scan': False,
     'start_on': 'service',
     'any_start': False,
 }
@@ -59,7 +63,9 @@ class DriveNode(Node):  # type: ignore[misc]
             dt=written['dt'], horizon=written['horizon'], start=tuple(written['start']),
             goal=tuple(written['goal']), goal_tolerance=written['goal_tolerance'],
             robot=written['robot'], dead_man=own['dead_man'], max_age=own['max_age'],
-            any_start=own['any_start'], start_on=own['start_on'])
+            max_jump=own['max_jump'], max_deviation=own['max_deviation'],
+            resample_scan=own['resample_scan'], any_start=own['any_start'],
+            start_on=own['start_on'])
         self.core = core.Core(settings, worker.Worker(folder, written['controller_sha256']))
         self._wait = 0.5 * settings.dt
         self._mounts: dict[str, float | None] = {}
@@ -75,6 +81,9 @@ class DriveNode(Node):  # type: ignore[misc]
         if own['pose_source'] == 'odom':
             self.create_subscription(
                 Odometry, own['odom_topic'], self._on_odom, qos_profile_sensor_data)
+        elif own['covariance_topic']:
+            self.create_subscription(
+                PoseWithCovarianceStamped, own['covariance_topic'], self._on_localised, kept)
         self.get_logger().info(f'stops within (m): {settings.stops_within()}')
         self.publish(core.Command(0.0, 0.0, 'waiting'))
         self._dead_man = self._ask_dead_man()
@@ -142,7 +151,12 @@ class DriveNode(Node):  # type: ignore[misc]
         place, turn = message.pose.pose.position, message.pose.pose.orientation
         own = (place.x, place.y, motion.yaw_of(turn.x, turn.y, turn.z, turn.w))
         pose = motion.compose(tuple(self.own['origin']), own)
+        self._on_localised(message)
         self.core.pose(_seconds(message.header.stamp), *pose)
+
+    def _on_localised(self, message: Any) -> None:
+        own = message.pose.covariance
+        self.core.localised((float(own[0]), float(own[7]), float(own[35])))
 
     def _look_up(self) -> None:
         try:

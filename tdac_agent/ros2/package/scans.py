@@ -56,19 +56,27 @@ class Scanner:
 
     A ray of the task reads the nearest return in its sector, halfway to its neighbours. A
     task with rays of its own (`is_scanner`) takes scans of this scanner alone.
+
+    Args:
+        robot: See `settings.json`.
+        resample: Whether it takes scans of this scanner with another number of rays, which may
+            change, and with gaps: a direction that a scan does not have is missing. The guard
+            then sees the task's rays.
     """
 
-    def __init__(self, robot: dict[str, Any]) -> None:
-        self.robot = robot
+    def __init__(self, robot: dict[str, Any], resample: bool = False) -> None:
+        self.robot, self.resample = robot, resample
         self.angles = np.asarray(robot['ray_angles'], np.float64)
         self.range_max = float(robot['range_max'])
-        blind = {'range_min': float(robot.get('range_min') or 0.0), 'zero': 0.0}
-        self.blind = blind.get(str(robot.get('below_min')), self.range_max)
+        least = float(robot.get('range_min') or 0.0)
+        blind = {'range_max': self.range_max, 'range_min': least, 'zero': 0.0}
+        self.blind = blind.get(str(robot.get('below_min')))
         self.zero_is_near = self._can_be_near()
         gaps = np.abs(_turns(np.diff(np.concatenate([self.angles, self.angles[:1]]))))
         self._gap = float(gaps[:-1].max()) if len(gaps) > 1 else 0.1
         self._layout: Layout | None = None
         self._sector = self._own = np.zeros(0, np.int64)
+        self._unseen = np.zeros(0, bool)
 
     def _can_be_near(self) -> np.ndarray[Any, Any]:
         """
@@ -95,16 +103,22 @@ class Scanner:
             return
         if not 1 <= layout.count <= MOST_RAYS:
             raise LayoutError(f'expected a scan of 1 to {MOST_RAYS} rays, got {layout.count}')
-        if not math.isfinite(layout.first + layout.step + layout.mount) or layout.step == 0.0:
+        turns = abs(layout.first) + abs(layout.step) * layout.count + abs(layout.mount)
+        if not turns < 4.0 * math.tau or layout.step == 0.0:
             raise LayoutError('the header of the scan has no valid angles')
-        if self.robot.get('is_scanner'):
+        if not 0.0 <= layout.range_min < layout.range_max:
+            raise LayoutError(
+                f'the header of the scan has no valid ranges: {layout.range_min:g} to '
+                f'{layout.range_max:g} m')
+        if self.robot.get('is_scanner') and not self.resample:
             self._check(layout)
         if layout.range_max < 0.99 * self.range_max:
             raise LayoutError(
                 f'the scan reaches {layout.range_max:g} m, the robot file {self.range_max:g} m')
         apart = np.abs(_turns(layout.angles()[:, None] - self.angles[None, :]))
         nearest, ray = apart.min(axis=0), apart.argmin(axis=0)
-        if nearest.max() > 0.5 * self._gap + abs(layout.step) + 1e-6:
+        unseen = nearest > 0.5 * self._gap + abs(layout.step) + 1e-6
+        if unseen.any() and not self.resample:
             i = int(nearest.argmax())
             raise LayoutError(
                 f'the scan does not see {math.degrees(self.angles[i]):.0f} degrees from the '
@@ -112,7 +126,7 @@ class Scanner:
         sector = apart.argmin(axis=1)
         inside = apart[np.arange(layout.count), sector] <= 0.5 * self._gap + 1e-6
         self._sector = np.where(inside, sector, -1)
-        self._own = ray
+        self._own, self._unseen = ray, unseen
         self._layout = layout
 
     def _check(self, layout: Layout) -> None:
@@ -124,11 +138,17 @@ class Scanner:
             raise LayoutError(
                 f'the scan has {layout.count} rays from {seen[0]:.3g} to {seen[-1]:.3g} rad '
                 f'({way}), the robot file {count} from {own[0]:.3g} to {own[-1]:.3g}: '
-                f'verify with a robot file of this scanner, or check its mounting')
+                f'verify with a robot file of this scanner, check its mounting, or set '
+                f'resample_scan if only the number of rays differs')
+
+    def guard_angles(self) -> np.ndarray[Any, Any]:
+        """Angles of the rays for the guard, from the robot's heading."""
+        assert self._layout is not None
+        return self.angles if self.resample else self._layout.angles()
 
     def read(self, ranges: Any) -> tuple[np.ndarray[Any, Any] | None, np.ndarray[Any, Any]]:
         """
-        Ranges of the task's rays, float32, and the range of each ray of the scan for the guard.
+        Ranges of the task's rays, float32, and those of `guard_angles` for the guard.
 
         The first is None if too many rays have no value. Of the second, NaN is unknown, and inf
         is free. A range of 0 is one without a return, as many drivers publish it; between 0
@@ -139,15 +159,18 @@ class Scanner:
         assert self._layout is not None
         raw = np.asarray(ranges, np.float64)
         if raw.shape != (self._layout.count,):
-            return None, np.full(self._layout.count, np.nan)
+            return None, np.full(len(self.guard_angles()), np.nan)
         missing = np.isnan(raw) | (raw == 0.0)
         near = (raw < self._layout.range_min) & ~missing
         value = np.where(raw > self.range_max, self.range_max, raw)
+        if self.robot.get('below_min') == 'range_min':
+            value = np.maximum(value, float(self.robot.get('range_min') or 0.0))
         value = np.where(near, _NEAR, np.where(missing, _NONE, value))
         found = np.full(len(self.angles), _NONE)
         inside = self._sector >= 0
         np.minimum.at(found, self._sector[inside], value[inside])
         found = np.where(found == _NONE, value[self._own], found)
+        found = np.where(self._unseen, _NONE, found)
         nothing = found == _NONE
         zero = nothing & (raw[self._own] == 0.0)
         unexplained = nothing & ~(zero & self.zero_is_near)
@@ -156,10 +179,20 @@ class Scanner:
         lost = found == _NONE
         task = None
         if unexplained.mean() <= MOST_MISSING and nothing.mean() <= MOST_ZERO:
-            task = np.where(found == _NEAR, self.blind, _filled(found, lost))
+            least = self._layout.range_min if self.blind is None else self.blind
+            task = np.where(found == _NEAR, least, _filled(found, lost))
             task = task.astype(np.float32)
         guard = np.where(near, np.nan, np.where(raw > self.range_max, np.inf, raw))
-        return task, np.where(missing, np.nan, guard)
+        guard = np.where(missing, np.nan, guard)
+        return task, self._resampled(guard) if self.resample else guard
+
+    def _resampled(self, guard: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """Return the nearest range in the sector of each ray of the task; NaN is unknown."""
+        found, inside = np.full(len(self.angles), np.nan), self._sector >= 0
+        np.fmin.at(found, self._sector[inside], guard[inside])
+        empty = np.bincount(self._sector[inside], minlength=len(found)) == 0
+        found = np.where(empty, guard[self._own], found)
+        return np.where(self._unseen, np.nan, found)
 
 
 class Guard:

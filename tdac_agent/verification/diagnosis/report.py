@@ -132,6 +132,9 @@ class SecondOpinion(StrictRecord):
     scaled: bool = Field(
         False, description="Whether a map without metres got a body radius of 0.1 m."
     )
+    varied: bool = Field(
+        False, description="Whether the robot was varied in each episode."
+    )
     episodes: tuple[OtherEpisode, ...]
 
     @property

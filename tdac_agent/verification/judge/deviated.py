@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from tdac_agent.episodes.deviated import DeviatedEnv
@@ -13,13 +14,15 @@ from tdac_agent.tasks.setting import JudgedEnv, Nominal
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.units import Units
 from tdac_agent.verification.judge.task_world import TaskEpisodes
-from tdac_agent.verification.judge.worlds import FOREVER, DeviatedWorlds, Program
+from tdac_agent.verification.judge.worlds import FOREVER, Case, Program
 from tdac_envs.drive.env import Observation
 from tdac_envs.drive.task import Pose
 from tdac_envs.physics.moved import EXACT
 
 if TYPE_CHECKING:
     from tdac_agent.verification.judge.set_worlds import SetEpisodes
+
+_PLACED = "start_x", "start_y", "heading", "obstacles_x", "obstacles_y"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +31,12 @@ class DeviatedEpisodes:
 
     Attributes:
         plain: The episodes without deviations.
-        worlds: The cases.
+        cases: The cases by their numbers.
     """
 
     plain: TaskEpisodes | SetEpisodes
-    worlds: DeviatedWorlds
+    cases: Mapping[int, Case]
+    _known: dict[tuple[int, Deviation], dict[str, Any]] = field(default_factory=dict)
 
     @property
     def units(self) -> Units:
@@ -41,15 +45,16 @@ class DeviatedEpisodes:
 
     def record(self, number: int, most: int = FOREVER) -> Record:
         """See `Worlds`."""
-        case = self.worlds.cases[number]
-        record = self.plain.record(case.number, most)
-        if isinstance(self.plain, TaskEpisodes):
-            own = self.plain
-            world = own.worlds
+        case, plain = self.cases[number], self.plain
+        if isinstance(plain, TaskEpisodes):
+            world, start = plain.worlds, None
             how = world.disturbance, world.variation, world.physics
-            record.env = shifted_env(own.task, case.deviation, *how)
+            env = shifted_env(plain.task, case.deviation, *how)
             if world.variation == "nominal":
-                record.start = start_of(own.task.nominal, case.deviation)
+                start = start_of(plain.task.nominal, case.deviation)
+            record = Record(env, start, most, seed=case.number)
+        else:
+            record = plain.record(case.number, most)
         record.env = DeviatedEnv(record.env, case.deviation, case.number)
         return record
 
@@ -59,7 +64,7 @@ class DeviatedEpisodes:
 
     def supply(self, child: Child, number: int, program: Program) -> None:
         """See `Worlds`. The files say nothing of the deviation."""
-        self.plain.supply(child, self.worlds.cases[number].number, program)
+        self.plain.supply(child, self.cases[number].number, program)
 
     def seen(self, observation: Observation) -> Observation:
         """See `Worlds`."""
@@ -71,13 +76,24 @@ class DeviatedEpisodes:
 
     def facts(self, env: JudgedEnv, number: int) -> dict[str, Any]:
         """See `Worlds`."""
-        facts = self.plain.facts(env, self.worlds.cases[number].number)
+        case = self.cases[number]
+        place = case.number, placed(case.deviation)
+        facts = self._known.get(place)
+        if facts is None:
+            facts = self.plain.facts(env, case.number)
+            self._known[place] = facts
         key = "seed" if "seed" in facts else "index"
         return {**facts, key: number}
 
     def diagnosed(self, env: JudgedEnv) -> tuple[Nominal, Units | None]:
         """See `Worlds`."""
         return self.plain.diagnosed(env)
+
+
+def placed(deviation: Deviation) -> Deviation:
+    """The parts of a deviation that move the start or the obstacles."""
+    own = deviation.parts().items()
+    return Deviation.of({name: value for name, value in own if name in _PLACED})
 
 
 def shifted_env(

@@ -11,6 +11,7 @@ from tdac_agent.verification.diagnosis.report import OtherEpisode, SecondOpinion
 from tdac_agent.verification.judge.findings import driven
 from tdac_agent.verification.judge.judge import Judge
 from tdac_envs.physics.engine import engine_version
+from tdac_envs.physics.moved import VARIED
 
 
 def drive_again(judge: Judge, physics: str) -> SecondOpinion | None:
@@ -36,6 +37,7 @@ def drive_again(judge: Judge, physics: str) -> SecondOpinion | None:
     return SecondOpinion(
         engine=engine_version(),
         scaled=not task.setting.has_metres,
+        varied=physics == VARIED,
         episodes=tuple(_row(task, each, before[each.name]) for each in again),
     )
 

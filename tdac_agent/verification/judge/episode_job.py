@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -74,6 +74,8 @@ class EpisodeJob(BaseModel):
         out: Folder of the results.
         rows: File in which an interrupted job finds what it has driven already.
         trajectories: Folder for the trajectory of each episode, `NUMBER.npz`.
+        series: Whether further jobs follow in the same process, equal to this one but
+            for cases, numbers, and `out`.
     """
 
     model_config = ConfigDict(extra="forbid")
@@ -91,6 +93,7 @@ class EpisodeJob(BaseModel):
     out: Path
     rows: Path | None = None
     trajectories: Path | None = None
+    series: bool = False
 
 
 class JobEnding(PrintableRecord):
@@ -114,6 +117,10 @@ class EpisodeSummary:
     tier: str
     late: bool
     is_retryable: bool
+
+
+Drive = Callable[[EpisodeJob], Iterable[EpisodeSummary]]
+"""Drives the episodes of a job."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,7 +173,7 @@ def opened(
     if isinstance(worlds, DeviatedWorlds):
         within = opened(worlds.within)
         assert not isinstance(within, DeviatedEpisodes)
-        return DeviatedEpisodes(within, worlds)
+        return DeviatedEpisodes(within, dict(enumerate(worlds.cases)))
     if isinstance(worlds, TaskWorld):
         return TaskEpisodes(read_task(worlds.task), worlds)
     # Task sets need much that a task does not; the server imports it in advance.
@@ -175,11 +182,18 @@ def opened(
     return open_set(worlds)
 
 
-def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
+def judge_episodes(
+    job: EpisodeJob, child_pool: ChildPool, series: Drive | None = None
+) -> None:
     """Drives the episodes of a job, and writes a row for each in their order.
 
     A sequential test gets them in the same order, so that its decision does not depend
     on timing. Episodes after its decision are dropped.
+
+    Args:
+        job: The job.
+        child_pool: The child pool.
+        series: Who drives the episodes if the job is one of a series.
     """
     job.out.mkdir(exist_ok=True)
     counts, fault, problem = [0, 0, 0], None, None
@@ -193,14 +207,18 @@ def judge_episodes(job: EpisodeJob, child_pool: ChildPool) -> None:
         files[0].writelines(f"{each.model_dump_json()}\n" for each in before)
         files[0].flush()
         try:
-            run = EpisodeRun.of(job, child_pool)
-            numbers = job.numbers[len(before) :]
-            if job.checks:
-                checks, tier = _checked(run)
-                write_atomic(job.out / CHECKS_FILE, checks.model_dump_json())
-                numbers = () if checks.failures else numbers
-            late = sum(each.cause == "time-out" for each in before)
-            for done in _in_order(run, numbers, late):
+            if series is not None:
+                episodes = series(job)
+            else:
+                run = EpisodeRun.of(job, child_pool)
+                numbers = job.numbers[len(before) :]
+                if job.checks:
+                    checks, tier = _checked(run)
+                    write_atomic(job.out / CHECKS_FILE, checks.model_dump_json())
+                    numbers = () if checks.failures else numbers
+                late = sum(each.cause == "time-out" for each in before)
+                episodes = _in_order(run, numbers, late)
+            for done in episodes:
                 tier = done.tier or tier
                 for file in files:
                     file.write(done.row.model_dump_json() + "\n")
@@ -278,12 +296,12 @@ def _in_order(
             from tdac_agent.verification.judge.drivers import load
 
             load(run.job.policy)
-        work, end = partial(_work, run), run.child_pool.close
+        work, end = partial(drive_or_skip, run), run.child_pool.close
         with closing(in_order(work, end, numbers, late, run.job.patience)) as episodes:
             yield from episodes
 
 
-def _work(run: EpisodeRun, number: int, skip: bool) -> EpisodeSummary:
+def drive_or_skip(run: EpisodeRun, number: int, skip: bool) -> EpisodeSummary:
     """Drives or skips an episode, and returns what is kept of it."""
     job = run.job
     if job.policy.kind == "privileged":

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import closing
+from contextlib import closing, contextmanager
 from functools import partial
 from typing import Protocol, TypeVar
 
@@ -24,6 +24,7 @@ class Timed(Protocol):
         """Whether the time-out may be due to a busy machine."""
 
 
+T = TypeVar("T")
 R = TypeVar("R", bound=Timed)
 
 
@@ -47,33 +48,51 @@ def in_order(
         late: Number of time-outs before these episodes.
         patience: Number of time-outs after which the rest is skipped; None for never.
     """
-    size = min(SIZE, len(numbers))
-    turns, ends = Turns(size), [0] * late
     patience = late + len(numbers) + 1 if patience is None else patience
+    with drivers(work, end, min(SIZE, len(numbers))) as drive:
+        yield from drive(numbers, [0] * late, patience)
+
+
+@contextmanager
+def drivers(
+    work: Callable[[T, bool], R], end: Callable[[], None], size: int = SIZE
+) -> Generator[Callable[[Iterable[T], list[T], int], Iterator[R]]]:
+    """A worker pool for any number of batches; see `in_order`.
+
+    Returns:
+        Drives a batch. Its arguments are what distinguishes the episodes, those that
+        timed out so far, and the patience.
+    """
+    turns = Turns(size)
     with (
         closing(WorkerPool(work, end, size)) as worker_pool,
         ThreadPoolExecutor(max_workers=size) as pool,
     ):
+
+        def drive(items: Iterable[T], late: list[T], patience: int) -> Iterator[R]:
+            return pool.map(
+                partial(_run_with_retry, worker_pool, turns, late, patience), items
+            )
+
         try:
-            run = partial(_run_with_retry, worker_pool, turns, ends, patience)
-            yield from pool.map(run, numbers)
+            yield drive
         finally:
             pool.shutdown(cancel_futures=True)
 
 
 def _run_with_retry(
-    worker_pool: WorkerPool[[int, bool], R],
+    worker_pool: WorkerPool[[T, bool], R],
     turns: Turns,
-    late: list[int],
+    late: list[T],
     patience: int,
-    number: int,
+    item: T,
 ) -> R:
     skip = len(late) >= patience
     with turns.beside():
-        kept = worker_pool.do(number, skip)
+        kept = worker_pool.do(item, skip)
     if kept.late and kept.is_retryable and len(late) < patience:
         with turns.alone():
-            kept = worker_pool.do(number, False)
+            kept = worker_pool.do(item, False)
     if kept.late:
-        late.append(number)
+        late.append(item)
     return kept

@@ -20,6 +20,7 @@ import sys
 import tempfile
 import threading
 import traceback
+from collections.abc import Iterator
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -45,11 +46,13 @@ from tdac_envs.drive.env import Observation
 EXIT_SECONDS = 1.0
 # Exit codes of a worker; a suite may end it with any other code.
 NO_JOB, DID_JOB = 77, 78
-DONE = b"done"
+# Answers to a request; the server gives the second one for a worker that has died.
+DONE, DIED = b"done", b"died"
 # Imported when a job needs them, or earlier if there is time.
 LOADED_LATE = (
     "tdac_agent.verification.judge.findings",
     "tdac_agent.verification.judge.episode_job",
+    "tdac_agent.verification.judge.series",
 )
 # The same, unless the judge is for a task: its controllers need neither.
 LOADED_FOR_ALL = (
@@ -61,8 +64,9 @@ LOADED_FOR_ALL = (
 def serve(child_pool: ChildPool | None = None, known: Path | None = None) -> None:
     """Forks one worker after another until there is no further job.
 
-    Writes the process id of each worker, and a line when its job is done. The worker
-    writes that line itself before it cleans up; the server does so if it could not.
+    Writes the process id of each worker, and a line when a job of it is done. The
+    worker writes that line itself, before it cleans up; the server writes another one
+    if the worker has died.
 
     Args:
         child_pool: Child pool of the first worker, whose job is due at once. By default
@@ -91,7 +95,7 @@ def serve(child_pool: ChildPool | None = None, known: Path | None = None) -> Non
         if more:
             child_pool = ChildPool()
         if code != DID_JOB:
-            _write_line(DONE)
+            _write_line(DIED)
 
 
 def _status_of(worker: int) -> int:
@@ -147,7 +151,8 @@ def work(child_pool: ChildPool) -> NoReturn:
                     os.dup2(output.fileno(), 1)
                     os.dup2(output.fileno(), 2)
                 code = 1
-                do_job(Path(request), child_pool, worker_pool, later)
+                further = _further(answers)
+                do_job(Path(request), child_pool, worker_pool, later, further)
                 code = DID_JOB
                 _flush()
                 _write_line(DONE, answers)
@@ -156,6 +161,17 @@ def work(child_pool: ChildPool) -> NoReturn:
     finally:
         _flush()
         os._exit(code)
+
+
+def _further(answers: int) -> Iterator[Path]:
+    """Further requests of a series, up to an empty line; answers the one before."""
+    while True:
+        _flush()
+        _write_line(DONE, answers)
+        request = _read_line(0)
+        if not request:
+            return
+        yield Path(request)
 
 
 def _flush() -> None:
@@ -243,8 +259,17 @@ def do_job(
     child_pool: ChildPool,
     worker_pool: SuitePool | None,
     later: contextlib.ExitStack,
+    further: Iterator[Path],
 ) -> None:
-    """Runs a job of any kind in its folder; the caller closes `later` after it."""
+    """Runs a job of any kind in its folder; the caller closes `later` after it.
+
+    Args:
+        request: File with the job.
+        child_pool: The child pool.
+        worker_pool: The worker pool of a suite.
+        later: What ends after the job.
+        further: Requests that follow, if the job is the first one of a series.
+    """
     # raw read: our temporary folder
     job = json.loads(request.read_text(encoding="utf-8"))
     os.chdir(request.parent)
@@ -253,8 +278,16 @@ def do_job(
     else:
         # Imported late, since it loads policies of all kinds.
         from tdac_agent.verification.judge.episode_job import EpisodeJob, judge_episodes
+        from tdac_agent.verification.judge.series import judge_series
 
-        judge_episodes(EpisodeJob.model_validate(job), child_pool)
+        first = EpisodeJob.model_validate(job)
+        if first.series:
+            # raw read: our temporary folder
+            texts = (each.read_text(encoding="utf-8") for each in further)
+            jobs = map(EpisodeJob.model_validate_json, texts)
+            judge_series(first, child_pool, jobs)
+        else:
+            judge_episodes(first, child_pool)
 
 
 if __name__ == "__main__":

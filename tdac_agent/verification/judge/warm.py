@@ -36,6 +36,8 @@ KEPT_VARIABLES = frozenset(
 # A start on a busy machine may take minutes; a dead server is noticed at once.
 START_SECONDS = 600.0
 EXIT_SECONDS = 5.0
+# See `tdac_agent.verification.judge.server`, which takes long to import.
+_DIED = b"died"
 POLL_SECONDS = 0.2
 
 
@@ -82,6 +84,8 @@ class WarmJudge:
         )
         self.folder = Path(self._folder.name)
         environment["TMPDIR"] = self._folder.name
+        # The process and the name of a series that may go on.
+        self._series: tuple[int, str] | None = None
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 - closed by close()
         place = environment, self.folder, self._log.fileno()
         if child_pool is None:
@@ -95,6 +99,7 @@ class WarmJudge:
         request: Path,
         seconds: float,
         meanwhile: Callable[[], None] | None = None,
+        series: str = "",
     ) -> None:
         """Runs one job; returns when it is done, or when its worker has died.
 
@@ -102,21 +107,59 @@ class WarmJudge:
             request: File with the job.
             seconds: Limit of the wall time, s.
             meanwhile: Called repeatedly until the job is done.
+            series: Name of its series. Jobs of a series that follow each other have
+                one worker, so that the later ones begin at once.
 
         Raises:
             Fault: The judge did not start, or the job took too long.
         """
         with nullcontext() if self._turn is None else wait_for(self._turn):
-            self._run(request, seconds, meanwhile)
+            self._run(request, seconds, meanwhile, series)
 
     def _run(
-        self, request: Path, seconds: float, meanwhile: Callable[[], None] | None
+        self,
+        request: Path,
+        seconds: float,
+        meanwhile: Callable[[], None] | None,
+        series: str,
     ) -> None:
         poll = partial(_call_all, (self._watch, meanwhile))
-        worker = self._worker(poll)
+        worker = self._next_in(series)
+        if worker is None:
+            self.end_series()
+            worker = self._worker(poll)
+        self._series = None
+        answer = self._request(f"{request}", worker, seconds, poll)
+        if series and answer != _DIED:
+            self._series = worker, series
+
+    def _next_in(self, series: str) -> int | None:
+        """The worker that waits for the next job of a series; None if there is none."""
+        if self._series is None or self._series[1] != series or self._has_answer():
+            return None
+        return self._series[0]
+
+    def end_series(self) -> None:
+        """Ends the worker of a series, if there is one."""
+        own, self._series = self._series, None
+        # It may have died while it waited; then the next worker must not be ended.
+        if own is not None and not self._has_answer():
+            self._request("", own[0], EXIT_SECONDS)
+
+    def _has_answer(self) -> bool:
+        return bool(select.select([self._server.answers], [], [], 0.0)[0])
+
+    def _request(
+        self,
+        line: str,
+        worker: int,
+        seconds: float,
+        poll: Callable[[], None] | None = None,
+    ) -> bytes:
+        """Sends a line to a worker, and returns the answer."""
         try:
-            os.write(self._server.requests, f"{request}\n".encode())
-            self._line(seconds, poll)
+            os.write(self._server.requests, f"{line}\n".encode())
+            return self._line(seconds, poll)
         except BaseException:
             # A worker leads a process group; its children end with it.
             with suppress(ProcessLookupError):  # it has just ended by itself

@@ -401,7 +401,10 @@ def test_a_mounted_scanner_is_turned_back():
 
 
 def test_ranges_without_a_value():
-    """inf reads the largest range; NaN the nearer neighbour; most NaN: no scan."""
+    """inf reads the largest range; NaN the nearer neighbour; most NaN: no scan.
+
+    Too near reads the smallest range, as the robot file says nothing else.
+    """
     robot = {"ray_angles": [0.3, 0.2, 0.1, 0.0, -0.1, -0.2], "range_max": 5.0}
     scanner = Scanner(robot)
     scanner.use(Layout(6, 0.3, -0.1, 0.1, 5.0))
@@ -409,7 +412,8 @@ def test_ranges_without_a_value():
     assert scanner.read([1, nan, 3, inf, 9, 5])[0].tolist() == [1, 1, 3, 5, 5, 5]
     assert scanner.read([1, nan, nan, 4, 5, 6])[0] is None
     assert scanner.read([1, 2])[0] is None
-    assert scanner.read([0.05, 2, 3, -inf, 5, 4])[0].tolist() == [5, 2, 3, 5, 5, 4]
+    near = scanner.read([0.05, 2, 3, -inf, 5, 4])[0]
+    assert np.allclose(near, [0.1, 2, 3, 0.1, 5, 4])
 
 
 ZEROS = [slice(None), slice(0, 14), slice(None, None, 2), slice(14, 47)]
@@ -476,6 +480,210 @@ def test_a_wall_that_is_too_near_is_no_missing_scan(settings):
     front[:40] = front[-40:] = 0.0
     assert scanner.read(front)[0] is None
     assert scanner.read(np.zeros(360))[0] is None
+
+
+LDS_02 = {
+    "ray_angles": [math.tau * i / 240 for i in range(240)],
+    "is_scanner": True,
+    "radius": 0.105,
+    "stopping_distance": 0.032,
+    "scanner_offset": (-0.032, 0.0),
+    "below_min": "range_min",
+    "range_min": 0.16,
+    "range_max": 8.0,
+}
+
+
+def scan_of_lds_02(random, away, blind=()):
+    """A scan as the driver of the LDS-02 makes it: from the first return to the last.
+
+    Args:
+        random: Draws the number of rays and the angle of the first one.
+        away: Range in a direction, rad.
+        blind: Directions without a return, degrees: first, last.
+    """
+    count = int(random.integers(230, 270))
+    step = math.tau / count
+    angles = random.uniform(0, step) + step * np.arange(count)
+    ranges = np.array([away(angle) for angle in angles])
+    for first, last in blind:
+        turn = np.degrees(angles)
+        ranges[(turn >= first) & (turn <= last)] = np.nan
+    known = np.flatnonzero(~np.isnan(ranges))
+    kept = slice(known[0], known[-1] + 1)
+    own = ranges[kept]
+    layout = Layout(len(own), float(angles[known[0]]), step, 0.0, 100.0)
+    return layout, own
+
+
+@given(seed=st.integers(0, 1000))
+def test_scans_of_the_lds_02_are_resampled(seed):
+    """Each ray reads the distance of a wall ahead, whatever the scan begins with."""
+    random = np.random.default_rng(seed)
+    scanner = Scanner(LDS_02, resample=True)
+    angles = np.array(LDS_02["ray_angles"])
+
+    def wall(angle):
+        return min(2.0 / max(math.cos(angle), 1e-9), 7.0)
+
+    scanner.use(scan_of_lds_02(random, wall)[0])
+    layout, ranges = scan_of_lds_02(random, wall)
+    scanner.use(layout)
+    task, guard = scanner.read(ranges)
+    true = np.array([wall(angle) for angle in angles])
+    # Two steps of the scan: a ray may see less than its sector, or beyond it.
+    least = np.array(
+        [min(wall(a + t) for t in np.linspace(-0.06, 0.06, 9)) for a in angles]
+    )
+    most = np.array(
+        [max(wall(a + t) for t in np.linspace(-0.06, 0.06, 9)) for a in angles]
+    )
+    assert (task >= least - 1e-5).all()
+    assert (task <= most + 1e-5).all()
+    assert abs(task[0] - true[0]) < 0.01
+    assert np.allclose(task, guard)
+    with pytest.raises(LayoutError, match="or set resample_scan if only the number"):
+        Scanner(LDS_02).use(dataclasses.replace(layout, count=layout.count + 60))
+
+
+def test_directions_that_a_scan_does_not_have_are_missing():
+    """A scan that begins at 20 degrees: filled if little is missing, else none."""
+    random, scanner = np.random.default_rng(0), Scanner(LDS_02, resample=True)
+    layout, ranges = scan_of_lds_02(random, lambda _: 1.0, [(0, 20), (350, 360)])
+    assert layout.first > math.radians(20)
+    scanner.use(layout)
+    task, guard = scanner.read(ranges)
+    assert np.allclose(task, 1.0)
+    assert np.isnan(guard[:10]).all()
+    layout, ranges = scan_of_lds_02(random, lambda _: 1.0, [(0, 50), (320, 360)])
+    scanner.use(layout)
+    assert scanner.read(ranges)[0] is None
+
+
+def test_what_was_near_stays_when_the_number_of_rays_changes(settings):
+    """A foot that the next scan cannot measure still stops the robot."""
+    settings = {**settings, "robot": {**settings["robot"], **LDS_02}}
+    own = core_settings(settings, dead_man=0.3, resample_scan=True, any_start=True)
+    core, random = Core(own, Ready(forward)), np.random.default_rng(1)
+    assert core.tick(0.0, 0.0).reason == "no scan yet"
+    core.scan(0.0, Layout(200, 0.0, 0.0, 0.0, 100.0), [1.0] * 200)
+    assert "no scan yet: the header" in core.tick(0.0, 0.0).reason
+
+    def see(now, away, blind=()):
+        core.scan(now, *scan_of_lds_02(random, away, blind))
+        core.pose(now, 0.0, 0.0, 0.0)
+        return core.tick(now, 0.0)
+
+    def foot(angle):
+        return 0.17 if math.cos(angle) > 0.98 else 3.0
+
+    assert see(0.1, lambda _: 3.0).state == "driving"
+    core.drove(0.0, 0.0)
+    assert "something is ahead" in see(0.2, foot).reason
+    gone = [(0, 12), (348, 360)]
+    assert "something is ahead" in see(0.3, lambda _: 3.0, gone).reason
+    assert see(0.4, lambda _: 3.0).state == "driving"
+
+
+def test_a_header_of_a_scan_that_is_impossible_is_refused():
+    """Angles and ranges of a header are numbers in order."""
+    scanner = Scanner({**LDS_02, "is_scanner": False})
+    for bad in (
+        Layout(240, math.nan, 0.02, 0.0, 100.0),
+        Layout(240, 0.0, 1e300, 0.0, 100.0),
+        Layout(240, 1e9, 0.02, 0.0, 100.0),
+        Layout(240, 0.0, 0.0, 0.0, 100.0),
+        Layout(240, 0.0, 0.026, math.nan, 100.0),
+        Layout(240, 0.0, 0.026, 0.0, math.nan),
+        Layout(240, 0.0, 0.026, 9.0, 8.0),
+        Layout(240, 0.0, 0.026, -1.0, 8.0),
+        Layout(0, 0.0, 0.026, 0.0, 8.0),
+        Layout(30_000, 0.0, 1e-4, 0.0, 8.0),
+    ):
+        with pytest.raises(LayoutError):
+            scanner.use(bad)
+
+
+@pytest.mark.parametrize("wrong", [(0.2, 0.0, 0.0), (0.0, 0.0, 0.3)])
+def test_a_jump_of_the_pose_stops_it(make_core, robot, wrong):
+    """It stands until the pose has been steady for a second, and says by how much."""
+    core = make_core()
+    assert drive(core, robot, 0.5)[-1].state == "driving"
+    before = robot.way
+
+    def jumped(core, robot, now):
+        reading = robot.read()
+        core.pose(now, *compose(tuple(reading.pose), wrong))
+        core.scan(now, robot.layout, reading.ranges)
+
+    commands = drive(core, robot, 1.5, jumped)
+    assert [c.state for c in commands[:10]] == ["stopped"] * 10
+    assert "the pose jumped by" in commands[0].reason
+    assert "steady for 1 s" in commands[0].reason
+    assert commands[-1].state == "driving"
+    assert drive(core, robot, 0.1)[0].state == "stopped"
+    assert (
+        robot.way - before
+        <= core.settings.stops_within()["the pose jumps or is unsure"] + 0.3 * 0.5
+    )
+
+
+def test_small_corrections_and_late_wheels_are_no_jumps(make_core, robot):
+    """Noise of a localiser, and wheels that obey a period late, do not stop it."""
+    core, random = make_core(), np.random.default_rng(2)
+
+    def turning(_):
+        return "action", (1.0, 0.4) if robot.time % 1.0 < 0.5 else (0.4, 1.0)
+
+    core = make_core(turning, start=(0.0, 0.0, 0.0), any_start=True)
+
+    def noisy(core, robot, now):
+        reading = robot.read()
+        off = random.normal(0.0, 0.02, 3)
+        core.pose(now, *(reading.pose + off))
+        core.scan(now, robot.layout, reading.ranges)
+
+    late, reasons = Command(0.0, 0.0, ""), set()
+    for _ in range(20):
+        noisy(core, robot, robot.time)
+        robot.obey(late.v, late.omega)
+        late = core.tick(robot.time, 0.0)
+        reasons.add(late.reason)
+        robot.step()
+    assert robot.way > 0.3
+    assert not any("jumped" in reason for reason in reasons), reasons
+
+
+@pytest.mark.parametrize(
+    ("variances", "drives"),
+    [
+        ((0.01, 0.01, 0.01), True),
+        ((0.0, 0.0, 0.0), True),
+        ((-1.0, -1.0, -1.0), True),
+        ((0.25, 0.01, 0.01), False),
+        ((0.01, 0.07, 0.01), False),
+        ((0.01, 0.01, 0.07), False),
+        ((math.nan, 0.0, 0.0), False),
+        ((0.0, 0.0, math.inf), False),
+    ],
+)
+def test_an_unsure_pose_stops_it(make_core, robot, variances, drives):
+    """It drives on as soon as the localiser is sure again; 0 or less says nothing."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    core.localised(variances)
+    command = drive(core, robot, 0.1)[-1]
+    assert (command.state == "driving") == drives
+    assert drives or "the pose is unsure: standard deviation" in command.reason
+    core.localised((0.01, 0.01, 0.001))
+    assert drive(core, robot, 0.1)[-1].state == "driving"
+
+
+@pytest.mark.parametrize("changes", [{"max_jump": -1.0}, {"max_deviation": math.nan}])
+def test_limits_of_the_pose_are_numbers(make_core, changes):
+    """0 or more."""
+    with pytest.raises(SettingsError, match="expected 0 or more"):
+        make_core(**changes)
 
 
 @given(yaw=ANGLES)

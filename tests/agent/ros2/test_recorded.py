@@ -164,7 +164,7 @@ def test_what_is_no_bag(tmp_path, bag):
         "torn.mcap": "is not a readable bag",
         "none.mcap": "is not a readable bag",
         "x.txt": "is not a bag",
-        ".": "is not a bag: expected a folder with metadata.yaml",
+        ".": "is not a bag: metadata.yaml: No such file or directory; expected",
         "gone": "no such file or folder",
     }.items():
         with pytest.raises(RunError, match=why):

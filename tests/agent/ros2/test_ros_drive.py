@@ -1,18 +1,23 @@
 """An exported package drives the simulated robot over DDS, whatever goes wrong."""
 
+import marshal
+import math
 import os
+import py_compile
 import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 pytest.importorskip("cyclonedds", reason="no wheel of Cyclone DDS")
 
 from tdac_agent.errors import RunError
+from tdac_agent.ros2 import messages as msg
 from tdac_agent.ros2.dds import Bus
 from tdac_agent.ros2.drive import Node, open_package
 from tdac_agent.ros2.export import core_settings
@@ -66,15 +71,14 @@ def robot_of(task, settings):
 
 
 def test_as_many_commands_as_verified(task, settings, package, steps, domain):
-    """In simulated time, a drive has the steps of the verified episode, or one off."""
+    """In simulated time, a drive has the steps of the verified episode."""
     with NodeProcess(package, domain) as node:
         simulator = Simulator(robot_of(task, settings), Bus(domain), patience=30.0)
         report = simulator.run(60.0)
         printed = node.output()
     assert report.outcome == "reached"
     assert report.commands == report.steps
-    # On a busy machine the node may see the start, or the goal, one tick longer.
-    assert abs(report.steps - steps) <= 1
+    assert report.steps == steps
     assert report.stops == 0
     assert "reached: the goal" in printed
     assert node.process.returncode == 0
@@ -89,7 +93,7 @@ def test_the_pose_from_odometry(task, settings, package, steps, domain):
         bus = Bus(domain, stamped=True)
         report = Simulator(robot_of(task, settings), bus, patience=30.0).run(60.0)
     assert report.outcome == "reached"
-    assert abs(report.steps - steps) <= 1
+    assert report.steps == steps
 
 
 @pytest.mark.slow
@@ -118,9 +122,9 @@ def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, ki
 
 
 @pytest.mark.slow_after(1)
-@pytest.mark.parametrize("kind", ["pose-jump", "some-nan", "second-publisher"])
+@pytest.mark.parametrize("kind", ["some-nan", "second-publisher"])
 def test_no_fault_leads_to_a_contact(task, settings, package, domain, kind):
-    """A wrong pose, missing ranges, a second publisher: the goal without a contact."""
+    """Missing ranges, a second publisher: the goal without a contact."""
     with NodeProcess(package, domain):
         simulator = Simulator(
             robot_of(task, settings),
@@ -236,6 +240,87 @@ def test_a_changed_package_needs_trust(package, tmp_path):
             open_package(copy)
     with pytest.raises(RunError, match="is not a package of tdac export ros2"):
         open_package(tmp_path)
+
+
+@pytest.mark.parametrize("place", ["__init__.py", "core.abi3.so", "core.pyc"])
+def test_nothing_else_in_the_folder_runs(package, tmp_path, place):
+    """A package that comes back with more files than it had runs none of them."""
+    copy = tmp_path / "copy"
+    shutil.copytree(package, copy)
+    modules, mark = copy / "tdac_floor", tmp_path / "ran"
+    evil = f"open({str(mark)!r}, 'w').close()\n"
+    if place == "core.pyc":
+        source = modules / "core.py"
+        made = py_compile.compile(str(source), doraise=True)
+        code = Path(made).read_bytes()[:16] + marshal.dumps(compile(evil, "x", "exec"))
+        Path(made).write_bytes(code)
+    else:
+        (modules / place).write_text(evil)
+    opened = open_package(copy)
+    assert opened.core.Core.__module__ == "tdac_agent.ros2.package.core"
+    assert not mark.exists()
+
+
+def test_a_second_signal_ends_it_at_once(package, domain, here):
+    """The first one sends the last zero several times; the second one, once more."""
+    said, bus = [], Bus(domain)
+    reader = bus.reader("cmd_vel")
+
+    def say(text):
+        said.append(text)
+        signal.raise_signal(signal.SIGINT)
+
+    node = Node(open_package(package), bus, dead_man=0.3, sim_time=False, say=say)
+    with pytest.raises(KeyboardInterrupt):
+        node.run()
+    assert said == ["waiting", "ended: the node was told to end"]
+    found, end = [], time.monotonic() + 10.0
+    while len(found) < 3 and time.monotonic() < end:
+        found += reader.take()
+    assert [(each.linear.x, each.angular.z) for each in found] == [(0.0, 0.0)] * 3
+
+
+def hostile_messages():
+    """Messages of the right types with values that no robot has."""
+    for value in (math.nan, math.inf, -math.inf, 1e308, -1.0):
+        point, turn = (
+            msg.Point(value, value),
+            msg.Quaternion(value, value, value, value),
+        )
+        body = msg.PoseWithCovariance(msg.Pose(point, turn), [value] * 36)
+        for seconds in (-(2**31), 0, 2**31 - 1):
+            header = msg.Header(msg.Time(seconds, 2**32 - 1), "x" * 5000)
+            yield "odom", msg.Odometry(header, "base_link", body)
+            yield "amcl_pose", msg.PoseWithCovarianceStamped(header, body)
+            place = msg.Transform(msg.Vector3(value, value), turn)
+            for parent, child in (("map", "odom"), ("odom", "base_link")):
+                own = msg.Header(header.stamp, parent)
+                moved = msg.TransformStamped(own, child, place)
+                yield "tf", msg.TFMessage([moved])
+            ranges = [max(min(value, 3e38), -3e38)] * 60
+            fields = [max(min(value, 3e38), -3e38)] * 7
+            yield "scan", msg.LaserScan(header, *fields, ranges)
+            yield "scan", msg.LaserScan(header, *fields, [])
+            yield "clock", msg.Clock(header.stamp)
+    frames = [msg.TransformStamped(msg.Header(), f"f{i}") for i in range(500)]
+    yield "tf", msg.TFMessage(frames)
+
+
+@pytest.mark.parametrize("origin", [None, (0.0, 0.0, 0.0)])
+def test_messages_of_strangers_move_nothing(package, domain, here, origin):
+    """Whatever numbers arrive, the node goes on and sends only zeros."""
+    bus, opened, sent = Bus(domain), open_package(package), []
+    node = Node(
+        opened, bus, dead_man=0.3, sim_time=False, any_start=True, origin=origin
+    )
+    writers = {name: bus.writer(name) for name in ("scan", "odom", "tf", "clock")}
+    writers["amcl_pose"] = bus.writer("amcl_pose")
+    for name, message in hostile_messages():
+        writers[name].write(message)
+        node._hear()
+        sent.append(node.core.tick(time.time(), 0.0))
+    assert {(each.v, each.omega) for each in sent} == {(0.0, 0.0)}
+    assert len(node._frames) <= 100
 
 
 @pytest.mark.parametrize(

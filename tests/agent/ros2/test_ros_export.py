@@ -3,7 +3,9 @@
 import configparser
 import hashlib
 import json
+import re
 import runpy
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -167,14 +169,50 @@ def test_the_readme_says_what_was_not_run(package):
     assert NOT_RUN in text
     assert "ros2 service call /drive/start" in text
     assert "| a scan or a pose is late, lost or old | 0.195 |" in text
+    assert "AMCL needs the map as SLAM wrote it" in text
+    assert "the task floor over ROS 2" in text
 
 
-def test_the_readme_names_run_and_package_as_they_were_given(run, package):
-    """Its commands work from where the package was exported."""
-    text = (package / "README.md").read_text()
-    assert f"tdac ros sim {run} " in text
-    assert f"tdac ros drive {package}\n" in text
-    assert f"cp -r {package} " in text
+def test_no_file_names_a_place_of_the_machine(run, package):
+    """Who gets the package learns nothing of the folders of its exporter."""
+    for file in package.rglob("*"):
+        if file.is_file() and "__pycache__" not in file.parts:
+            data = file.read_bytes()
+            for place in (run, package, Path.home(), Path(sys.prefix)):
+                assert str(place).encode() not in data, (file, place)
+
+
+HOSTILE = "a`$(touch x)`</description><b>'\"; import os # {{ 7*7 }} [x](http:y) ü"
+
+
+def test_a_hostile_name_of_a_task_stays_text(run, tmp_path):
+    """It ends up in no code, no XML, no shell command and no Markdown."""
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    spec = yaml.safe_load((folder / "task.yaml").read_text())
+    spec["name"] = HOSTILE.replace("/", "|")
+    (folder / "task.yaml").write_text(yaml.safe_dump(spec))
+    made = export_ros2(folder, tmp_path / "out", unverified=True)
+    assert re.fullmatch("[a-z0-9_]+", made.name)
+    for file in made.folder.rglob("*"):
+        if file.is_file() and file.name != "settings.json":
+            data = file.read_bytes()
+            for part in (b"$(touch", b"<b>", b"import os #", b"7*7", b"](http"):
+                assert part not in data or file.suffix in {".npy", ".png", ".py"}, file
+    for file in (*made.folder.glob("*.py"), *(made.folder / "launch").iterdir()):
+        compile(file.read_text(), str(file), "exec")
+    ET.parse(made.folder / "package.xml")
+    yaml.safe_load((made.folder / "config" / "drive.yaml").read_text())
+    settings = json.loads((made.folder / "controller" / "settings.json").read_text())
+    assert settings["task"] == spec["name"]
+
+
+@pytest.mark.parametrize("name", ["test", "config", "class", "json", "numpy", "rclpy"])
+def test_names_that_would_hide_others_are_refused(run, tmp_path, name):
+    """Of Python, of the package's own folders, of what it imports."""
+    with pytest.raises(RunError, match=f"has this name; try tdac_{name}"):
+        export_ros2(run, tmp_path / "out", name=name, unverified=True)
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_is_not_verified_needs_a_flag(run, package, tmp_path):

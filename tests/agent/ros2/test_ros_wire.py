@@ -43,6 +43,12 @@ MESSAGES = [
         ),
         msg.TwistWithCovariance(TWIST, [float(-i) for i in range(36)]),
     ),
+    msg.PoseWithCovarianceStamped(
+        HEADER,
+        msg.PoseWithCovariance(
+            msg.Pose(msg.Point(1.0, 2.0, 3.0), TURN), [float(i) for i in range(36)]
+        ),
+    ),
     msg.TFMessage(
         [
             msg.TransformStamped(
@@ -91,7 +97,7 @@ def test_topics_have_the_names_types_and_qos_of_ros(task, settings):
     other = DomainParticipant(DOMAIN)
     reader = BuiltinDataReader(other, BuiltinTopicDcpsPublication)
     end, seen = time.monotonic() + 10.0, {}
-    while len(seen) < 5 and time.monotonic() < end:
+    while len(seen) < 6 and time.monotonic() < end:
         for each in reader.take(100):
             if hasattr(each, "topic_name") and each.topic_name.startswith("rt/"):
                 seen[each.topic_name] = each
@@ -101,6 +107,7 @@ def test_topics_have_the_names_types_and_qos_of_ros(task, settings):
         "rt/odom": "nav_msgs::msg::dds_::Odometry_",
         "rt/tf": "tf2_msgs::msg::dds_::TFMessage_",
         "rt/tf_static": "tf2_msgs::msg::dds_::TFMessage_",
+        "rt/amcl_pose": "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_",
         "rt/clock": "rosgraph_msgs::msg::dds_::Clock_",
     }
     reliable = {n: each.qos[Policy.Reliability] for n, each in seen.items()}
@@ -109,8 +116,9 @@ def test_topics_have_the_names_types_and_qos_of_ros(task, settings):
         "rt/scan",
         "rt/clock",
     }
-    lasting = seen["rt/tf_static"].qos[Policy.Durability]
-    assert lasting == Policy.Durability.TransientLocal
+    for name in ("rt/tf_static", "rt/amcl_pose"):
+        lasting = seen[name].qos[Policy.Durability]
+        assert lasting == Policy.Durability.TransientLocal
     assert seen["rt/scan"].qos[Policy.Durability] == Policy.Durability.Volatile
     assert simulator is not None
 

@@ -128,7 +128,8 @@ def test_robots_that_fit_are_offered(tmp_path):
     """Those in metres where metres are known, and e-pucks in worlds."""
     metric = metric_map(tmp_path)
     names = [robot.name for robot in metric.robots]
-    assert names == ["create3-rplidar", "jackal", "turtlebot3-burger"]
+    burgers = ["turtlebot3-burger", "turtlebot3-burger-lds02"]
+    assert names == ["create3-rplidar", "jackal", *burgers]
     world = view_of("world", "maze")
     assert [robot.name for robot in world.robots] == ["e-puck", "e-puck2"]
     assert view_of("map", "maze").robots == ()

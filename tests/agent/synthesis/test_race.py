@@ -9,6 +9,7 @@ from subject import Subject
 
 from tdac_agent.errors import RunError
 from tdac_agent.models.provider import Reply
+from tdac_agent.runs.falsification import read_falsification
 from tdac_agent.runs.resume import check_same, settings_of
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.runs.selection_record import read_selection
@@ -110,6 +111,51 @@ def test_the_selection_has_a_comparison_with_the_best_first_answer(race, out):
         assert all(each == numbers[name][0] for each in numbers[name])
     sets = [set.union(*each) for each in numbers.values()]
     assert sum(map(len, sets)) == len(set.union(*sets))
+
+
+@pytest.mark.slow
+def test_the_smallest_failure_of_the_best_one_is_told(race, out):
+    """Each best one is searched once, in worlds of the pool that it passed."""
+    model, run = race(SLOW, FAST, SLOWER, SLOW, ask="informed,repair", envelope=16)
+    assert run.status == "selected"
+    first, *others = prompts(model)
+    assert "carries" not in first
+    best = ["1", "2", "2"]
+    for prompt, name in zip(others, best, strict=True):
+        told = prompt.partition(f"### How far candidate {name} carries\n")[2]
+        assert "there may be smaller failures.\n- " in told
+        assert ("smallest failure found in world" in told) or ("no comb" in told)
+    pool = {
+        row["index"]
+        for path in out.glob("iterations/k01/j0/improve-*/episodes.json")
+        for row in json.loads(path.read_text())["episodes"]
+    }
+    folders = sorted(out.glob("iterations/*/j0/envelope"))
+    assert [each.parent.parent.name for each in folders] == ["k01", "k02"]
+    for folder in folders:
+        found = read_falsification(folder)
+        assert found.episodes <= found.budget == 16
+        assert {each.number for each in found.envelopes} <= pool
+
+
+@pytest.mark.slow
+def test_a_search_on_record_is_not_made_again(wide, out, write):
+    """After an interruption, the same questions follow."""
+
+    def stop(record):
+        if record["event"] == "verify.end" and record["k"] == 2:
+            raise KeyboardInterrupt
+
+    options = {"ask": "informed", "envelope": 16, "iterations": 3}
+    sources = [*map(code, (SLOW, FAST, SLOWER))]
+    with pytest.raises(KeyboardInterrupt):
+        write(wide, *sources, on_event=stop, **options)
+    file = out / "iterations/k01/j0/envelope/falsify.json"
+    before = file.read_bytes(), file.stat().st_mtime_ns
+    model, run = write(wide, *sources[2:], **options)
+    assert run.finished
+    assert (file.read_bytes(), file.stat().st_mtime_ns) == before
+    assert "### How far candidate 2 carries" in model.requests[-1].prompt
 
 
 @pytest.mark.slow

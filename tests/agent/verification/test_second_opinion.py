@@ -94,7 +94,10 @@ def test_a_required_opinion_is_a_test_that_all_arrive():
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--physics", "mujoko"), "'mujoko' is not one of 'exact', 'mujoco'"),
+        (
+            ("--physics", "mujoko"),
+            "'mujoko' is not one of 'exact', 'mujoco'",
+        ),
         (("--require-physics",), "--require-physics needs --physics mujoco"),
     ],
 )

@@ -40,7 +40,8 @@ def in_room(floor, **options):
 
 def test_they_come_with_the_package():
     assert set(bundled_robots()) == {
-        *("turtlebot3-burger", "create3-rplidar", "jackal"),
+        *("turtlebot3-burger", "turtlebot3-burger-lds02", "create3-rplidar"),
+        "jackal",
         *("e-puck", "e-puck2", "paper-disc"),
     }
 
