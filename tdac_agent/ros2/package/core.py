@@ -25,6 +25,8 @@ LATENCY = 1
 """Control periods from a command to the wheels that are reckoned with; more is not covered."""
 STEADY = 10
 """Control periods without a jump after which the pose counts again."""
+FARTHEST = 1e6
+"""No place on a map is so far away, m."""
 TURNED = 0.25
 """Largest jump and standard deviation of the yaw, rad."""
 
@@ -189,7 +191,7 @@ class Core:
 
     def pose(self, stamp: float, x: float, y: float, yaw: float) -> None:
         """Take a pose in the map's frame; older ones than the last do not count."""
-        if not (stamp > self._pose_stamp and math.isfinite(stamp + x + y + yaw)):
+        if not stamp > self._pose_stamp or not abs(x) + abs(y) + abs(yaw) < FARTHEST:
             return
         pose = (x, y, wrapped(yaw))
         if self._pose_stamp > -math.inf:

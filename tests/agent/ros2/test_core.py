@@ -679,6 +679,21 @@ def test_an_unsure_pose_stops_it(make_core, robot, variances, drives):
     assert drive(core, robot, 0.1)[-1].state == "driving"
 
 
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e308, 1e7])
+def test_a_pose_that_is_no_place_does_not_count(make_core, robot, value):
+    """The robot stands as without a pose, and observes only numbers."""
+    core = make_core()
+    drive(core, robot, 0.5)
+
+    def wrong(core, robot, now):
+        core.pose(now, value, 0.0, 0.0)
+        core.scan(now, robot.layout, robot.read().ranges)
+
+    last = drive(core, robot, 1.0, wrong)[-1]
+    assert (last.v, last.reason) == (0.0, "the last pose is older than 0.3 s")
+    assert all(np.isfinite(each).all() for each in core.observation().values())
+
+
 @pytest.mark.parametrize("changes", [{"max_jump": -1.0}, {"max_deviation": math.nan}])
 def test_limits_of_the_pose_are_numbers(make_core, changes):
     """0 or more."""
