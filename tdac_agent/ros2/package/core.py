@@ -350,12 +350,16 @@ class Core:
         return min(found, key=lambda each: max(each[0] / limit, each[1] / TURNED))
 
     def _moved(self, since: float, until: float) -> tuple[float, float, float]:
-        """Return the motion by the commands in a time, as a pose in the body's first frame."""
+        """
+        Return the motion by the commands in a time, as a pose in the body's first frame.
+
+        A command lasts until the next one, and no longer than the robot's timer.
+        """
         moved = (0.0, 0.0, 0.0)
         steps = list(self._motion)
         steps.append((max(until, steps[-1][0] if steps else until), 0.0, 0.0))
         for (begin, v, omega), (end, _, _) in pairwise(steps):
-            lasted = min(end, until) - max(begin, since)
+            lasted = min(end, until, begin + self.settings.dead_man) - max(begin, since)
             if lasted > 0.0:
                 half = 0.5 * omega * lasted
                 chord = v * lasted * float(np.sinc(half / math.pi))

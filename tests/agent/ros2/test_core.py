@@ -628,6 +628,16 @@ def test_a_jump_of_the_pose_stops_it(make_core, robot, wrong):
     )
 
 
+def test_a_node_that_was_frozen_sees_no_jump(make_core, robot):
+    """The robot stopped by its own timer, which is where the commands lead, too."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    for _ in range(12):
+        robot.step()
+    assert robot.stands
+    assert drive(core, robot, 0.1)[-1].state == "driving"
+
+
 def test_small_corrections_and_late_wheels_are_no_jumps(make_core, robot):
     """Noise of a localiser, and wheels that obey a period late, do not stop it."""
     core, random = make_core(), np.random.default_rng(2)
