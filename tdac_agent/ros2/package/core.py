@@ -25,6 +25,8 @@ LATENCY = 1
 """Control periods from a command to the wheels that are reckoned with; more is not covered."""
 STEADY = 10
 """Control periods without a jump after which the pose counts again."""
+FARTHEST = 1e6
+"""No place on a map is so far away, m."""
 TURNED = 0.25
 """Largest jump and standard deviation of the yaw, rad."""
 
@@ -189,7 +191,7 @@ class Core:
 
     def pose(self, stamp: float, x: float, y: float, yaw: float) -> None:
         """Take a pose in the map's frame; older ones than the last do not count."""
-        if not (stamp > self._pose_stamp and math.isfinite(stamp + x + y + yaw)):
+        if not stamp > self._pose_stamp or not abs(x) + abs(y) + abs(yaw) < FARTHEST:
             return
         pose = (x, y, wrapped(yaw))
         if self._pose_stamp > -math.inf:
@@ -348,12 +350,16 @@ class Core:
         return min(found, key=lambda each: max(each[0] / limit, each[1] / TURNED))
 
     def _moved(self, since: float, until: float) -> tuple[float, float, float]:
-        """Return the motion by the commands in a time, as a pose in the body's first frame."""
+        """
+        Return the motion by the commands in a time, as a pose in the body's first frame.
+
+        A command lasts until the next one, and no longer than the robot's timer.
+        """
         moved = (0.0, 0.0, 0.0)
         steps = list(self._motion)
         steps.append((max(until, steps[-1][0] if steps else until), 0.0, 0.0))
         for (begin, v, omega), (end, _, _) in pairwise(steps):
-            lasted = min(end, until) - max(begin, since)
+            lasted = min(end, until, begin + self.settings.dead_man) - max(begin, since)
             if lasted > 0.0:
                 half = 0.5 * omega * lasted
                 chord = v * lasted * float(np.sinc(half / math.pi))

@@ -628,6 +628,16 @@ def test_a_jump_of_the_pose_stops_it(make_core, robot, wrong):
     )
 
 
+def test_a_node_that_was_frozen_sees_no_jump(make_core, robot):
+    """The robot stopped by its own timer, which is where the commands lead, too."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    for _ in range(12):
+        robot.step()
+    assert robot.stands
+    assert drive(core, robot, 0.1)[-1].state == "driving"
+
+
 def test_small_corrections_and_late_wheels_are_no_jumps(make_core, robot):
     """Noise of a localiser, and wheels that obey a period late, do not stop it."""
     core, random = make_core(), np.random.default_rng(2)
@@ -677,6 +687,21 @@ def test_an_unsure_pose_stops_it(make_core, robot, variances, drives):
     assert drives or "the pose is unsure: standard deviation" in command.reason
     core.localised((0.01, 0.01, 0.001))
     assert drive(core, robot, 0.1)[-1].state == "driving"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1e308, 1e7])
+def test_a_pose_that_is_no_place_does_not_count(make_core, robot, value):
+    """The robot stands as without a pose, and observes only numbers."""
+    core = make_core()
+    drive(core, robot, 0.5)
+
+    def wrong(core, robot, now):
+        core.pose(now, value, 0.0, 0.0)
+        core.scan(now, robot.layout, robot.read().ranges)
+
+    last = drive(core, robot, 1.0, wrong)[-1]
+    assert (last.v, last.reason) == (0.0, "the last pose is older than 0.3 s")
+    assert all(np.isfinite(each).all() for each in core.observation().values())
 
 
 @pytest.mark.parametrize("changes", [{"max_jump": -1.0}, {"max_deviation": math.nan}])
