@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from matplotlib.ticker import MaxNLocator
+
 from tdac_agent.metrics.exact import CONFIDENCE, exact_interval
 from tdac_agent.plots.style import (
     COLOURS,
@@ -24,16 +26,19 @@ def draw_curves(found: Falsification, path: Path) -> None:
     parts: dict[str, list[Point]] = {}
     for point in found.curves:
         parts.setdefault(point.part, []).append(point)
-    rows = -(-len(parts) // _COLUMNS)
-    figure = new_plot(2.6 * min(_COLUMNS, len(parts)), 1.9 * rows + 0.4)
+    columns = min(_COLUMNS, len(parts))
+    rows = -(-len(parts) // columns)
+    figure = new_plot(2.6 * max(2, columns), 1.9 * rows + 0.6)
     count = max(point.count for point in found.curves)
     what = "jittered starts" if found.split is None else f"worlds of {found.split}"
     figure.suptitle(
-        f"{found.policy} on {found.name}: success in {count} {what}, 95 % intervals",
-        fontsize=10,
+        f"{found.policy} on {found.name}\nshare of successes in {count} {what}, exact "
+        "95 % intervals; dashed: where the task's own start fails",
+        fontsize=9,
+        wrap=True,
     )
     for number, (name, points) in enumerate(parts.items()):
-        axes = apply_style(figure.add_subplot(rows, _COLUMNS, number + 1))
+        axes = apply_style(figure.add_subplot(rows, columns, number + 1))
         part = DEVIATIONS[name]
         scale, unit = _axis(part, found)
         values = [scale * point.value for point in points]
@@ -59,6 +64,8 @@ def draw_curves(found: Falsification, path: Path) -> None:
         axes.set_ylim(-0.03, 1.03)
         axes.set_xlabel(f"{part.words} ({unit})", fontsize=8)
         axes.tick_params(labelsize=7)
+        whole = part.unit == "steps"
+        axes.xaxis.set_major_locator(MaxNLocator(5, integer=whole))
     write_atomic(path, figure_bytes(figure, "png"))
 
 

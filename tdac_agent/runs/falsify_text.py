@@ -14,8 +14,9 @@ from tdac_agent.tasks.deviation import DEVIATIONS
 from tdac_agent.verification.diagnosis.gap import gap_text
 
 NO_PROOF = (
-    "This is a search of {} episodes, not a proof: there may be smaller failures. What "
-    "it cannot find, the blind drives of a verification still bound."
+    "This is a search of {} episodes, not a proof: there may be smaller failures. The "
+    "blind drives of a verification bound how often it fails with the starts and the "
+    "noise that they draw, not with a robot that differs."
 )
 _JOINED = {"pose error": ("pose_x", "pose_y"), "start": ("start_x", "start_y")}
 _JOINED |= {"obstacles": ("obstacles_x", "obstacles_y")}

@@ -42,6 +42,8 @@ _LINE, _CHARACTERS = 21, 50
 _PIECES = 16
 # Minimum margin around the event in a close-up, body radii.
 _MARGIN_RADII = 5.0
+# The same beside another picture, which shows the surroundings.
+_NEAR_RADII = 2.0
 # Minimum enlargement that justifies a close-up.
 _MIN_ZOOM = 1.5
 _SMALLEST_BODY = 4.0
@@ -112,17 +114,20 @@ def with_close_up(
 ) -> Image:
     """Another picture of a map, with the close-up and the caption of a run beside it.
 
+    It stays as it is if a close-up would show little more.
+
     Args:
         whole: The picture, uint8 RGB.
         background: Background of the run's task.
         poses: Shape (T + 1, 3): x, y, heading.
         event: The event to show.
     """
-    window = _window(background, event, poses, background.whole().scale)
-    close = None
-    if window is not None:
-        own = background.close_up(window)
-        close = _close_up(own, poses, event, background.radius)
+    scale = background.whole().scale
+    window = _window(background, event, poses, scale, _NEAR_RADII)
+    if window is None:
+        return whole
+    chart = background.close_up(window)
+    close = _close_up(chart, poses, event, background.radius)
     return _side_by_side(whole, _column(event, close))
 
 
@@ -224,12 +229,16 @@ def _draw_trail(canvas: Canvas, places: Points) -> None:
 
 
 def _window(
-    background: Backdrop, event: Event, poses: Points, scale: float
+    background: Backdrop,
+    event: Event,
+    poses: Points,
+    scale: float,
+    margin: float = _MARGIN_RADII,
 ) -> CloseUpWindow | None:
     """The part to enlarge; None if no close-up is worthwhile."""
     for where in (event.where, poses[-1:, :2]):
         low, high = where.min(axis=0), where.max(axis=0)
-        extent = float((high - low).max()) + 2.0 * _MARGIN_RADII * background.radius
+        extent = float((high - low).max()) + 2.0 * margin * background.radius
         window = background.window((low + high) / 2.0, extent)
         if CLOSE_UP / window.side >= _MIN_ZOOM * scale:
             return window

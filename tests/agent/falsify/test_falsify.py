@@ -1,6 +1,8 @@
 """The search names what makes a controller fail, and by how much."""
 
 import json
+import os
+import signal
 from dataclasses import replace
 
 import pytest
@@ -105,6 +107,26 @@ def test_the_same_seed_gives_the_same_bytes_and_goes_on(search, tmp_path):
     files = {each.name for each in cut.iterdir()}
     assert files == {"falsify.json"}
     assert counts[-1] == found.episodes
+
+
+def test_a_worker_that_dies_between_two_batches_is_replaced(search, warm):
+    """What it drove stays; the batches after it have another worker."""
+    workers = []
+
+    def kill_first(count):
+        assert warm._series is not None
+        workers.append(warm._series[0])
+        if len(workers) == 1:
+            os.killpg(workers[0], signal.SIGKILL)
+            while not warm._has_answer():
+                os.sched_yield()
+
+    plan = replace(PLAN, episodes=16, space={"delay": None})
+    found = search(BREAKS_WHEN_LATE, plan, watch=kill_first)
+    assert smallest(found) == {"delay": LATE}
+    assert len(workers) > 2
+    assert len(set(workers)) == 2
+    assert warm._series is None  # the worker has ended with the search
 
 
 def _plain(found):
