@@ -96,10 +96,10 @@ def _compared(
         "cause": there.cause or "",
         "step": step,
         "steps_here": here.steps,
-        "apart": round(float(np.hypot(*(same - end)[:2])) / radius, 4),
-        "aside": round(float(offsets[near]) / radius, 4),
+        "apart": round(float(np.hypot(*(same - end)[:2]) / radius), 4),
+        "aside": round(float(offsets[near] / radius), 4),
         "turned": round(turned, 4),
-        "gap": round((here.least_gap or 0.0) / radius, 4),
+        "gap": round(float((here.least_gap or 0.0) / radius), 4),
     }
 
 

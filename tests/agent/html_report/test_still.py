@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 from PIL import Image
-from script import AHEAD, Script, code
+from script import AHEAD, NO_RULES, Script, code
 from unconfirmed import synthesize
 
 from tdac_agent import load_task
@@ -28,7 +28,7 @@ def run(tmp_path_factory, warm):
     out = place / "run"
     synthesize(
         load_task(file),
-        Script(code(AHEAD)),
+        Script(code(AHEAD), NO_RULES),
         out=out,
         iterations=1,
         patience=0,
