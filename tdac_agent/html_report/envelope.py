@@ -43,6 +43,7 @@ def envelope_of(folder: Path) -> dict[str, Any] | None:
         return {"left_out": f"{RECORD_FILE} is of another controller"}
     failed, summary = found.counterexample, summary_of(found)
     return {
+        "left_out": "",
         "summary": summary[:1].upper() + summary[1:],
         "failure": "" if failed is None else failure_text(failed, found),
         "worlds": [_world(each, found) for each in found.envelopes],

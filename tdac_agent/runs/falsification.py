@@ -105,7 +105,7 @@ class Falsification(FiniteRecord):
     budget: int = Field(description="Most episodes of the search.")
     episodes: int = Field(description="Episodes of the search, without curves.")
     sandbox: str
-    envelopes: tuple[Envelope, ...]
+    envelopes: tuple[Envelope, ...] = Field(min_length=1)
     curves: tuple[Point, ...] = ()
     versions: dict[str, str]
 

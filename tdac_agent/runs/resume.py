@@ -62,6 +62,7 @@ CONFIGURATION = {
     "episodes": "number of episodes",
     "feedback_episodes": "feedback episodes",
     "improve": "number of improving episodes",
+    "envelope": "number of episodes of a search for the smallest failure",
 }
 
 NOT_TO_BE_RESUMED = {"version", "dynamics", "vision"}
@@ -222,6 +223,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         **({"ask": run.ask} if run.ask else {}),
         "confirm": run.confirm,
         "improve": run.improve,
+        "envelope": run.envelope,
         **_of_episodes(run),
         "seed": run.seed,
         "index": run.index,

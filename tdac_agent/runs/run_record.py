@@ -189,6 +189,11 @@ class Run(PrintableRecord):
     improve: int = Field(
         0, description="Further simulated episodes, to improve what works."
     )
+    envelope: int = Field(
+        0,
+        exclude_if=operator.not_,
+        description="Most episodes of each search for a smallest failure.",
+    )
     then_verify: bool = Field(
         False, description="Whether the selected controller drives on hidden worlds."
     )

@@ -7,6 +7,7 @@ import os
 import pytest
 
 from tdac_agent.html_report.envelope import envelope_of
+from tdac_agent.html_report.page import _environment
 from tdac_agent.storage.hashes import sha256_of
 
 SOURCE = b"def policy(obs):\n    return 0.0, 0.0\n"
@@ -68,6 +69,11 @@ def leave(folder, text):
     (folder / "falsify.json").write_text(text)
 
 
+def shown(found):
+    """The panel of the page."""
+    return _environment().get_template("envelope.html.j2").render(envelope=found)
+
+
 def places(value, place=()):
     """The places of all values inside a value."""
     yield place
@@ -94,6 +100,16 @@ def test_it_has_the_smallest_failure_and_says_that_it_is_a_search(folder):
     assert "delay 3 steps" in found["failure"]
     assert "it touched a wall" in found["failure"]
     assert "search of 60 episodes, not a proof" in found["note"]
+    assert "<td>3 steps</td>" in shown(found)
+
+
+def test_texts_of_a_record_are_no_markup(folder):
+    row = {**ROW, "text": "case 3: <script>alert(1)</script>. Then more"}
+    place = ("envelopes", 0, "counterexample", "row")
+    leave(folder, json.dumps(changed(place, row)))
+    page = shown(envelope_of(folder))
+    assert "<script>" not in page
+    assert "&lt;script&gt;" in page
 
 
 def test_nothing_is_said_without_a_record(folder):
@@ -107,6 +123,7 @@ def test_a_damaged_record_or_that_of_another_controller_is_named(folder):
     }
     leave(folder, json.dumps({**RECORD, "policy_sha256": "2" * 64}))
     assert envelope_of(folder) == {"left_out": "falsify.json is of another controller"}
+    assert "of another controller" in shown(envelope_of(folder))
 
 
 def test_no_value_breaks_a_report(folder):
@@ -115,22 +132,23 @@ def test_no_value_breaks_a_report(folder):
         for new in NASTY:
             leave(folder, json.dumps(changed(place, new)))
             found = envelope_of(folder)
-            assert "left_out" in found or found["worlds"] is not None
+            assert found["left_out"] or found["summary"]
+            assert shown(found)
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, "1" * 5000, '{"name": ' * 2000])
 def test_a_deep_or_long_record_is_left_out(folder, text):
     leave(folder, text)
-    assert "left_out" in envelope_of(folder)
+    assert envelope_of(folder)["left_out"]
 
 
 def test_neither_a_pipe_nor_a_huge_file_is_read(folder):
     os.mkfifo(folder / "falsify.json")
-    assert "left_out" in envelope_of(folder)
+    assert envelope_of(folder)["left_out"]
     (folder / "falsify.json").unlink()
     with (folder / "falsify.json").open("wb") as file:
         file.truncate(8 << 30)
-    assert "left_out" in envelope_of(folder)
+    assert envelope_of(folder)["left_out"]
 
 
 def test_no_link_leads_out_of_the_folder(folder, tmp_path_factory):
@@ -142,4 +160,4 @@ def test_no_link_leads_out_of_the_folder(folder, tmp_path_factory):
     assert envelope_of(folder)["picture"] is None
     (folder / "falsify.json").rename(outside / "falsify.json")
     (folder / "falsify.json").symlink_to(outside / "falsify.json")
-    assert "left_out" in envelope_of(folder)
+    assert envelope_of(folder)["left_out"]

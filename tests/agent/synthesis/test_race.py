@@ -156,6 +156,7 @@ def test_a_search_on_record_is_not_made_again(wide, out, write):
     assert run.finished
     assert (file.read_bytes(), file.stat().st_mtime_ns) == before
     assert "### How far candidate 2 carries" in model.requests[-1].prompt
+    assert settings_of(run)["envelope"] == 16
 
 
 @pytest.mark.slow
