@@ -24,7 +24,6 @@ from tdac_agent.synthesis.confirming import (
     drive_blind,
     keep_confirmation,
 )
-from tdac_agent.synthesis.counterexample import counterexample_text
 from tdac_agent.synthesis.delivery import (
     compared,
     place_verified,
@@ -178,6 +177,11 @@ class SuiteTrials:
 
     def counterexample(self, candidate: Candidate) -> str:
         """See `Trials`."""
+        if not self.terms.options.envelope:
+            return ""
+        # It loads task sets, which a run on a task needs for nothing else.
+        from tdac_agent.synthesis.counterexample import counterexample_text
+
         return counterexample_text(candidate, self.task, self.terms, 0)
 
     def admit(self, candidate: Candidate) -> Explored | None:

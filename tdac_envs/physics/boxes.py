@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.errors import TaskError
-from tdac_envs.physics.scene import Prism, Scene
-from tdac_envs.worlds.footprint import Rectangle
+
+if TYPE_CHECKING:
+    # Loaded with the first scene: a map without it needs no code of worlds.
+    from tdac_envs.physics.scene import Scene
+    from tdac_envs.worlds.footprint import Rectangle
 
 Cells = NDArray[np.bool_]
 MOST_BOXES = 20_000
@@ -57,6 +62,8 @@ def scene_on(
     Raises:
         TaskError: The map needs too many boxes.
     """
+    from tdac_envs.physics.scene import Prism, Scene
+
     found = rectangles(cells)
     if len(found) > MOST_BOXES:
         raise TaskError(
@@ -76,6 +83,8 @@ def scene_on(
 
 
 def _box(one: tuple[int, int, int, int], metres: float) -> Rectangle:
+    from tdac_envs.worlds.footprint import Rectangle
+
     left, top, right, bottom = (metres * (edge - 0.5) for edge in one)
     middle = (left + right) / 2, -(top + bottom) / 2
     return Rectangle(*middle, 0.0, right - left, bottom - top)

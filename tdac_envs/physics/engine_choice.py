@@ -11,7 +11,7 @@ from tdac_envs.core.errors import TaskError, hint
 from tdac_envs.physics.body import BodySpec
 from tdac_envs.physics.moved import EXACT, VARIED, engine_named
 from tdac_envs.robots.bundled import load_robot
-from tdac_envs.robots.robot_file import Body
+from tdac_envs.robots.robot_file import body_in
 
 BODY_KEYS = tuple(one.name for one in fields(BodySpec) if one.name != "radius")
 KEYS = "engine", "resolution", *BODY_KEYS
@@ -80,9 +80,3 @@ def engine_of(given: Any, robot: Any = None) -> Engine:
     if name == VARIED:
         own.setdefault("varied", 0)
     return Engine(name, resolution, own)
-
-
-def body_in(body: Body | None) -> dict[str, float]:
-    """The values of a `BodySpec` that the `body` of a robot file has."""
-    known = {} if body is None else body.model_dump(exclude_none=True)
-    return {"top" if key == "height" else key: own for key, own in known.items()}

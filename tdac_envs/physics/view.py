@@ -9,18 +9,18 @@ import math
 import os
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.errors import TaskError
-from tdac_envs.physics import mjcf
 from tdac_envs.physics.body import BodySpec
-from tdac_envs.physics.decor import DRAWN, drawn_model
-from tdac_envs.physics.engine import mujoco_module
 from tdac_envs.physics.moved import Pose
-from tdac_envs.physics.scene import Scene
+
+if TYPE_CHECKING:
+    # Loaded with the first picture: an environment needs no code of worlds.
+    from tdac_envs.physics.scene import Scene
 
 Image = NDArray[np.uint8]
 WIDTH, HEIGHT = 800, 480
@@ -57,6 +57,10 @@ class View3D:
         goal: tuple[float, float],
         tolerance: float,
     ) -> None:
+        from tdac_envs.physics import mjcf
+        from tdac_envs.physics.decor import DRAWN, drawn_model
+        from tdac_envs.physics.engine import mujoco_module
+
         engine = self._engine = mujoco_module()
         self._context = current_context()
         self._floor, self._body = scene.floor, body
@@ -81,6 +85,7 @@ class View3D:
         self._above = self._camera_above(bounds)
         free = [self._model.joint(mjcf.name_of(k)) for k in range(len(scene.things))]
         self._free = [int(joint.qposadr[0]) for joint in free]
+        self._robot = int(self._model.joint(mjcf.ROBOT).qposadr[0])
 
     def frame(
         self,
@@ -115,8 +120,7 @@ class View3D:
         return image
 
     def _place(self, pose: Pose, things: NDArray[np.float64] | None) -> None:
-        qpos, (x, y, heading) = self._data.qpos, pose
-        at = int(self._model.joint(mjcf.ROBOT).qposadr[0])
+        qpos, (x, y, heading), at = self._data.qpos, pose, self._robot
         qpos[at : at + 3] = x, y, self._floor + self._body.wheel_radius
         qpos[at + 3 : at + 7] = _about_z(heading)
         for start, row in zip(

@@ -102,6 +102,12 @@ class Body(StrictModel):
     friction: _Amount | None = Field(None, description="Of the body on obstacles.")
 
 
+def body_in(body: Body | None) -> dict[str, float]:
+    """The values of a `BodySpec` that the `body` of a robot file has."""
+    known = {} if body is None else body.model_dump(exclude_none=True)
+    return {"top" if key == "height" else key: own for key, own in known.items()}
+
+
 def body_written(body: Body | None) -> dict[str, Any]:
     """The key `body` of a robot in a task file; empty without one."""
     own = {} if body is None else body.model_dump(exclude_none=True)

@@ -25,9 +25,8 @@ from tdac_envs.epuck.infrared import TABLE
 from tdac_envs.epuck.robot_options import e_puck_of, with_version
 from tdac_envs.epuck.source import open_world
 from tdac_envs.epuck.task import TOLERANCE, EPuckTask, make_task
-from tdac_envs.physics.engine_choice import body_in
 from tdac_envs.robots.bundled import placed_robot
-from tdac_envs.robots.robot_file import Body, RobotFile, body_written
+from tdac_envs.robots.robot_file import Body, RobotFile, body_in, body_written
 from tdac_envs.worlds.bundled import bundled_worlds, world_file
 from tdac_envs.worlds.wbt.reader import load_world
 from tdac_envs.worlds.wbt.writer import write_world

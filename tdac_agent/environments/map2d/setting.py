@@ -42,8 +42,7 @@ from tdac_envs.mapping.params import MapParams, ReadingOptions
 from tdac_envs.mapping.preprocessing import as_image
 from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
 from tdac_envs.movers.spec import AnySpec
-from tdac_envs.physics.engine_choice import body_in
-from tdac_envs.robots.robot_file import Body, body_written
+from tdac_envs.robots.robot_file import Body, body_in, body_written
 
 DT = 0.05
 

@@ -32,7 +32,10 @@ def archive():
 @pytest.fixture
 def texts(archive):
     told = PoolFeedback("world", FIRST, scene=None)
-    return RaceQuestions(archive, SimpleNamespace(pool_feedback=told, aim="Be quick."))
+    trials = SimpleNamespace(
+        pool_feedback=told, aim="Be quick.", counterexample=lambda candidate: ""
+    )
+    return RaceQuestions(archive, trials)
 
 
 def failed(archive, k, parent, said="test_imports: os"):
