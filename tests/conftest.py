@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from file_halves import is_in_half
 
 SAMPLE = 80
 ROOT = Path(__file__).resolve().parents[1]
@@ -107,8 +108,15 @@ def one_set_of_types() -> Iterator[None]:
 def pytest_collection_modifyitems(
     config: pytest.Config, items: list[pytest.Item]
 ) -> None:
-    """With TDAC_SLOW_SAMPLE set, keeps a seeded sample of the slow tests."""
+    """Keeps a seeded sample of the slow tests, or the tests of half of the files.
+
+    TDAC_SLOW_SAMPLE is the seed of the sample, TDAC_TEST_PART that of the files.
+    """
     _mark_later_cases(items)
+    if part := os.environ.get("TDAC_TEST_PART"):
+        others = [each for each in items if not is_in_half(part, each.nodeid)]
+        config.hook.pytest_deselected(items=others)
+        items[:] = [item for item in items if item not in set(others)]
     seed = os.environ.get("TDAC_SLOW_SAMPLE")
     slow = sorted((i for i in items if i.get_closest_marker("slow")), key=_order)
     if seed is None or len(slow) <= SAMPLE:

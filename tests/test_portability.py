@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from file_halves import is_in_half
 
 TOOL = Path(__file__).parents[1] / "tools/portability"
 
@@ -87,3 +88,16 @@ def test_an_unknown_row_is_refused():
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "no row 'lowset'; there are temporary," in done.stderr
+
+
+def test_a_seed_draws_half_of_the_files():
+    """About half of them, the same ones again, and all tests of a file or none."""
+    files = [f"tests/test_{number}.py" for number in range(400)]
+
+    def half(seed):
+        return [file for file in files if is_in_half(seed, f"{file}::test_x")]
+
+    assert 160 < len(half("a commit")) < 240
+    assert half("a commit") == half("a commit") != half("b")
+    ids = f"{files[0]}::test_x", f"{files[0]}::TestX::test_y[case]"
+    assert len({is_in_half("a commit", each) for each in ids}) == 1

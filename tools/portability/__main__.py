@@ -26,10 +26,11 @@ DRAWN = "drawn"
 def main() -> int:
     """Runs the selected rows; returns 1 if one of them failed."""
     options = _options()
-    names = _names(options.rows)
+    commit = _last_commit() if DRAWN in options.rows else ""
+    names = _names(options.rows, commit)
     folder = options.work or Path(tempfile.mkdtemp(prefix="tdac-portability-"))
     folder.mkdir(parents=True, exist_ok=True)
-    place = Place(folder.resolve(), shlex.split(options.command))
+    place = Place(folder.resolve(), shlex.split(options.command), commit)
     outcomes = []
     try:
         for name in names:
@@ -57,18 +58,21 @@ def _options() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _names(wanted: list[str]) -> list[str]:
+def _names(wanted: list[str], commit: str) -> list[str]:
     """The rows to run; exits if one is unknown."""
-    names = [_drawn() if name == DRAWN else name for name in wanted or ROWS]
+    names = [_drawn(commit) if name == DRAWN else name for name in wanted or ROWS]
     if unknown := [name for name in names if name not in ROWS]:
         sys.exit(f"no row {unknown[0]!r}; there are {', '.join(ROWS)}")
     return names
 
 
-def _drawn() -> str:
-    """The row selected by the hash of the last commit."""
+def _last_commit() -> str:
     command = ["git", "rev-parse", "HEAD"]
-    commit = subprocess.check_output(command, cwd=ROOT, text=True).strip()
+    return subprocess.check_output(command, cwd=ROOT, text=True).strip()
+
+
+def _drawn(commit: str) -> str:
+    """The row selected by the hash of the last commit."""
     name = drawn(commit)
     out = ", ".join(other for other in ROWS if not ROWS[other].drawn)
     print(f"drawn by {commit[:12]}: {name} (not in the draw: {out})", flush=True)

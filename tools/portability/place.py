@@ -20,13 +20,16 @@ class Place:
     Attributes:
         folder: The folder.
         command: Command that `temporary` and `busy` run in the clone.
+        part: Seed that draws the half of the test files that rows with other versions
+            run; empty for all files.
     """
 
-    def __init__(self, folder: Path, command: list[str]) -> None:
+    def __init__(self, folder: Path, command: list[str], part: str = "") -> None:
         # Commands that run as another user need access.
         folder.chmod(0o755)
         self.folder = folder
         self.command = command
+        self.part = part
 
     @functools.cached_property
     def tree(self) -> Path:

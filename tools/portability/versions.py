@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import tomllib
 
-from commands import counted, run
+from commands import counted, own_environment, run
 from place import Place, interpreter
 
 # These pull in gigabytes for GPUs if no smaller build is available.
@@ -49,7 +49,9 @@ def _tests(place: Place, name: str, version: str, *options: str) -> str:
     # After a crash, a new process would wait for ever for the files of the old one.
     parallel = ["-n", "2", "--dist", "loadfile", "--max-worker-restart", "0"]
     tests = ["-m", "pytest", "-q", *parallel, "-m", "not slow"]
-    return counted(run([python, *tests], cwd=place.tree)) + left_out
+    env = own_environment(TDAC_TEST_PART=place.part) if place.part else None
+    told = "; half of the files, drawn" if place.part else ""
+    return counted(run([python, *tests], cwd=place.tree, env=env)) + told + left_out
 
 
 def test_extra(place: Place) -> list[str]:
