@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +27,9 @@ import numpy as np
 from benchmarks.agreement import ARMS, ROWS, append, read
 from benchmarks.agreement_pairs import Pair, all_pairs
 from benchmarks.agreement_tables import SLIP, load
-from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.falsify.drives import JITTER, Drives
-from tdac_agent.verification.judge.warm import WarmJudge
-from tdac_agent.verification.judge.worlds import Case
+from tdac_agent.evaluation.replay import drive_episode
+from tdac_agent.falsify.drives import named_disturbance
+from tdac_agent.problems.part import Part
 
 COMPARED = "compared.csv"
 FIELDS = (
@@ -46,44 +44,31 @@ def compare(out: Path, only: str = "") -> None:
     wanted = pairs[pairs["here"].astype(bool) & ~pairs["there"].astype(bool)]
     facts = wanted.set_index("pair")
     done = {row["pair"] for row in read(out / COMPARED)}
-    with WarmJudge() as judge:
-        for pair in all_pairs():
-            if pair.name not in facts.index or pair.name in done:
-                continue
-            if only not in pair.name:
-                continue
-            own = rows[(rows["pair"] == pair.name) & (rows["arm"] == "there")]
-            failed = own[~own["success"]].iloc[0]
-            fact = facts.loc[pair.name]
-            row = _compared(pair, int(failed["number"]), fact["radius"], judge)
-            speed = fact["speed"] * fact["metres"]
-            row["slip"] = round(speed**2 / SLIP / fact["metres"] / fact["radius"], 4)
-            append(out / COMPARED, FIELDS, [row])
-            print(row, flush=True)
+    for pair in all_pairs():
+        if pair.name not in facts.index or pair.name in done or only not in pair.name:
+            continue
+        own = rows[(rows["pair"] == pair.name) & (rows["arm"] == "there")]
+        failed = own[~own["success"]].iloc[0]
+        fact = facts.loc[pair.name]
+        row = _compared(pair, int(failed["number"]), fact["radius"])
+        speed = fact["speed"] * fact["metres"]
+        row["slip"] = round(speed**2 / SLIP / fact["metres"] / fact["radius"], 4)
+        append(out / COMPARED, FIELDS, [row])
+        print(row, flush=True)
 
 
-def _compared(
-    pair: Pair, number: int, radius: float, judge: WarmJudge
-) -> dict[str, Any]:
+def _compared(pair: Pair, number: int, radius: float) -> dict[str, Any]:
     """The row of an episode, without `slip`."""
     problem = pair.opened()
     entrant, split = pair.entrant(problem), "test" if pair.is_level else ""
+    own = named_disturbance(problem)
     found = {}
     for arm in ("here", "there"):
         physics, deviation = ARMS[arm]
-        with (
-            tempfile.TemporaryDirectory() as name,
-            Drives(
-                entrant, problem, split, 1, {"kind": "agreement"}, "auto", None, judge,
-                physics=physics,
-            ) as drives,
-        ):  # fmt: skip
-            cases = [Case(number=number, deviation=deviation)]
-            (row,) = drives.drive(cases, JITTER, Path(name))
-            found[arm] = row, Trajectory.load(Path(name) / "0.npz")
+        part = Part((number,), split, disturbance=own, physics=physics)
+        driven = drive_episode(entrant, problem, part, deviation=deviation)
+        found[arm] = driven.row, driven.rollout.trajectory
     (here, path), (there, other) = found["here"], found["there"]
-    assert here is not None
-    assert there is not None
     end, step = other.poses[-1], other.steps
     same = path.poses[min(step, path.steps)]
     offsets = np.hypot(*(path.poses[:, :2] - end[:2]).T)

@@ -42,11 +42,15 @@ from tdac_envs.map2d.carried import finish, metres_of, turn_wheels
 from tdac_envs.map2d.env import Map2DEnv
 from tdac_envs.map2d.robot import Map2DArrays
 from tdac_envs.map2d.task import Map2DTask
-from tdac_envs.physics.boxes import rectangles
+from tdac_envs.physics.boxes import (
+    Edges,
+    fence,
+    fence_width,
+    middle_and_sides,
+    rectangles,
+)
 from tdac_envs.physics.moved import Pose, arc_between
 
-_FENCE = 1.0
-"""Width of the walls around a map, m."""
 _UNLIMITED = 1e6
 
 
@@ -102,13 +106,8 @@ def scene_of(task: Map2DTask, metres: float) -> dict[str, Any]:
     """The world of a task in ir-sim's own format: walls are rectangles."""
     cells, own, start = task.terrain.grid.cells, task.robot, task.start
     rows, columns = cells.shape
-    wide = max(round(_FENCE / metres), 1)
-    fence = [
-        (-wide, -wide, columns + wide, 0),
-        (-wide, rows, columns + wide, rows + wide),
-        (-wide, 0, 0, rows),
-        (columns, 0, columns + wide, rows),
-    ]
+    wide, walls = fence_width(metres), [*rectangles(cells)]
+    walls += fence(rows, columns, metres)
     angles = own.angles()
     return {
         "world": {
@@ -138,15 +137,14 @@ def scene_of(task: Map2DTask, metres: float) -> dict[str, Any]:
                 ],
             }
         ],
-        "obstacle": [_wall(one, metres) for one in (*rectangles(cells), *fence)],
+        "obstacle": [_wall(one, metres) for one in walls],
     }
 
 
-def _wall(one: tuple[int, int, int, int], metres: float) -> dict[str, Any]:
-    left, top, right, bottom = (metres * (edge - 0.5) for edge in one)
-    shape = {"name": "rectangle", "length": right - left, "width": bottom - top}
-    middle = [(left + right) / 2, -(top + bottom) / 2, 0.0]
-    return {"shape": shape, "state": middle, "static": True}
+def _wall(one: Edges, metres: float) -> dict[str, Any]:
+    (x, y), along, across = middle_and_sides(one, metres)
+    shape = {"name": "rectangle", "length": along, "width": across}
+    return {"shape": shape, "state": [x, y, 0.0], "static": True}
 
 
 class InIrSim:

@@ -33,6 +33,11 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput") and not config.option.collectonly:
         _compile_kernels()
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    # `nohup` has SIGHUP ignored. Commands that tests run take it, so that processes
+    # would begin with or without it, depending on the test that starts them.
+    for number in (signal.SIGHUP, signal.SIGQUIT):
+        if signal.getsignal(number) == signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
 
 
 @pytest.hookimpl(wrapper=True)

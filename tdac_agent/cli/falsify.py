@@ -22,6 +22,7 @@ from tdac_agent.environments.map2d.pictures import MapPictures
 from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted, prepared
 from tdac_agent.evaluation.replay import drive_episode
 from tdac_agent.falsify.curves import draw_curves
+from tdac_agent.falsify.drives import named_disturbance
 from tdac_agent.falsify.falsify import SearchPlan, falsify, space_on
 from tdac_agent.problems.part import Part
 from tdac_agent.runs.falsification import PICTURE, Counterexample, Falsification
@@ -240,7 +241,7 @@ def part_of(problem: Task | TaskSet, number: int, split: str | None) -> Part:
     """The episode of a number, undisturbed unless the problem says otherwise."""
     if not isinstance(problem, Task):
         return Part((number,), split or "dev")
-    own = problem.own_disturbance() if problem.says_disturbances else Disturbance.none()
+    own = named_disturbance(problem)
     return Part((number,), disturbance=own, variation="nominal")
 
 

@@ -10,9 +10,9 @@ from rich.spinner import Spinner
 from rich.table import Table
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.run_view import list_tests
 from tdac_agent.models.budget import format_usd
 from tdac_agent.synthesis.question_kinds import NEW
+from tdac_agent.verification.diagnosis.listed import list_tests
 from tdac_agent.verification.verdict import COLOURS
 
 _ANSWERS = (

@@ -11,12 +11,12 @@ from rich.table import Table
 from rich.text import Text
 
 from tdac_agent.cli.console import Console
-from tdac_agent.cli.run_view import list_tests
 from tdac_agent.cli.sentences import print_sentences
 from tdac_agent.episodes.trajectory import nominal_first
 from tdac_agent.prompting.feedback import Group, cut, group_failures
 from tdac_agent.tasks.units import UNITS, Units
 from tdac_agent.verification.diagnosis.gap import gap_figure, too_close_text
+from tdac_agent.verification.diagnosis.listed import list_tests
 from tdac_agent.verification.diagnosis.report import (
     Episode,
     Failure,

@@ -9,13 +9,13 @@ from rich.markup import escape
 from rich.table import Table
 
 from tdac_agent.cli.console import Console, print_json
-from tdac_agent.cli.run_view import list_tests
 from tdac_agent.cli.sentences import print_plain
 from tdac_agent.errors import RunError
 from tdac_agent.prompting.given_rules import GIVEN, shared_rules, written
 from tdac_agent.prompting.rules import RepairRule, RuleBook
 from tdac_agent.runs.run_record import Run, load_rules, load_run
 from tdac_agent.storage.files import write_atomic
+from tdac_agent.verification.diagnosis.listed import list_tests
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 _COLOURS = {"in force": "green", "dropped": "red", "made room": "yellow"}

@@ -25,7 +25,8 @@ def show_ending(run: Run, search: TaskImprovement | None, console: Console) -> N
     """
     status = status_now(run, before=False)
     mark = "✔ " if status in {"verified", "passed"} else ""
-    colour, evidence = COLOURS.get(status, "yellow"), evidence_of(run)
+    confirmation = read_confirmation(run) if run.confirmations else None
+    colour, evidence = COLOURS.get(status, "yellow"), evidence_of(run, confirmation)
     shown = f": {evidence}" if evidence else ""
     console.print(
         f"[bold {colour}]{mark}{status}[/]{escape(shown)} → "
@@ -37,7 +38,6 @@ def show_ending(run: Run, search: TaskImprovement | None, console: Console) -> N
     if search is not None and search.selected != search.first:
         how += f"; improved in iteration {search.k}"
     print_indented(console, how)
-    confirmation = read_confirmation(run) if run.confirmations else None
     if confirmation is not None:
         print_indented(console, verified_text(confirmation))
     if search is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
 
 from rich.box import SIMPLE
 from rich.markup import escape
@@ -31,6 +30,7 @@ from tdac_agent.runs.selection_record import (
     losses_text,
 )
 from tdac_agent.tasks.task_file import SET_FILE
+from tdac_agent.verification.diagnosis.listed import list_tests
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.verdict import COLOURS
 from tdac_envs.core.intake import RECORD_BYTES, read_file
@@ -99,13 +99,6 @@ def _attempts(run: Run, search: TaskImprovement | None) -> Table:
             failed = search.text_of(attempt.k, attempt.j) or failed
         table.add_row(str(attempt.k), str(attempt.j), _result(attempt), escape(failed))
     return table
-
-
-def list_tests(tests: Sequence[str], most: int) -> str:
-    """The names of the first `most` tests, and the number of the others."""
-    names = [name.rpartition("::")[2] for name in tests]
-    more = len(names) - most
-    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def _remark(attempt: Attempt) -> str:

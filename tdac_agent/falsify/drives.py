@@ -138,14 +138,6 @@ class Drives:
         """Episodes that may still be driven."""
         return self.budget - self.count
 
-    @property
-    def own_disturbance(self) -> Disturbance:
-        """What disturbs all episodes of a task: only what the task itself names."""
-        assert isinstance(self.problem, Task)
-        if self.problem.says_disturbances:
-            return self.problem.own_disturbance()
-        return Disturbance.none()
-
     def is_possible(self, deviation: Deviation) -> bool:
         """Whether an episode can begin with shifted start and obstacles."""
         if not isinstance(self.problem, Task):
@@ -224,17 +216,23 @@ class Drives:
     def _within(self, variation: str) -> TaskWorld | SetWorlds:
         folder = self._folder / f"world-{variation}"
         folder.mkdir(exist_ok=True)
-        disturbance = None
-        if isinstance(self.problem, Task):
-            disturbance = self.own_disturbance
         part = Part(
             (0,),
             self.split,
-            disturbance=disturbance,
+            disturbance=named_disturbance(self.problem),
             variation=variation,
             physics=self.physics,
         )
         return episodes_of(self.problem).worlds(part, folder, self.entrant.policy)
+
+
+def named_disturbance(problem: Task | TaskSet) -> Disturbance | None:
+    """What disturbs all episodes of a task: only what it names. A set has its own."""
+    if not isinstance(problem, Task):
+        return None
+    if problem.says_disturbances:
+        return problem.own_disturbance()
+    return Disturbance.none()
 
 
 def _key(case: Case) -> str:

@@ -20,7 +20,7 @@ from tdac_agent.html_report.code import (
     is_rewritten,
     shown_diff,
 )
-from tdac_agent.html_report.names import candidate_name
+from tdac_agent.html_report.names import candidate_name, short_test
 from tdac_agent.html_report.overview import format_seconds, overview_of
 from tdac_agent.html_report.scene import TaskPicture, scene_of
 from tdac_agent.html_report.section import (
@@ -192,15 +192,6 @@ def _environment() -> jinja2.Environment:
 def shortened(text: str) -> str:
     """Cuts a text to a bounded length."""
     return text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]} …"
-
-
-def short_test(test: str) -> str:
-    """A test's name without its file and `test_`, with spaces for underscores.
-
-    On a task set, it is a cause of failures, and stays as it is.
-    """
-    name, bracket, case = (test.partition("::")[2] or test).partition("[")
-    return name.removeprefix("test_").replace("_", " ") + bracket + case
 
 
 def _text(name: str) -> str:

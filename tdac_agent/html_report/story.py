@@ -11,7 +11,9 @@ import numpy as np
 
 from tdac_agent.html_report.animation import FINENESS
 from tdac_agent.html_report.code import count_changes, is_new_file, is_rewritten
+from tdac_agent.html_report.names import short_test
 from tdac_agent.runs.history import CandidateHistory, RunHistory
+from tdac_agent.verification.diagnosis.listed import first_of
 from tdac_agent.verification.diagnosis.report import Cause, Diagnosis, Report
 
 MOST_CARDS = 6
@@ -125,10 +127,8 @@ def told_of(report: Report, drive: dict[str, Any] | None) -> str:
     if reached < len(drives) and shown:
         text = _ending(shown[0], drive)
         return f"{text[0].upper()}{text[1:]}; {reached} of {len(drives)} drives arrive."
-    names = [each.test.rpartition("::test_")[2] for each in report.failures]
-    listed = ", ".join(name.replace("_", " ") for name in names[:MOST_NAMES])
-    more = len(names) - MOST_NAMES
-    listed += f" and {more} more" if more > 0 else ""
+    names = [short_test(each.test) for each in report.failures]
+    listed = first_of(names, MOST_NAMES)
     tests = f"{len(names)} test{'' if len(names) == 1 else 's'}"
     arrive = f"Arrives in {reached} of {len(drives)} drives; " if drives else ""
     text = f"{arrive}fails {tests}: {listed}."

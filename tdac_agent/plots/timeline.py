@@ -22,6 +22,7 @@ from tdac_agent.runs.history import (
 )
 from tdac_agent.runs.run_record import Run
 from tdac_agent.storage.journal import JournalRecord
+from tdac_agent.verification.diagnosis.listed import first_of
 
 COLUMNS, MOST_LINES, MOST_CAUSES = 106, 3, 4
 LINE, GAP = 0.165, 0.6
@@ -141,12 +142,11 @@ def _causes(record: JournalRecord, tried: CandidateHistory | None) -> tuple[str,
 def _cause(group: Group) -> str:
     """Text of a root cause: its tests, and the first sentence of what happened."""
     names = [short_name(failure.test) for failure in group.members]
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     first = group.members[0]
     text = first.message if first.diagnosis is None else first.diagnosis.text
     # Unlike a decimal point, the end of a sentence is followed by a space.
     sentence = text.partition(". ")[0].partition("\n")[0].rstrip(".")
-    return f"{', '.join(names[:NAMED])}{more}: {sentence}"
+    return f"{first_of(names, NAMED)}: {sentence}"
 
 
 def _wrapped(texts: Sequence[str], most: int = MOST_LINES) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tdac_agent.storage.plain import plain
+from tdac_agent.verification.diagnosis.listed import first_of
 from tdac_agent.verification.diagnosis.report import GROUPS, Diagnosis, Failure, Report
 
 MAX_GROUPS = 3
@@ -180,9 +181,7 @@ def _first(texts: list[str]) -> list[str]:
 
 
 def _names(failures: Sequence[Failure]) -> str:
-    names = ", ".join(failure.test for failure in failures[:MAX_NAMES])
-    more = len(failures) - MAX_NAMES
-    return f"{names} and {more} more" if more > 0 else names
+    return first_of([failure.test for failure in failures], MAX_NAMES)
 
 
 def _short(group: Group, unit: str, limit: int = 100) -> str:

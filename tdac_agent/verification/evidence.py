@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from tdac_agent.runs.run_record import Run
-from tdac_agent.verification.confirmation import read_confirmation
+from tdac_agent.verification.diagnosis.listed import list_tests
+from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_agent.verification.verify import report_in
 
 MOST_NAMES = 4
 
 
-def evidence_of(run: Run) -> str:
+def evidence_of(run: Run, confirmation: EpisodeReport | None) -> str:
     """Such as `41 of 41 tests, 93 of 93 blind drives arrive`; empty without a report.
 
     Args:
         run: A run on a task, with a controller that passed all tests.
+        confirmation: Its confirmation, if it has one.
     """
     parts = []
     report = report_in(run.folder, {})
     if report is not None:
         tests = report.verdict
         parts.append(f"{tests.passed_tests} of {tests.expected} tests")
-    confirmation = read_confirmation(run) if run.confirmations else None
     if confirmation is not None:
         count = f"{confirmation.successes} of {confirmation.count}"
         parts.append(f"{count} blind drives arrive")
@@ -34,9 +35,6 @@ def failed_last(run: Run) -> str:
     last = run.attempts[-1] if run.attempts else None
     if last is None or not last.failed_tests:
         return ""
-    names = [test.rpartition("::")[2] for test in last.failed_tests]
-    listed = ", ".join(names[:MOST_NAMES])
-    more = len(names) - MOST_NAMES
-    listed += f" and {more} more" if more > 0 else ""
-    count = f"{len(names)} test{'' if len(names) == 1 else 's'}"
-    return f"The last candidate failed {count}: {listed}."
+    failed = last.failed_tests
+    count = f"{len(failed)} test{'' if len(failed) == 1 else 's'}"
+    return f"The last candidate failed {count}: {list_tests(failed, MOST_NAMES)}."

@@ -15,13 +15,16 @@ if TYPE_CHECKING:
     from tdac_envs.worlds.footprint import Rectangle
 
 Cells = NDArray[np.bool_]
+Point = tuple[float, float]
+Edges = tuple[int, int, int, int]
+"""First column, first row, last column + 1, last row + 1 of a rectangle of pixels."""
 MOST_BOXES = 20_000
 """Largest number of boxes of a map."""
 _FENCE = 1.0
 """Width of the walls around a map, m."""
 
 
-def rectangles(cells: Cells) -> list[tuple[int, int, int, int]]:
+def rectangles(cells: Cells) -> list[Edges]:
     """Rectangles that cover the occupied cells of a grid, each cell once.
 
     Runs of equal columns in successive rows become one rectangle.
@@ -32,7 +35,7 @@ def rectangles(cells: Cells) -> list[tuple[int, int, int, int]]:
     Returns:
         First column, first row, last column + 1, last row + 1 of each.
     """
-    done: list[tuple[int, int, int, int]] = []
+    done: list[Edges] = []
     open_: dict[tuple[int, int], int] = {}
     for row, line in enumerate(cells):
         edges = np.flatnonzero(np.diff(line.astype(np.int8), prepend=0, append=0))
@@ -70,21 +73,36 @@ def scene_on(
             f"physics 'mujoco': the obstacles of the map are {len(found)} boxes, more "
             f"than {MOST_BOXES}; use a coarser map"
         )
-    rows, columns = cells.shape
-    wide = max(round(_FENCE / metres), 1)
-    fence = [
+    if fenced:
+        rows, columns = cells.shape
+        found += fence(rows, columns, metres)
+    return Scene(tuple(Prism(_box(one, metres), 0.0, height) for one in found))
+
+
+def fence(rows: int, columns: int, metres: float) -> list[Edges]:
+    """Walls around a map, 1 m wide; see `rectangles`."""
+    wide = fence_width(metres)
+    return [
         (-wide, -wide, columns + wide, 0),
         (-wide, rows, columns + wide, rows + wide),
         (-wide, 0, 0, rows),
         (columns, 0, columns + wide, rows),
     ]
-    found += fence if fenced else []
-    return Scene(tuple(Prism(_box(one, metres), 0.0, height) for one in found))
 
 
-def _box(one: tuple[int, int, int, int], metres: float) -> Rectangle:
+def fence_width(metres: float) -> int:
+    """Width of the walls around a map, px of so many metres."""
+    return max(round(_FENCE / metres), 1)
+
+
+def middle_and_sides(one: Edges, metres: float) -> tuple[Point, float, float]:
+    """Middle (m, y up) of a rectangle of pixels, and its sides along x and y, m."""
+    left, top, right, bottom = (metres * (edge - 0.5) for edge in one)
+    return ((left + right) / 2, -(top + bottom) / 2), right - left, bottom - top
+
+
+def _box(one: Edges, metres: float) -> Rectangle:
     from tdac_envs.worlds.footprint import Rectangle
 
-    left, top, right, bottom = (metres * (edge - 0.5) for edge in one)
-    middle = (left + right) / 2, -(top + bottom) / 2
-    return Rectangle(*middle, 0.0, right - left, bottom - top)
+    middle, along, across = middle_and_sides(one, metres)
+    return Rectangle(*middle, 0.0, along, across)

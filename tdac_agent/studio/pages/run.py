@@ -35,6 +35,7 @@ from tdac_agent.studio.run_status import (
     progress_of,
     readable_run,
 )
+from tdac_agent.verification.confirmation import read_confirmation
 from tdac_agent.verification.evidence import evidence_of, failed_last
 from tdac_envs.core.errors import TdacError
 
@@ -237,7 +238,8 @@ def _remarks(state: RunState, job: StudioJob | None) -> Iterator[tuple[str, bool
         yield SELECTED, False
     elif state.run and not state.run.on_set and not state.running:
         run = state.run
-        told = evidence_of(run) if run.passed else failed_last(run)
+        confirmation = read_confirmation(run) if run.confirmations else None
+        told = evidence_of(run, confirmation) if run.passed else failed_last(run)
         if told:
             yield f"{told[0].upper()}{told[1:]}", not run.passed
     if state.run and (remark := from_elsewhere(state.run)):
