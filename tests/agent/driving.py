@@ -5,6 +5,7 @@ import itertools
 import math
 import shutil
 import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -111,10 +112,13 @@ def import_controller(source, env, folder, monkeypatch):
 
 def import_from(folder, source, monkeypatch):
     """The module of a controller in a working folder that is filled."""
-    (folder / "controller.py").write_text(source)
+    file = folder / "controller.py"
+    file.write_text(source)
+    # Python would take bytecode of a file of the same length and second for its own.
+    Path(importlib.util.cache_from_source(file)).unlink(missing_ok=True)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.delitem(sys.modules, "sensors", raising=False)
-    spec = importlib.util.spec_from_file_location("driven", folder / "controller.py")
+    spec = importlib.util.spec_from_file_location("driven", file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     monkeypatch.delitem(sys.modules, "sensors")
