@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -10,10 +12,13 @@ from matplotlib.ticker import MaxNLocator
 
 from tdac_agent.plots.style import (
     COLOURS,
+    GRID,
     MARKERS,
     TEXT,
+    apply_style,
     legend_above,
     line_style,
+    new_plot,
     panels,
 )
 
@@ -29,59 +34,128 @@ DIFFICULTY = {
 BINS = 4
 """Groups of worlds of about the same number, by a figure of difficulty."""
 _KINDS = {
-    "builtin": "builtin",
+    "builtin": "our own program",
     "planner": "classical planner",
     "controller": "controller file",
-    "learned": "learned",
+    "learned": "learned policy",
     "baseline": "follows waypoints",
     "privileged": "knows the true world",
 }
 # Inches that the labels below and above the panels need.
 ROOM = {"above": 0.8, "narrowest": 6.2}
 # Characters of a name.
-_LONGEST = 22
+_LONGEST = 26
+# Inches of the column of names.
+_NAMES = 2.2
+_SPOKEN = {
+    "builtin": "our own program (builtin)",
+    "first-answers": "language model, one answer",
+    "dwa": "DWA",
+    "mppi": "MPPI",
+    "orca": "ORCA",
+    "ppo": "PPO",
+    "ppo-with-map": "PPO with the map",
+    "recurrent-ppo": "recurrent PPO",
+}
 
 
-def plot_scores(rows: pd.DataFrame) -> Figure:
-    """Plots the time score of each entrant with its interval, a panel per set.
+def plot_scores(
+    rows: pd.DataFrame, over: Sequence[str] = (), *, told: bool = False
+) -> Figure:
+    """Plots the time score of each entrant with its interval, a column per set.
+
+    Of several sets, the first column is the mean. An entrant that did not drive on a
+    set has no mark there; without one of those in the mean, it has no mean.
 
     Args:
         rows: A row per set and entrant, with the columns `set`, `entrant`, `kind`,
             `worlds`, `time`, `low` and `high`; `time` is empty for one that did not
             drive.
+        over: The sets of the mean; empty for all of them.
+        told: Whether the title says the best mean of each kind of entrants.
     """
+    rows = rows[rows["time"].notna()]
     sets = list(rows["set"].drop_duplicates())
-    mean = rows.groupby("entrant", sort=False)["time"].mean()
-    order = list(mean.sort_values(ascending=False, kind="stable").index)
-    height = 0.55 + 0.22 * len(order)
-    figure, grid = panels(len(sets), 2.1, height, left=1.3, **ROOM)
-    for axes, name in zip(grid, sets, strict=False):
+    over = over or sets
+    means = mean_scores(rows, over)
+    order = _in_order(rows, means)
+    columns = ["", *sets] if len(sets) > 1 else sets
+    width = _NAMES + 1.3 * len(columns)
+    figure = new_plot(max(width, 5.0), 1.1 + 0.27 * len(order) + 0.3 * told)
+    for axes, name in zip(
+        np.atleast_1d(figure.subplots(1, len(columns), sharey=True)),
+        columns,
+        strict=True,
+    ):
+        apply_style(axes)
+        axes.grid(visible=True, axis="x", color=GRID, linewidth=0.8)
         own = rows[rows["set"] == name].set_index("entrant")
         for place, entrant in enumerate(order):
-            _dot(axes, own, entrant, len(order) - place)
+            if name == "" and entrant in means.index:
+                _dot(axes, means.loc[entrant], len(order) - place, heavy=True)
+            elif entrant in own.index:
+                _dot(axes, own.loc[entrant], len(order) - place)
         axes.set_title(
-            f"{name}, {int(own['worlds'].max())} worlds", loc="left", fontsize=9.5,
-            color=TEXT,
+            name or ("mean" if len(over) == len(sets) else f"mean of {len(over)}"),
+            loc="left", fontsize=9, color=TEXT,
         )  # fmt: skip
-        axes.set_yticks(range(len(order), 0, -1), [_short(name) for name in order])
+        axes.set_yticks(range(len(order), 0, -1), [spoken(each) for each in order])
         axes.set_ylim(0.4, len(order) + 0.6)
-        axes.set_xlim(-0.02, 1.0)
-        axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "", "0.5", "", "1"])
-        axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
-    legend_above(figure, grid, 4)
-    label = "time score: mean of success x OT / T, with 95 % intervals"
-    if rows["time"].notna().sum() < len(sets) * len(order):
-        label += "; –: did not drive"
-    figure.supxlabel(label, fontsize=9, color=TEXT)
+        axes.set_xlim(-0.03, 1.0)
+        axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+        axes.tick_params(axis="y", length=0)
+    finding = best_of_kinds(means)
+    figure.set_label(f"Time scores. {finding}" if len(means) else "Time scores")
+    legend_above(figure, figure.axes, 6, title=finding if told else "")
+    least, most = int(rows["worlds"].min()), int(rows["worlds"].max())
+    worlds = f"{least}" if least == most else f"{least} to {most}"
+    label = "time score: mean of success × OT / T, with 95 % intervals"
+    label += f"; {worlds} worlds per set"
+    figure.supxlabel(label, fontsize=8.5, color=TEXT)
     return figure
 
 
-def _dot(axes: Axes, own: pd.DataFrame, entrant: str, place: float) -> None:
-    if entrant not in own.index or pd.isna(own.loc[entrant, "time"]):
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 2}
-        axes.text(0.5, place, "–", ha="center", va="center", color="#666666", bbox=box)
-        return
-    row = own.loc[entrant]
+def mean_scores(rows: pd.DataFrame, sets: Sequence[str]) -> pd.DataFrame:
+    """The mean time score over `sets` of the entrants that drove on all of them.
+
+    The interval takes the worlds of different sets for independent.
+
+    Returns:
+        Columns `kind`, `time`, `low` and `high`, by entrant; the best one first.
+    """
+    own = rows[rows["set"].isin(list(sets)) & rows["time"].notna()]
+    found = {}
+    for entrant, each in own.groupby("entrant", sort=False):
+        if len(each) == len(sets):
+            mean = each["time"].mean()
+            down = np.hypot.reduce(each["time"] - each["low"]) / len(each)
+            up = np.hypot.reduce(each["high"] - each["time"]) / len(each)
+            found[entrant] = each["kind"].iloc[0], mean, mean - down, mean + up
+    columns = ["kind", "time", "low", "high"]
+    means = pd.DataFrame.from_dict(found, orient="index", columns=columns)
+    return means.sort_values("time", ascending=False, kind="stable")
+
+
+def spoken(entrant: str) -> str:
+    """The name of an entrant as a reader of a figure says it."""
+    return _SPOKEN.get(entrant) or _short(entrant)
+
+
+def best_of_kinds(means: pd.DataFrame) -> str:
+    """The best mean of each kind of entrants, in a sentence."""
+    best = means.groupby("kind", sort=False).head(1)
+    words = [f"{spoken(name)} {row['time']:.2f}" for name, row in best.iterrows()]
+    return f"On new worlds: {' · '.join(words)}"
+
+
+def _in_order(rows: pd.DataFrame, means: pd.DataFrame) -> list[str]:
+    """All entrants, by their mean over the sets on which they drove."""
+    mean = rows.groupby("entrant", sort=False)["time"].mean()
+    mean.update(means["time"])
+    return list(mean.sort_values(ascending=False, kind="stable").index)
+
+
+def _dot(axes: Axes, row: pd.Series, place: float, *, heavy: bool = False) -> None:
     kind = list(_KINDS).index(row["kind"])
     axes.errorbar(
         row["time"],
@@ -89,10 +163,22 @@ def _dot(axes: Axes, own: pd.DataFrame, entrant: str, place: float) -> None:
         xerr=[[row["time"] - row["low"]], [row["high"] - row["time"]]],
         fmt=MARKERS[kind],
         color=COLOURS[kind],
-        markersize=4,
+        markersize=5 if heavy else 4,
         linewidth=1.2,
         label=_KINDS[row["kind"]],
         clip_on=False,
+    )
+    axes.annotate(
+        f"{row['time']:.2f}",
+        (1.0, place),
+        (3, 0),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        va="center",
+        fontsize=8.5 if heavy else 7.5,
+        weight="bold" if heavy else "normal",
+        color=TEXT,
+        annotation_clip=False,
     )
 
 

@@ -26,7 +26,13 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LINES = ("-", "--", "-.", ":")
 PASSED, FAILED, NOTHING = "#009E73", "#D55E00", "#D9D9D9"
 PALE = "#D8EEE6"  # passed tests, where failed ones must stand out
-TEXT = "#333333"
+TEXT, GRID = "#333333", "#E5E5E5"
+_ON_DARK = {
+    "#ffffff": "#0d1117", "#000000": "#e6edf3", "#333333": "#e6edf3",
+    "#666666": "#9da7b3", "#999999": "#6e7681", "#e5e5e5": "#30363d",
+    "#0072b2": "#58a6e8",
+}  # fmt: skip
+"""Colours of figures on dark pages; the others are seen there, too."""
 
 
 class Plot(Figure):
@@ -85,7 +91,7 @@ def apply_style(axes: Axes) -> Axes:
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color("#999999")
     axes.tick_params(colors=TEXT, labelsize=9)
-    axes.grid(visible=True, axis="y", color="#E5E5E5", linewidth=0.8)
+    axes.grid(visible=True, axis="y", color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
     return axes
 
@@ -153,8 +159,17 @@ def legend(axes: Axes, count: int) -> None:
     )
 
 
-def legend_above(figure: Figure, panels: Sequence[Axes], columns: int) -> None:
-    """Adds a legend of all panels above them, an entry for each label."""
+def legend_above(
+    figure: Figure, panels: Sequence[Axes], columns: int, *, title: str = ""
+) -> None:
+    """Adds a legend of all panels above them, an entry for each label.
+
+    Args:
+        figure: The figure.
+        panels: Its axes.
+        columns: Most entries in a row.
+        title: What the figure shows, in a sentence.
+    """
     entries = {}
     for axes in panels:
         handles, labels = axes.get_legend_handles_labels()
@@ -166,7 +181,11 @@ def legend_above(figure: Figure, panels: Sequence[Axes], columns: int) -> None:
         ncols=columns,
         frameon=False,
         fontsize=8.5,
-    )
+        labelcolor=TEXT,
+        title=title or None,
+        title_fontproperties={"size": 11, "weight": "bold"},
+        alignment="left",
+    ).get_title().set_color(TEXT)
 
 
 def save_figure(figure: Figure, *paths: Path) -> None:
@@ -175,10 +194,25 @@ def save_figure(figure: Figure, *paths: Path) -> None:
         write_atomic(path, figure_bytes(figure, path.suffix.lstrip(".") or "svg"))
 
 
+def save_dark(figure: Figure, path: Path) -> None:
+    """Writes a figure as SVG for dark pages."""
+    drawn = figure_bytes(figure).decode("utf-8")
+    for light, dark in _ON_DARK.items():
+        drawn = drawn.replace(light, dark)
+    write_atomic(path, drawn.encode("utf-8"))
+
+
 def figure_bytes(figure: Figure, kind: str = "svg") -> bytes:
-    """Encodes a figure as svg, pdf or png; equal figures give equal bytes."""
+    """Encodes a figure as svg, pdf or png; equal figures give equal bytes.
+
+    The label of a figure (`figure.set_label`) is the title of an SVG, for those who
+    cannot see it.
+    """
     stream = io.BytesIO()
+    stamp: dict[str, str | None] | None
     stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    if kind == "svg" and figure.get_label():
+        stamp = {"Date": None, "Title": str(figure.get_label())}
     with rc_context({"svg.hashsalt": "tdac"}):  # for the ids of elements
         figure.savefig(stream, format=kind, dpi=150, metadata=stamp)
     return stream.getvalue()

@@ -1,11 +1,20 @@
 """Figures of a bench show the values of its tables."""
 
+import math
+from xml.etree import ElementTree
+
 import numpy as np
 import pandas as pd
 import pytest
 
-from tdac_agent.plots.arena import BINS, plot_difficulty, plot_scores, plot_training
-from tdac_agent.plots.style import line_style
+from tdac_agent.plots.arena import (
+    BINS,
+    mean_scores,
+    plot_difficulty,
+    plot_scores,
+    plot_training,
+)
+from tdac_agent.plots.style import figure_bytes, line_style, save_dark
 
 
 @pytest.fixture
@@ -31,13 +40,47 @@ def marks(axes):
 
 
 def test_scores(rows):
-    """A dot for each that drove, at its value; the best entrant is at the top."""
-    known, lost = plot_scores(rows).axes[:2]
-    names = [label.get_text() for label in known.get_yticklabels()]
-    assert names == ["builtin", "ppo", "dwa"]
+    """A dot with its value for each that drove; the best mean is at the top."""
+    mean, known, lost = plot_scores(rows).axes
+    names = [label.get_text() for label in mean.get_yticklabels()]
+    assert names == ["our own program (builtin)", "PPO", "DWA"]
+    assert marks(mean) == [(0.75, 3), (0.675, 2)]
     assert marks(known) == [(0.9, 3), (0.7, 2), (0.5, 1)]
     assert marks(lost) == [(0.6, 3), (0.65, 2)]
-    assert [text.get_text() for text in lost.texts] == ["–"]
+    assert [text.get_text() for text in lost.texts] == ["0.60", "0.65"]
+
+
+def test_the_mean_of_some_sets(rows):
+    """Those that drove on all of these have a mean, its interval from all of them."""
+    means = mean_scores(rows, ["known", "lost"])
+    assert means.index.tolist() == ["builtin", "ppo"]
+    half = math.hypot(0.05, 0.05) / 2, math.hypot(0.02, 0.02) / 2
+    assert means.loc["ppo", ["low", "high"]].tolist() == pytest.approx(
+        [0.675 - half[0], 0.675 + half[1]]
+    )
+    figure = plot_scores(rows, ["known"], told=True)
+    assert marks(figure.axes[0]) == [(0.9, 3), (0.7, 2), (0.5, 1)]
+    title = figure.legends[0].get_title().get_text()
+    assert (
+        title == "On new worlds: our own program (builtin) 0.90 · PPO 0.70 · DWA 0.50"
+    )
+    assert (
+        ElementTree.fromstring(figure_bytes(figure))[0].text == f"Time scores. {title}"
+    )
+
+
+def test_one_set_has_no_mean(rows):
+    assert len(plot_scores(rows[rows["set"] == "known"]).axes) == 1
+
+
+def test_on_dark_pages(rows, tmp_path):
+    """The same figure on a dark ground, with nothing left in black."""
+    figure = plot_scores(rows, told=True)
+    save_dark(figure, tmp_path / "dark.svg")
+    dark = (tmp_path / "dark.svg").read_text()
+    for colour in ("#ffffff", "#333333", "#000000"):
+        assert colour not in dark
+    assert "#0d1117" in dark
 
 
 def test_training(rows):
