@@ -95,6 +95,7 @@ def made_up(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_tables_of_made_up_rows_are_those_of_other_code(made_up):
     text = tables(made_up)
     for line in expected(made_up):

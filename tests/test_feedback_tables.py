@@ -125,6 +125,7 @@ def test_the_pool_does_not_depend_on_the_number_of_answers(answers):
         assert shares(episodes_for(pool, answers), 0, answers).block == pool
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("contrast", [("I", "A+"), ("E", "A+"), ("I", "M"), ("S", "I")])
 def test_differences(contrast):
     """Each is that of the best candidates in the pool, against A+ at equal cost."""
@@ -143,6 +144,7 @@ def test_fresh_answers_at_equal_cost():
         assert at_equal_cost(scores, group, cost)["k"] == last
 
 
+@pytest.mark.slow
 def test_contrasts():
     """Means, p-values and intervals are those of plain Python and of SciPy."""
     scores = made_up()
@@ -212,6 +214,7 @@ def test_the_interval_of_the_race():
     assert stratified_interval(pairs) == pytest.approx((mean - half, mean + half))
 
 
+@pytest.mark.slow
 def test_the_slope():
     """A gain that grows with the dose is found."""
     scores = made_up()

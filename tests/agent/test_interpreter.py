@@ -145,7 +145,7 @@ def test_no_planted_module_runs(kind, planted, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["src/..", "", ".", ":/none"])
 def test_the_first_process_imports_nothing_from_a_relative_path(planted, path):
     """All modules count that Python has not loaded by itself before."""

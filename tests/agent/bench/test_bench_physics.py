@@ -11,6 +11,7 @@ from tdac_envs.ladder.task_sets import load_set
 pytest.importorskip("mujoco")
 
 
+@pytest.mark.slow
 def test_rows_of_another_physics_are_its_own(few, solver, tmp_path, warm):
     """In one folder nothing of one physics answers for the other one."""
     file, out = tmp_path / "solver.py", tmp_path / "out"
@@ -34,6 +35,7 @@ def test_rows_of_another_physics_are_its_own(few, solver, tmp_path, warm):
     assert [each[2] for each in driven].count(2) == 2
 
 
+@pytest.mark.slow
 def test_different_physics_are_not_put_together(tmp_path, level, warm):
     folders = [tmp_path / name for name in ("exact", "mujoco")]
     for folder in folders:

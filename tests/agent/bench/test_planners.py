@@ -77,6 +77,7 @@ def test_files_have_the_constants_that_are_tuned():
         with_values(source_of(name), dict.fromkeys(ranges_of(name), 1.0))
 
 
+@pytest.mark.slow
 def test_what_is_not_tuned_is_said():
     assert planner_on("go-to-goal", load_set("known")).tuned is None
     assert planner_on("mppi", load_set("unknown")).tuned

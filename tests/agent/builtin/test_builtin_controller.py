@@ -180,7 +180,7 @@ def test_large_maps_are_planned_on_a_lattice(name, nodes, tmp_path, monkeypatch)
     assert rollout.reached, rollout.outcome
 
 
-@pytest.mark.slow_after(4)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", bundled_maps())
 def test_drives_on_bundled_maps(name, tmp_path, monkeypatch):
     """The first controller solves each bundled map, and keeps the required gap."""

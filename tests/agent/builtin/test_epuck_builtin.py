@@ -183,7 +183,7 @@ def drives(task, starts, parameters, folder, monkeypatch, **options):
     return [episode(module, env, start) for start in starts]
 
 
-@pytest.mark.slow_after(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WORLDS)
 def test_drives_in_bundled_worlds(name, tmp_path, monkeypatch):
     """The first controller solves every world fast, and keeps the required gap."""

@@ -117,6 +117,7 @@ def test_of_finished_runs_only_records_may_be_kept(once):
     assert all((run / "iterations").is_dir() for run in runs if run not in thin)
 
 
+@pytest.mark.slow
 def test_a_dry_run_writes_nothing_and_needs_no_key(done, monkeypatch):
     monkeypatch.delenv("OPENAI_API_KEY", raising=False)
     said = done("campaign", "paper_2d", "--dry-run")

@@ -18,6 +18,7 @@ def runs(learner, tau=(1, 2, None), task="maze", most=3, **labels):
     return frames_from_tau(tau, most, learner=learner, task=task, **known)
 
 
+@pytest.mark.slow
 def test_each_task_has_its_curves_and_all_share_the_rates(tmp_path):
     """PNG files beside the tables; the same command writes the same bytes again."""
     frames = join_frames(

@@ -51,6 +51,7 @@ def yielding(_seconds):
     os.sched_yield()
 
 
+@pytest.mark.slow
 def test_slots_grow_by_one_a_round_and_are_halved_by_a_rate_limit(tmp_path):
     """n answers at n slots make n + 1 of them, about; never more than there may be."""
     limit = ConcurrencyLimit(tmp_path, most=12)

@@ -41,6 +41,7 @@ def _loaded(*words, cwd):
     return loaded
 
 
+@pytest.mark.slow
 def test_code_for_tasks_imports_no_task_sets_and_no_worlds(tmp_path):
     """What a task on a map needs imports no code of other problems, and no pandas."""
     names = ", ".join(f"tdac_agent.{each}" for each in MODULES)

@@ -68,6 +68,7 @@ def test_it_shows_a_world(tdac, done):
     assert all(isinstance(shown[key], float) for key in FIGURES)
 
 
+@pytest.mark.slow
 def test_it_draws(tdac, tmp_path):
     """One world, and a sheet of 24; a folder is made if need be."""
     one, many = tmp_path / "new" / "one.png", tmp_path / "many.png"

@@ -181,7 +181,7 @@ def policy(obs):
 """
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["map", "world"])
 def test_a_name_that_nothing_can_print_is_no_fault_of_ours(tdac, tmp_path, kind):
     """The controller has failed, in every command that runs it."""

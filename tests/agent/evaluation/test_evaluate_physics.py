@@ -17,6 +17,7 @@ def endings(found):
     return [(each.number, each.outcome) for each in found.results[0].episodes]
 
 
+@pytest.mark.slow
 def test_a_set_is_driven_in_its_own_worlds(few, solver, tmp_path, warm):
     """The scene follows the world: a controller arrives in both physics."""
     file = tmp_path / "solver.py"

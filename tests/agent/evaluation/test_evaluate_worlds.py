@@ -145,6 +145,7 @@ def test_a_level_without_a_controller_of_our_own(tmp_path):
         evaluate(["no.py"], [load_set(path)], 1)
 
 
+@pytest.mark.slow
 def test_the_command(tdac, done, level, files):
     """A table with scores, failures and generators; JSON with the same figures."""
     words = ("evaluate", *files, "--set", level, "--split", "dev", "-n", "4")

@@ -86,6 +86,7 @@ def test_nobody_is_accused_without_a_failure(search):
     assert found.episodes <= PLAN.episodes
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_goes_on(search, tmp_path):
     plan = replace(PLAN, episodes=48)
     whole = tmp_path / "whole"

@@ -79,7 +79,7 @@ def test_it_fits(opened):
         assert opened.execute_script(size, find(opened, selector)) >= 12
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 def test_the_player(opened):
     """Plays, pauses, is dragged, and shows the episode that is chosen."""
     player = "#run-2 .player"

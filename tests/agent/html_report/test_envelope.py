@@ -126,6 +126,7 @@ def test_a_damaged_record_or_that_of_another_controller_is_named(folder):
     assert "of another controller" in shown(envelope_of(folder))
 
 
+@pytest.mark.slow
 def test_no_value_breaks_a_report(folder):
     """Any value may be wrong: the record is left out, or what is told is finite."""
     for place in places(RECORD):

@@ -177,7 +177,7 @@ def damaged(folder, name, content=None):
     path.write_bytes(whole[: len(whole) // 2] if content is None else content)
 
 
-@pytest.mark.slow_after(3)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "told"),
     [
@@ -241,6 +241,7 @@ def test_a_run_that_is_still_at_work(copied):
         assert word not in shown
 
 
+@pytest.mark.slow
 def test_only_several_runs_have_rates(copied):
     """One that is at work is counted as such."""
     alone = make_page(copied).html.decode()

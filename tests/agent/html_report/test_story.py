@@ -38,6 +38,7 @@ def test_what_changed(cards):
     assert (first.changed, second.changed) == ("", "484 lines added, 1 removed")
 
 
+@pytest.mark.slow
 def test_a_long_run_has_the_first_ones_and_the_last(long_run):
     """The number of those in between is told."""
     cards = cards_of(long_run)

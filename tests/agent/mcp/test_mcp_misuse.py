@@ -173,6 +173,7 @@ def test_two_servers_on_one_folder(serve, small_task, out, tdac):
     assert len(error.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [

@@ -211,7 +211,7 @@ BILLED |= dict.fromkeys(
 )
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("vendor", VENDORS)
 def test_what_may_have_been_billed(server, canary, vendor):
     """A server that says no has not begun an answer; any other may have."""

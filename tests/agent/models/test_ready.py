@@ -168,7 +168,7 @@ COMMANDS = {
 }
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_it_is_told_before_anything_is_compiled(command, fresh, tmp_path, name):
     """One line, no folder, and no compiled code, although there was none before."""

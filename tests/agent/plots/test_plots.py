@@ -280,6 +280,7 @@ def test_the_stages_of_preprocessing():
     assert not grid.cells[y, x].any()
 
 
+@pytest.mark.slow
 def test_a_style_of_the_working_directory_is_not_used(tmp_path):
     """It may be anyone's, and LaTeX would be started with its preamble."""
     foreign = "text.usetex: True\nbackend: module://foreign\n"

@@ -103,6 +103,7 @@ def test_a_chunk_that_declares_much(tmp_path):
     refused(path, "needs more than|is not a readable bag")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no limit here")
 def test_a_folder_that_unpacks_to_much(bag, tmp_path):
     """A file that is packed as a whole is unpacked only up to the limit."""

@@ -188,6 +188,7 @@ def test_the_command(bag, run, monkeypatch, capsys):
     assert printed.err == "error: --recorded runs no test: leave out --paper\n"
 
 
+@pytest.mark.slow
 def test_a_recorded_simulation(source, task, settings, package, tmp_path):
     """A drive over DDS with a fault is replayed to the last command, with its stop."""
     pytest.importorskip("cyclonedds", reason="no wheel of Cyclone DDS")

@@ -70,6 +70,7 @@ def robot_of(task, settings):
     return Robot(task, settings, dead_man=0.3)
 
 
+@pytest.mark.slow
 def test_as_many_commands_as_verified(task, settings, package, steps, domain):
     """In simulated time, a drive has the steps of the verified episode."""
     with NodeProcess(package, domain) as node:
@@ -121,7 +122,7 @@ def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, ki
     assert report.faults[0]["way"] <= stated["a scan or a pose is late, lost or old"]
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["some-nan", "second-publisher"])
 def test_no_fault_leads_to_a_contact(task, settings, package, domain, kind):
     """Missing ranges, a second publisher: the goal without a contact."""
@@ -153,7 +154,7 @@ def signalled(number, process, after):
     return state, watch
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP, signal.SIGTERM])
 def test_a_node_that_ends_or_freezes(task, settings, package, stated, domain, number):
     """The robot stands within the stated distance; a new node finishes the drive."""

@@ -361,6 +361,7 @@ def test_a_syntax_error_names_its_line(launch):
     assert caught.value.line == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "forged",
     [

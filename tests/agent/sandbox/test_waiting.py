@@ -47,7 +47,7 @@ def crowded(loaded, crowd, tier):
     return start
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 def test_standing_in_line_for_a_cpu_is_not_the_controllers_time(crowded):
     """0.6 s of work are within a second, however long they take by the clock."""
     child = crowded(BUSY)

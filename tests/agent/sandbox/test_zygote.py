@@ -158,7 +158,7 @@ def test_a_nursery_that_was_not_used_leaves_nothing(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow
 def test_processes_share_a_nursery(tier):
     """No two of them get the same child, be it ready or not; each ends its own."""
     child_pool = ChildPool(ahead=False)

@@ -104,6 +104,7 @@ def test_an_address_without_a_page_leads_back(browser, filled):
     assert "Nothing is at /nothing/here" in browser.page_source
 
 
+@pytest.mark.slow
 def test_a_report_has_no_scroll_bar_of_its_own(browser, filled):
     """Its frame is as high as it is, and its links move the page around it."""
     browser.get(filled.address)

@@ -274,6 +274,7 @@ def test_the_keyboard_alone(page, plan):
     wait(page, lambda b: "/run?" in b.current_url)
 
 
+@pytest.mark.slow
 def test_the_form_of_a_bench_shows_its_command(page, studio):
     """It starts nothing without worlds; a bench is a page with the studio's links."""
     page.get(f"{studio.base}/benches")
@@ -341,6 +342,7 @@ def test_a_bench_is_stopped_and_continued(page, studio):
     assert report["episodes"][: len(before)] == before
 
 
+@pytest.mark.slow
 def test_a_world_is_driven_by_the_keyboard(page, studio):
     """Straight ahead, the robot of this world meets a wall within seconds."""
     page.get(f"{studio.base}/worlds?level=unknown")
@@ -375,6 +377,7 @@ def test_a_controller_for_a_set_of_worlds(page, studio):
     says(page, "Only hidden worlds, which nobody has seen, can verify it.")
 
 
+@pytest.mark.slow
 def test_a_phone_shows_all_columns_of_a_run(page, studio):
     """As a card, with the name of each."""
     shutil.copytree(DEMO, studio.place / "runs" / "on-a-phone")
@@ -484,6 +487,7 @@ def test_a_page_says_that_another_studio_has_its_port(browser, page, studio, tmp
     browser.get_log("browser")  # the connection was lost
 
 
+@pytest.mark.slow
 def test_an_address_has_the_chosen_task(page, plan):
     """Loading the page again loses no click."""
     open_plan(page, plan)
@@ -547,6 +551,7 @@ def test_two_runs_are_compared(page, studio):
         shutil.rmtree(studio.place / "runs" / f"compared-{name}")
 
 
+@pytest.mark.slow
 def test_disturbed_episodes_have_short_names(page, studio, small_task, good, warm):
     """Not the ten digits of a seed; a click draws the episode."""
     shutil.copytree(DEMO, studio.place / "runs" / "robust")

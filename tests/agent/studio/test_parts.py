@@ -157,6 +157,7 @@ def test_a_draft_with_a_robot_is_the_task_of_its_command(tmp_path, monkeypatch):
     assert "&robot=e-puck2" in address_with(named)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["map", "world"])
 def test_clicks_lead_back_to_places(kind):
     for name in names_of(kind):
@@ -180,6 +181,7 @@ def test_what_cannot_be_driven(tmp_path):
     assert "outside of the closed wall" in outside.problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["maze", "rooms", "street"])
 def test_the_narrowest_passage_limits_the_robot(source, tmp_path):
     """On maps with one way, it and the widest robot that gets through agree."""
@@ -250,6 +252,7 @@ def test_a_job_is_found_again(tmp_path):
     assert [each.file.about for each in jobs(tmp_path)] == ["runs/y", "runs/x"]
 
 
+@pytest.mark.slow
 def test_a_command_at_work_is_not_started_twice(tmp_path):
     """As by a double click; and its folder is given to no other one."""
     job = start(tmp_path, ["runs", "."], free_folder("demo", tmp_path))

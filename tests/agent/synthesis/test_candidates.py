@@ -212,6 +212,7 @@ def test_the_command_takes_candidates(tdac, tmp_path):
     assert load_run(tmp_path / "run").candidates == 3
 
 
+@pytest.mark.slow
 def test_threads_do_not_parse_at_the_same_time(task):
     """Python 3.11 raises SystemError if a garbage collection lets another one parse."""
 

@@ -88,6 +88,7 @@ def test_a_dry_run_prints_the_prompt_and_nothing_else(tmp_path, tdac):
     assert "price of openai:unheard-of: unknown" in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

@@ -43,6 +43,7 @@ def learnt(task, tmp_path, warm):
     return tmp_path / "first"
 
 
+@pytest.mark.slow
 def test_what_was_learnt_on_one_task_is_given_to_the_next(
     learnt, task, tmp_path, warm, good_source, tdac, refused, done
 ):
@@ -83,6 +84,7 @@ def test_what_was_learnt_on_one_task_is_given_to_the_next(
     assert "different given rules" in err
 
 
+@pytest.mark.slow
 def test_a_run_with_given_rules_is_resumed(task, tmp_path, warm, good_source):
     file = tmp_path / "rules.md"
     file.write_text("- Keep right.\n")

@@ -55,6 +55,7 @@ def test_the_library_omits_facts(few, out):
         begin(few, out, omit="radius", prompt="underspecified")
 
 
+@pytest.mark.slow
 def test_the_flags(done, tdac):
     """`--dry-run` prints the question; without --prompt, the first wording."""
     words = ("synth", "--set", "lost", "--dry-run")

@@ -46,6 +46,7 @@ def test_only_common_episodes_count():
     assert not is_clearly_worse(worse, seven)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [8, 16, 32])
 def test_an_equal_one_is_seldom_dropped(count):
     """One look at equal candidates drops about one of a hundred."""

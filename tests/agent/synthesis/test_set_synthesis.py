@@ -183,6 +183,7 @@ def test_the_best_is_selected_when_the_budget_ends(write, on_set, half, out):
     assert report.stopped == run.reason
 
 
+@pytest.mark.slow
 def test_another_run_is_refused(write, on_set):
     write(on_set, code(STILL), iterations=1, patience=0, refine=False)
     with pytest.raises(RunError, match="number of episodes 12 instead of 14"):

@@ -44,6 +44,7 @@ def test_the_built_in_controller(tdac, done, refused, tmp_path):
     assert json.loads(out)["status"] == "selected"
 
 
+@pytest.mark.slow
 def test_a_program_as_a_model(tdac, rejected, tmp_path):
     """It gets the printed prompt; a controller that never moves is not selected."""
     few = write_set(tmp_path / "few.yaml")

@@ -41,6 +41,7 @@ def halted(folder):
 # On a task and on a task set alike.
 
 
+@pytest.mark.slow
 def test_the_same_code_is_not_tested_again(write, ground, out):
     """Neither in an edit nor in a later iteration; the model is told."""
     # j=1 is unedited, k=2 begins with k=1's code, and its edit changes nothing.
@@ -82,6 +83,7 @@ def test_a_broken_run_goes_on_where_it_was(write, ground, out):
     assert (model.asked(), again.status) == ([], run.status)
 
 
+@pytest.mark.slow
 def test_an_interrupt_leaves_a_readable_run(write, ground, out):
     """Ctrl-C in the middle of a call; another run is then refused in its folder."""
     with pytest.raises(KeyboardInterrupt):
@@ -173,7 +175,7 @@ def check_folder(folder, source):
     assert "test_end_to_end.py::test_progress" in rules[0]["evidence"]
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "reply",
     [

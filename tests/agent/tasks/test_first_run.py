@@ -37,6 +37,7 @@ def name_of(compiled):
     return f"{function.__module__.removeprefix('tdac_envs.')}.{function.__name__}"
 
 
+@pytest.mark.slow
 def test_a_map_without_movers_needs_few_kernels():
     """Each further one would be compiled before the first run of all."""
     script = (

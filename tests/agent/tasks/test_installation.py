@@ -77,7 +77,7 @@ def spoiled_by(kind, file):
         file.chmod(0o644 if kind == "for others to read" else 0o600)
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", ["not a folder", "a link", "a pipe", "too short", "for others to read"]
 )
@@ -94,7 +94,7 @@ def test_no_place_for_a_secret_is_said(kind, tmp_path):
     assert sorted(tmp_path.rglob("*")) == before
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("shown", exposure().packages + exposure().system[:1])
 def test_a_secret_is_kept_from_the_sandbox(shown):
     """A folder that controllers can read is no place for it: said, not made."""
@@ -146,6 +146,7 @@ def test_another_installation_has_other_starts(good, tmp_path):
     assert said(python(tmp_path / "two", script, good, first.split()[0]))[0] == first
 
 
+@pytest.mark.slow
 def test_disturbed_episodes_begin_where_nobody_can_know(small_task, good_source, warm):
     """The seed of the first one is that of the controller, unless it is given."""
     report = verify_episodes(good_source, small_task, 1, judge=warm)
@@ -155,6 +156,7 @@ def test_disturbed_episodes_begin_where_nobody_can_know(small_task, good_source,
     assert given.provenance.first == 0
 
 
+@pytest.mark.slow
 def test_a_run_tells_the_seeds_and_not_the_secret(small_task, tmp_path, warm):
     """Each candidate has its own, in run.json and in its report."""
     run = synthesize(small_task, out=tmp_path / "run", judge=warm)

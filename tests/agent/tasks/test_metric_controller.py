@@ -67,7 +67,7 @@ def files(request, tmp_path):
     return tmp_path, units
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 def test_one_controller_drives_the_same_in_either_frame(files, warm):
     folder, _ = files
     driven = []

@@ -9,6 +9,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "steps"), [(5, 12), (5, 1), (1, 12)])
 def test_its_memory_is_that_of_sb3_contrib(count, steps):
     """Outputs, states and gradients, if some sequences begin with an episode."""

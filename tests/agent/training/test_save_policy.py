@@ -60,6 +60,7 @@ def driven(model, make, worlds):
     return found
 
 
+@pytest.mark.slow
 def test_statistics_and_stacked_frames_go_with_it(level, tmp_path, warm):
     """The judge drives as SB3 does, to the step."""
     from stable_baselines3.common.vec_env import (
@@ -111,6 +112,7 @@ def test_a_policy_of_single_environments(level, tmp_path, warm):
     assert found.rows[0].episodes == 2
 
 
+@pytest.mark.slow
 def test_noise_is_the_same_again(level, tmp_path, warm):
     """It is drawn from the world's number; without it, the drive is another."""
     model = learned(batch(level))
@@ -126,6 +128,7 @@ def test_noise_is_the_same_again(level, tmp_path, warm):
     assert first == again != likely
 
 
+@pytest.mark.slow
 def test_what_cannot_be_recorded_is_refused(level, tmp_path):
     """In one line that says what to do; nothing is written."""
     from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
@@ -241,6 +244,7 @@ def policy(obs):
 """
 
 
+@pytest.mark.slow
 def test_another_trainers_policy_has_its_weights_beside_it(level, tmp_path, warm):
     """They are in the sandbox as weights.npz; the table calls it learned."""
     file = tmp_path / "mine.py"
@@ -281,6 +285,7 @@ def test_odd_weights_are_refused(tmp_path, odd):
         entrant_of(str(controller))
 
 
+@pytest.mark.slow
 def test_what_was_hashed_is_what_drives(level, tmp_path):
     """Files of a controller that change after it was named change nothing."""
     file = tmp_path / "mine.py"

@@ -159,6 +159,7 @@ class Evil:
         return os.system, (f"touch {self.canary}",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["checkpoint.zip", "replay.pkl"])
 def test_a_foreign_checkpoint_is_not_loaded(tmp_path, small, config, name, tdac):
     """It may run anything: one line, unless it is trusted; then the attack works."""

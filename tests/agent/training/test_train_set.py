@@ -217,6 +217,7 @@ def test_hyperparameters_do_not_choose_the_worlds(few, config):
         make_set_plan(few(), config=config(env_kwargs={"privileged": True}))
 
 
+@pytest.mark.slow
 def test_the_commands_in_turn(tdac, rejected, done, tmp_path, few, config):
     """train, runs, evaluate: what each prints leads to the next."""
     level = few()
@@ -236,7 +237,7 @@ def test_the_commands_in_turn(tdac, rejected, done, tmp_path, few, config):
     assert {row["knows"] for row in rows} == {"sensors"}
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("uses", "first", "knows"),
     [("memory", "seen-map", "+ memory"), ("planner", "waypoints", "+ planner")],

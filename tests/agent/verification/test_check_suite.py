@@ -156,6 +156,7 @@ def test_the_nominal_start_alone(name, warm):
     assert verify(source, task, paper=True, judge=warm).failures == ()
 
 
+@pytest.mark.slow
 def test_the_impossible_is_found_out(task, suite_of, warm):
     """A test that the reference fails is named, with its message."""
     check = check_suite(task, suite=suite_of(IMPOSSIBLE), repeats=1, bad=(), judge=warm)
@@ -338,6 +339,7 @@ def test_a_paid_run_begins_with_the_proof(tmp_path, good_source, who, warm):
     assert records[2]["suite"] == "map2d"
 
 
+@pytest.mark.slow
 def test_what_costs_nothing_needs_no_proof(tmp_path, warm):
     """A run of the builtin learner loses no time."""
     task = load_task(write_small_task(tmp_path / "task", profile="policy"))

@@ -202,6 +202,7 @@ def test_a_sequential_test_sees_the_seeds_in_order(
     assert not report.passed
 
 
+@pytest.mark.slow
 def test_a_good_controller_is_accepted(small_task, good_source, warm):
     """As soon as its successes suffice."""
     report = verify_episodes(

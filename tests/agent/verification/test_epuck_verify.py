@@ -137,6 +137,7 @@ def test_a_policy_drives_the_environment(crates, controller):
     assert observation["pose"][0] > -0.6
 
 
+@pytest.mark.slow
 def test_a_run_is_self_contained(crates, tmp_path, warm):
     """A synthesis leaves the world, its original, the picture and a task that loads."""
     run = synthesize(crates, out=tmp_path / "run", iterations=2, judge=warm)
@@ -178,6 +179,7 @@ def test_command_line_lists_what_is_left_out(refused, done, controller, tmp_path
     assert left_out == ["LegoTallWall 'north' at (0.1, 3)"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -69,6 +69,7 @@ def suite_of(folder, text):
     return folder
 
 
+@pytest.mark.slow
 def test_each_fixture_is_there(few, suite, warm, tmp_path):
     """They see the first public world; tests of jittered starts are left out."""
     source = KNOWN.read_bytes()

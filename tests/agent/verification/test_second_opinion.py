@@ -41,6 +41,7 @@ def test_an_e_puck_drives_again_from_the_same_starts(crates, crates_source, warm
     assert {each.gap for each in opinion.episodes} != set(gaps.values())
 
 
+@pytest.mark.slow
 def test_a_map_without_metres_is_scaled_and_says_so(good, done):
     """The nominal episode alone, with `--paper`; the line follows the verdict."""
     words = "--paper", "--physics", "mujoco", "--require-physics", "--out", "out"
@@ -66,6 +67,7 @@ def test_what_does_not_arrive_here_is_not_driven_again(crates, warm):
     assert "no episode reached the goal" in report.failures[-1].message
 
 
+@pytest.mark.slow
 def test_without_it_a_report_says_nothing(good, done):
     said = done("verify", good / "controller.py", "--task", good, "--paper", "--json")
     assert json.loads(said)["second_opinion"] is None
@@ -140,6 +142,7 @@ def test_a_run_is_refused_before_the_model_is_asked(tmp_path):
     assert model.requests == []
 
 
+@pytest.mark.slow
 def test_an_episode_is_played_in_three_dimensions(done, good):
     said = done("play", good, "--view", "3d", "--video", "a.gif", "--speed", "50")
     assert "wrote a.gif" in said

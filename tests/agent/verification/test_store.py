@@ -54,7 +54,7 @@ def succeeded(line):
     return json.dumps({**json.loads(line), "outcome": "reached", "collisions": 0})
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", ["task", "set"], indirect=True)
 def test_edited_rows_are_driven_again(problem, tmp_path, warm):
     """Rows with a mark are not driven again; edited, added or copied ones are."""
@@ -69,6 +69,7 @@ def test_edited_rows_are_driven_again(problem, tmp_path, warm):
     assert not (out / UNFINISHED).exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", ["set"], indirect=True)
 def test_rows_with_a_mark_are_used(problem, tmp_path, warm):
     """They are the first that the next call counts."""

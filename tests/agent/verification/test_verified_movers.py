@@ -16,6 +16,7 @@ def moving(tmp_path_factory):
     return load_task(write_small_task(folder, movers="bounce:3", horizon=100))
 
 
+@pytest.mark.slow
 def test_a_verification_draws_movers_from_its_seed(moving, warm, tmp_path):
     """The same seed gives the same movers, which the trajectory records."""
     kept = []

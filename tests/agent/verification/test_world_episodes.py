@@ -262,6 +262,7 @@ def test_hidden_worlds_are_told_in_sums_alone(warm, set_yaml, tmp_path):
     assert {each["text"] for each in figures} == {None}
 
 
+@pytest.mark.slow
 def test_a_hidden_evaluation_is_driven_once(warm, set_yaml, tmp_path):
     """The same file, set, salt and number are answered from the ledger."""
     salt, driven = tmp_path / "secret.salt", []
@@ -290,6 +291,7 @@ def test_a_hidden_evaluation_is_driven_once(warm, set_yaml, tmp_path):
     assert (other.hidden.number, other.hidden.count) == (1, 1)
 
 
+@pytest.mark.slow
 def test_the_ledger_is_written_before_hidden_worlds_are_driven(
     warm, set_yaml, tmp_path
 ):
@@ -347,6 +349,7 @@ def policy(obs):
     assert report.episodes[0].outcome == "out of time"
 
 
+@pytest.mark.slow
 def test_an_import_may_not_take_long(warm, set_yaml):
     source = "x = sum(i * i for i in range(8_000_000))\n" + STILL
     tasks = set_yaml(cpu={"start": 0.15, "step": 0.02, "bank": 1.0})
@@ -480,6 +483,7 @@ def test_the_command_tells_a_refused_file(tdac, tmp_path):
     assert last == "not verified"
 
 
+@pytest.mark.slow
 def test_one_flag_for_episodes_and_worlds(done, refused, level, tmp_path):
     """The words for a task and for a set are the same; a set is not disturbed more."""
     (tmp_path / "still.py").write_text(STILL)
@@ -506,6 +510,7 @@ def test_the_command_counts_hidden_evaluations(tdac, done, tmp_path, set_yaml):
     assert again.rstrip().endswith("nothing was driven anew")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -101,6 +101,7 @@ def test_bundled_world(tdac):
     assert run["world"] == "arena.wbt"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("speed", "frames", "told"),
     [
@@ -157,7 +158,7 @@ def test_without_a_sandbox(tdac, there, monkeypatch):
     assert err.startswith("infrastructure fault: the sandbox failed: bubblewrap")
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("tier", [tier.name for tier in TIERS])
 def test_every_sandbox(tdac, there, tier):
     """A run is the same in each tier that works here."""

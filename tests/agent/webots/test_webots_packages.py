@@ -6,6 +6,7 @@ from worlds_for_controllers import OPEN
 STEP = "from controller import Robot\nRobot().step(32)\n"
 
 
+@pytest.mark.slow
 def test_installed_packages_can_be_imported(drive):
     """Those of tdac's environment, without a screen: plots are drawn, windows not."""
     report = drive(

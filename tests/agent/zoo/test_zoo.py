@@ -65,7 +65,7 @@ def test_tapes_pass_where_the_starts_are_known():
 FEW_CASES = sorted((c for c in CASES if c.name in ALWAYS), key=lambda case: case.good)
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("case", FEW_CASES, ids=str)
 def test_a_few_on_the_best_tier(case, check):
     """What is tried in each run of the tests."""
@@ -115,7 +115,7 @@ def test_a_hostile_file_is_refused_in_one_line(offer, tdac, tmp_path, alarm):
     assert sorted(here.rglob("*")) == before
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "offer", [offer for offer in OFFERS if str(offer) in FEW], ids=str
 )

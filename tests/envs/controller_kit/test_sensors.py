@@ -130,6 +130,7 @@ def is_through_a_corner(occ, x, y, angle, range_max, values):
 DIAGONAL = np.eye(3, 4, dtype=bool)[::-1], 1.5, 1.5, -math.pi / 8, 9, 90.0, 17.5
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(scenes())
 @example(DIAGONAL)

@@ -63,6 +63,7 @@ def test_what_runs_counts(name):
     assert code_of(SOURCE.replace(old, new)) != code_of(SOURCE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("part", sorted({part for parts in ALL for part in parts}))
 def test_only_docstrings_are_left_out_of_our_code(part):
     """The rest of a file has the same syntax tree as the whole of it.

@@ -114,6 +114,7 @@ def test_what_ffmpeg_says_is_passed_on(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["TDAC-Map2D-v0", "TDAC-EPuck-v0"])
 def test_gymnasium_records_films(tmp_path, name):
     """With the extra `video`, a whole episode; each frame has the robot elsewhere."""

@@ -75,6 +75,7 @@ def test_it_does_what_single_environments_do(case, mode):
     assert ends >= 2
 
 
+@pytest.mark.slow
 @every_env
 @pytest.mark.parametrize("threads", [2, 3])
 def test_threads_change_nothing(name, threads):

@@ -172,12 +172,14 @@ def check_episode(env, seed, at_end, in_step):
         assert found is None or found.gap == pytest.approx(close, abs=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_the_gap_to_walls_is_that_of_dense_samples(seed):
     """On random maps, along the arcs, to 1e-6 px; 0 with a contact."""
     check_episode(map_env(seed), seed, end_oracle, map_oracle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_the_gap_to_movers_is_that_of_dense_samples(seed):
     """The movers' motion within a step counts, with all their turns."""
@@ -186,6 +188,7 @@ def test_the_gap_to_movers_is_that_of_dense_samples(seed):
     check_episode(env, seed, end_oracle, map_oracle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["maze", "crates"])
 @pytest.mark.parametrize("seed", range(2))
 def test_the_gap_in_worlds_is_that_of_dense_samples(world, seed):

@@ -43,7 +43,7 @@ def poses(ground, count):
     )
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [60, 300])
 @every_world
 def test_they_change_nothing(name, place, count):

@@ -372,6 +372,7 @@ def test_a_missing_file_of_barn(tmp_path):
         load_set(path)
 
 
+@pytest.mark.slow
 def test_the_shipped_worlds_of_barn():
     """50 worlds with a log are for tests; a world has ten runs with their own noise."""
     tasks = load_set("barn")

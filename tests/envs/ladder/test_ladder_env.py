@@ -61,7 +61,7 @@ def test_levels():
     assert set(set_names()) == set(KEYS)
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("level", LEVELS)
 def test_gymnasium_finds_nothing_wrong(level):
     with warnings.catch_warnings():

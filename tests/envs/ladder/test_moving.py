@@ -184,6 +184,7 @@ class TestPlanner:
 class TestDriver:
     """The privileged driver by ORCA, which admits worlds with a crowd."""
 
+    @pytest.mark.slow
     def test_it_arrives_in_each_world_of_the_level(self):
         tasks = load_set("crowd")
         for index in range(4):

@@ -39,6 +39,7 @@ def digest(world):
     return hashlib.sha256(write_world(world.world).encode()).hexdigest()
 
 
+@pytest.mark.slow
 def test_golden_worlds():
     """The first three worlds, and the first fifty as one hash of hashes."""
     found = [digest(make_plates(SPEC, key(index))) for index in range(50)]

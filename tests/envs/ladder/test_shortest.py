@@ -87,7 +87,7 @@ def are_free(cells, begin, ends, body):
     return free
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_the_shortest_path_is_that_of_a_visibility_graph(seed):
     """It is neither longer nor shorter; so nothing drives faster than OT."""
@@ -152,7 +152,7 @@ def test_the_bottleneck_of_a_corridor_is_half_its_width(width):
     assert found == pytest.approx(width / 2)
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_the_bottleneck_is_that_of_a_fine_lattice(seed):
     """Less than half a px below; 0 where nothing gets through."""

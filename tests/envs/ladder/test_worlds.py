@@ -101,6 +101,7 @@ print(*(digest(make_world(spec_of(n), key(i))) for i in (2, 0, 1) for n in NAMES
 """
 
 
+@pytest.mark.slow
 def test_worlds_are_equal_in_another_order_and_another_process():
     """No world depends on those made before it."""
     here = [

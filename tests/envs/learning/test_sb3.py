@@ -124,6 +124,7 @@ def test_robots_are_no_objects_of_their_own():
         envs.env_method("close")
 
 
+@pytest.mark.slow
 def test_importing_the_environments_imports_neither_sb3_nor_torch():
     script = (
         "import sys, tdac_envs, tdac_envs.map2d.vector\n"

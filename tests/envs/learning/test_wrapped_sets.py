@@ -61,7 +61,7 @@ def test_the_default_is_sensors_alone(level):
     batch.close()
 
 
-@pytest.mark.slow_after(10)
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
 @pytest.mark.parametrize(
     ("values", "names"),

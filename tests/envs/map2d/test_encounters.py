@@ -126,6 +126,7 @@ class Pair:
         return True
 
 
+@pytest.mark.slow
 def test_the_first_contact_is_that_of_dense_samples():
     """In place to 1e-6 px; pairs that miss each other by less may go either way."""
     found = [Pair(seed).check() for seed in range(100)]

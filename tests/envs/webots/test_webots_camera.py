@@ -117,7 +117,7 @@ class TestProjection:
         assert len(np.unique(red[seen & ~even])) == 1
         assert abs(int(red[seen & even][0]) - int(red[seen & ~even][0])) > 50
 
-    @pytest.mark.slow_after(1)
+    @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(4))
     def test_any_scene_as_marched_along_its_rays(self, seed):
         """Every tenth pixel shows what a point moving along its ray meets first."""

@@ -275,6 +275,7 @@ def test_the_coordinate_system_must_be_known():
         read_world(text(info='coordinateSystem "NED"'), "w.wbt")
 
 
+@pytest.mark.slow
 def test_nesting_and_size_are_bounded():
     """No file exhausts the stack or the memory, USE or not."""
     deep = "Group { children [ " * (DEEPEST - 1)

@@ -146,6 +146,7 @@ def test_what_was_read_is_written_and_read_again(source):
         assert f"# not modelled: {node.kind}" in write_world(world)
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
 @given(rng=st.randoms(use_true_random=False))
 def test_odd_worlds_are_written_too(rng):

@@ -94,7 +94,7 @@ def test_the_body_looks_where_it_went():
     assert np.abs(beside[ahead < -2]).max() > np.abs(beside[ahead > 4]).max()
 
 
-@pytest.mark.slow_after(9)
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(0, len(PLANTS), 3))
 def test_any_failure_can_be_drawn(number):
     """Caption in ASCII, picture as large as map and column, equal when drawn again."""
@@ -111,6 +111,7 @@ def test_any_failure_can_be_drawn(number):
     assert PLANTS[number].cause in event.title
 
 
+@pytest.mark.slow
 def test_a_failed_verification_leaves_pictures(small_task, warm, good_source, tmp_path):
     """One for each failed episode; a later, passing one removes them."""
     report = verify(AHEAD, small_task, profile="policy", judge=warm, out=tmp_path)
@@ -125,6 +126,7 @@ def test_a_failed_verification_leaves_pictures(small_task, warm, good_source, tm
     assert endings == {".npz"}
 
 
+@pytest.mark.slow
 def test_held_out_pictures_are_for_people_only(small_task, warm, tmp_path):
     """They show the outcome and the trail; nothing of them is in what a model gets."""
     source = recorded(small_task)
@@ -166,6 +168,7 @@ def recorded(task):
     )
 
 
+@pytest.mark.slow
 def test_verify_out(rejected, tmp_path):
     """The command says where the report and each picture are."""
     (tmp_path / "controller.py").write_text(AHEAD)

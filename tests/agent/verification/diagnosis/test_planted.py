@@ -36,7 +36,7 @@ def test_nine_in_ten_are_named_right():
     assert sum(named) >= 0.9 * len(named)
 
 
-@pytest.mark.slow_after(12)
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(len(PLANTS)), ids=lambda n: PLANTS[n].fault)
 def test_facts(number):
     """Cause, side, place, step, corner and words are those that were planted."""
@@ -145,7 +145,7 @@ CONTROLLERS = {
 }
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_controllers_that_fail(name, small_task, warm, quick):
     """What a controller did wrong is told with its step; bounded, nothing of ours."""

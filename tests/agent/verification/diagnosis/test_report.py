@@ -20,6 +20,7 @@ def report(small_task, warm):
     return verify(STILL, small_task, profile="policy", paper=True, judge=warm)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=100)
 @given(st.data())
 def test_a_damaged_report(report, data):

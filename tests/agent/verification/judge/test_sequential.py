@@ -69,7 +69,7 @@ def test_simulated_controllers_fare_as_said(accept_at, margin):
         assert abs(used.mean() - found.mean_episodes) <= 4.0 * error + 1e-9
 
 
-@pytest.mark.slow_after(6)
+@pytest.mark.slow
 @pytest.mark.parametrize("margin", [0.02, 0.05, 0.2])
 @pytest.mark.parametrize("accept_at", [0.5, 0.9, 0.95, 0.99])
 def test_errors_keep_to_walds_bounds(accept_at, margin):

@@ -111,7 +111,7 @@ def watched(name, folder, child_pool, index):
     return around, set(map(same, texts)), seen, same, process
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", set_names())
 def test_two_worlds_differ_by_map_and_observation_alone(name, tmp_path, child_pool):
     """No text, number, time, variable or path in the process tells a world."""

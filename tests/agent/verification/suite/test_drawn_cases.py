@@ -31,6 +31,7 @@ def test_a_map_without_room_has_no_walks():
     assert list(WorldOracle().walks(np.zeros((3, 3), np.bool_), 5, random)) == []
 
 
+@pytest.mark.slow
 def test_what_is_drawn_follows_from_the_seed():
     """The same seed draws the same walks and copy of a world, another one others."""
     oracle, occ = WorldOracle(), np.zeros((50, 60), np.bool_)

@@ -206,7 +206,7 @@ def test_the_good_one_passes(crates, crates_source, warm):
         assert report.provenance.unit == "m"
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_one_fails_where_it_is_wrong(checked, crates_source, name):
     """Exactly the unit tests that are about it fail."""
@@ -216,7 +216,7 @@ def test_a_wrong_one_fails_where_it_is_wrong(checked, crates_source, name):
     assert failed(report, "static") == set()
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     ["parse_world", "build_grid", "astar", "compute_wheel_speeds", "run_episode"],

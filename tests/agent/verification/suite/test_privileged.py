@@ -37,6 +37,7 @@ def assert_solved(rollout):
     assert rollout.collisions == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8))
 def test_the_reference_solves_random_grids(seed, tmp_path, monkeypatch):
     """From float32 observations, with little or no room to spare, from any seed."""

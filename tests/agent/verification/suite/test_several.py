@@ -20,6 +20,7 @@ def test_what_fails_is_collected():
         raise KeyError
 
 
+@pytest.mark.slow
 def test_feedback_names_every_wrong_entry(small_task, warm):
     """Of `run_episode`: with where to read what is wanted; of constants: each."""
     robot = small_task.params.robot

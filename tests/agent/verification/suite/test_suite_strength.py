@@ -236,7 +236,7 @@ def test_a_wrong_controller_fails_its_test(failed, good_source, name):
     assert failed(spoiled(good_source, old, new)) == set(expected)
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BROAD)
 def test_a_broadly_wrong_controller_fails(failed, good_source, name):
     """Its own test fails, whatever else does."""
@@ -244,6 +244,7 @@ def test_a_broadly_wrong_controller_fails(failed, good_source, name):
     assert failed(spoiled(good_source, old, new)) >= set(expected)
 
 
+@pytest.mark.slow
 def test_each_unstable_pattern_fails_its_test(failed, good_source):
     """Import in a function, SciPy, eval, writing, sleeping, swallowing, randomness."""
     source = spoiled(good_source, "import heapq\n", "import heapq\nimport random\n")
@@ -251,6 +252,7 @@ def test_each_unstable_pattern_fails_its_test(failed, good_source):
     assert failed(source + PATTERNS) == {*expected, STATIC + "test_imports"}
 
 
+@pytest.mark.slow
 def test_words_in_strings_and_comments_are_harmless(failed, good_source):
     """What merely mentions a forbidden pattern passes."""
     assert failed(good_source + WORDS) == set()

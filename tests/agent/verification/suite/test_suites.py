@@ -48,6 +48,7 @@ def test_the_fixtures_warn_of_nothing(check):
     assert outcome(report) == "passed"
 
 
+@pytest.mark.slow
 def test_a_users_test_takes_part(check):
     """It gets the documented fixtures, is expected, and is named as the user's."""
     text = '''
@@ -75,7 +76,7 @@ def test_fails(rollout):
     assert report.provenance.suite == "map2d + mine"
 
 
-@pytest.mark.slow_after(3)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "found"),
     [
@@ -102,7 +103,7 @@ def test_an_unexpected_pass_is_no_pass(check):
     assert not check(text).passed
 
 
-@pytest.mark.slow_after(2)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
