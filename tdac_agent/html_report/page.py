@@ -27,6 +27,7 @@ from tdac_agent.html_report.section import (
     grouped_failures,
     section_of,
 )
+from tdac_agent.html_report.status_style import STATUS_STYLE
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.history import RunHistory, gather_run, learner_named, run_folders
 from tdac_agent.storage.hashes import sha256_of
@@ -110,7 +111,7 @@ def rendered(template: str, scenes: Mapping[str, TaskPicture], **values: Any) ->
     script = _text("page.js")
     html = _environment().get_template(template).render(
         scenes={key: _for_player(scene) for key, scene in scenes.items()},
-        style=Markup(_text("page.css")),
+        style=Markup(STATUS_STYLE + _text("page.css")),
         script=Markup(script),
         script_hash=own_script(),
         **values,

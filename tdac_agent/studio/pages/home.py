@@ -62,7 +62,7 @@ def add(place: Path) -> None:
     async def page(
         source: str = FIRST, task: str = "", obstacles: str = "", robot: str = ""
     ) -> None:
-        with framed("New controller"):
+        with framed("New controller", place):
             await StartPage(place).show(source, task, obstacles, robot)
 
 
