@@ -37,6 +37,11 @@ code.command { display: block; background: var(--code); padding: .6em .8em;
 code.command span { display: inline-block; max-width: 100%; }
 .board { width: 100%; border: 1px solid var(--line); border-radius: 6px;
   overflow: hidden; }
+.keys { width: 100%; }
+.keys:focus { outline: none; }
+.keys:focus-visible .board { outline: 3px solid var(--link); outline-offset: 2px; }
+kbd { font: inherit; font-size: .85em; padding: 0 .4em; border-radius: 4px;
+  border: 1px solid var(--edge); background: var(--paper); color: var(--ink); }
 .board img { width: 100%; cursor: crosshair; }
 .choosing { display: grid; gap: 1.5rem; width: 100%; }
 @media (min-width: 1024px) {
