@@ -28,6 +28,7 @@ from tdac_agent.html_report.section import (
     section_of,
 )
 from tdac_agent.html_report.status_style import STATUS_STYLE
+from tdac_agent.html_report.terms import explain_terms
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.history import RunHistory, gather_run, learner_named, run_folders
 from tdac_agent.storage.hashes import sha256_of
@@ -116,7 +117,7 @@ def rendered(template: str, scenes: Mapping[str, TaskPicture], **values: Any) ->
         script_hash=own_script(),
         **values,
     )  # fmt: skip
-    return html.translate(_HIDDEN).encode("utf-8", "replace")
+    return explain_terms(html).translate(_HIDDEN).encode("utf-8", "replace")
 
 
 def _details(

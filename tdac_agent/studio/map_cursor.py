@@ -18,7 +18,7 @@ STEP = {"px": 1.0, "m": 0.01}
 """How far a key moves the cursor, by the unit of places."""
 FAR = 10
 """Steps of a key with Shift."""
-COLOUR = "#d55e00"
+COLOUR = "#b0217a"
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,6 +40,7 @@ code.command span { display: inline-block; max-width: 100%; }
 .keys { width: 100%; }
 .keys:focus { outline: none; }
 .keys:focus-visible .board { outline: 3px solid var(--link); outline-offset: 2px; }
+@media (pointer: coarse) { #map-keys { display: none; } }
 kbd { font: inherit; font-size: .85em; padding: 0 .4em; border-radius: 4px;
   border: 1px solid var(--edge); background: var(--paper); color: var(--ink); }
 .board img { width: 100%; cursor: crosshair; }
@@ -47,7 +48,7 @@ kbd { font: inherit; font-size: .85em; padding: 0 .4em; border-radius: 4px;
 @media (min-width: 1024px) {
   .choosing { grid-template-columns: 26rem minmax(0, 1fr); }
   .beside { position: sticky; top: 4rem; align-self: start;
-    --room: (100vh - 9rem); } /* height for the map */
+    --room: (100vh - 14rem); } /* height for the map */
 }
 @media (max-width: 1023px) {
   .choosing { grid-template-columns: minmax(0, 1fr); }
