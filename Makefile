@@ -14,7 +14,10 @@
 #                     make clients CLIENTS="sb3 skrl"
 #   make results-rl   The trainings of results/ladder/learned: hours, not part of CI;
 #                     after an interruption it goes on.
-#   make docs         The site, in build/site, with its links checked and its notebooks run.
+#   make notebooks    The notebooks, executed and kept with their outputs. Selected ones:
+#                     make notebooks NOTEBOOKS="02 05"
+#   make docs         The site, in build/site, with its links checked. The outputs of its
+#                     notebooks must belong to their code; they are not executed.
 #   make linkcheck    Links to other sites; needs a network.
 #   make lint         Style, types, import rules, circles of imports, long modules, reads of
 #                     files that bypass the safe reader, and long paragraphs of the docs.
@@ -32,7 +35,7 @@ PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: synth test test-all slow slow-sample lint bench portability clients results-rl \
-	docs linkcheck clean
+	notebooks docs linkcheck clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
@@ -62,11 +65,11 @@ results-rl: $(VENV)/.installed
 	$(BIN)/pip install --quiet -e ".[sb3]"
 	$(BIN)/python -m benchmarks.ladder_trainings runs/results-rl --keep results/ladder/learned
 
+notebooks: $(VENV)/.test-installed
+	$(BIN)/python -m tools.notebooks $(NOTEBOOKS)
+
 docs: $(VENV)/.docs-installed
-	@# Sphinx alone runs one notebook after another. It names those that fail here.
-	@mkdir -p build/notebooks
-	$(BIN)/jcache notebook -p build/notebooks add notebooks/*.ipynb >/dev/null
-	-$(BIN)/jcache project -p build/notebooks execute -e local-parallel -t 900 -v WARNING
+	$(BIN)/python -m tools.notebooks --check
 	$(BIN)/sphinx-build -W --keep-going -q -j auto -b html -c docs . build/site
 	@echo "built: build/site/index.html"
 

@@ -33,11 +33,8 @@ exclude_patterns = [".*", "build", "runs", "node_modules"]
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 html_theme, html_title = "furo", "tdac"
 html_extra_path = ["site"]
-# Notebooks are run anew only if they have changed.
-nb_execution_mode = "cache"
-nb_execution_cache_path = "build/notebooks"
-nb_execution_raise_on_error = True
-nb_execution_timeout = 900
+# Notebooks are kept with their outputs: `make notebooks` executes them.
+nb_execution_mode = "off"
 nb_merge_streams = True
 myst_heading_anchors = 4
 nitpicky = True

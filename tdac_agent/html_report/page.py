@@ -27,6 +27,8 @@ from tdac_agent.html_report.section import (
     grouped_failures,
     section_of,
 )
+from tdac_agent.html_report.status_style import STATUS_STYLE
+from tdac_agent.html_report.terms import explain_terms
 from tdac_agent.models.budget import format_usd
 from tdac_agent.runs.history import RunHistory, gather_run, learner_named, run_folders
 from tdac_agent.storage.hashes import sha256_of
@@ -110,12 +112,12 @@ def rendered(template: str, scenes: Mapping[str, TaskPicture], **values: Any) ->
     script = _text("page.js")
     html = _environment().get_template(template).render(
         scenes={key: _for_player(scene) for key, scene in scenes.items()},
-        style=Markup(_text("page.css")),
+        style=Markup(STATUS_STYLE + _text("page.css")),
         script=Markup(script),
         script_hash=own_script(),
         **values,
     )  # fmt: skip
-    return html.translate(_HIDDEN).encode("utf-8", "replace")
+    return explain_terms(html).translate(_HIDDEN).encode("utf-8", "replace")
 
 
 def _details(

@@ -94,6 +94,16 @@ class TaskDraft:
         over, down = place[0] - self.start[0], place[1] - self.start[1]
         return replace(self, heading=round(math.atan2(down, over), 3))
 
+    def turned(self, angle: float) -> TaskDraft:
+        """The draft with another start heading.
+
+        Args:
+            angle: How far it turns, rad, from +x towards +y.
+        """
+        turned = (self.heading or 0.0) + angle
+        wrapped = math.atan2(math.sin(turned), math.cos(turned))
+        return replace(self, heading=round(wrapped, 3))
+
     def task_file(self) -> TaskFile:
         """The same as a task file."""
         start: tuple[float, ...] | None = self.start

@@ -100,7 +100,7 @@ def _application(place: Path) -> fastapi.FastAPI:
     disconnected.add(application, place)
     for page in (bench, compare, home, run, run_list, worlds):
         page.add(place)
-    unknown.add()
+    unknown.add(place)
     ui.run_with(
         application,
         title="tdac studio",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from tdac_envs.drawing.canvas import Image as Picture
-from tdac_envs.grid.grid import BoolGrid, clearance
+from tdac_envs.grid.grid import BoolGrid, FloatGrid, clearance
 from tdac_envs.mapping.bundled import bundled_map, bundled_maps
 from tdac_envs.mapping.image import MapImage
 from tdac_envs.mapping.map_files import load_image
@@ -57,6 +58,8 @@ class SourceView:
         widest: Largest body radius that gets from one place to another, in the unit;
             negative for none. None for worlds, whose robot has one size.
         resolution: Metres per px of a map that gives them.
+        room: Distance from a place to the nearest obstacle, in the unit; 0 inside of
+            one. None for worlds.
         laid_over: The picture with another occupied grid over it: the reading of a
             map may depend on start and goal. None for worlds.
     """
@@ -74,6 +77,7 @@ class SourceView:
     goal: Place | None = None
     radius: float | None = None
     widest: Callable[[Place, Place], float] | None = None
+    room: Callable[[Place], float] | None = None
     laid_over: Callable[[BoolGrid], bytes] | None = None
     resolution: float | None = None
 
@@ -145,7 +149,15 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
 
     def widest(start: Place, goal: Place) -> float:
         ends = [_pixel(grid.cells, each) for each in (start, goal)]
-        return float(widest_radius(clearance(grid.cells), *ends))
+        return float(widest_radius(clear(), *ends))
+
+    @functools.cache
+    def clear() -> FloatGrid:
+        return clearance(grid.cells)
+
+    def room(place: Place) -> float:
+        column, row = _pixel(grid.cells, place)
+        return float(clear()[row, column])
 
     size = f"{params.width} x {params.height} px"
     text = f"{size}: {obstacles_text(params)}; {scale_text(params.resolution)}"
@@ -163,6 +175,7 @@ def _of_map(source: str, polarity: str | None) -> SourceView:
         bundled.goal if bundled else None,
         bundled.robot_radius if bundled else params.robot.radius,
         widest,
+        room,
         laid_over,
         params.resolution,
     )

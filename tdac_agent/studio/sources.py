@@ -20,10 +20,15 @@ def sources_in(place: Path) -> list[str]:
     """Bundled maps and worlds, and files of the studio's folder, as `KIND: NAME`."""
     sources = [f"map: {name}" for name in names_of("map")]
     sources += [f"world: {name}" for name in names_of("world")]
+    return sources + own_sources(place)
+
+
+def own_sources(place: Path) -> list[str]:
+    """Maps and worlds among the files of the studio's folder, as `KIND: PATH`."""
     folders = place, place / "maps", place / FILES
     files = sorted(path for folder in folders for path in folder.glob("*"))
     named = (source_of(place, path) for path in files[:MOST_FILES] if path.is_file())
-    return sources + [source for source in named if source is not None]
+    return [source for source in named if source is not None]
 
 
 def is_source(path: Path) -> bool:

@@ -22,11 +22,13 @@ from tdac_agent.studio.pages.layout import (
     file_frame,
     framed,
     heading,
+    say_empty,
     say_missing,
     shown_first,
     status_badge,
 )
-from tdac_agent.studio.pages.worlds import policies_in
+from tdac_agent.studio.pages.trail import BENCHES, NEW
+from tdac_agent.studio.pages.worlds import NO_POLICIES, policies_in
 from tdac_agent.verification.judge.sequential import MOST_EPISODES
 from tdac_agent.verification.salt import SEALED
 from tdac_agent.verification.store import REPORT_FILE, ROWS_FILE, UNFINISHED
@@ -54,13 +56,14 @@ def add(place: Path) -> None:
 
     @ui.page("/benches")
     async def benches() -> None:
-        with framed("Benches"):
+        with framed("Benches", place):
             BenchForm(place).show()
-            show_benches(place, "Benches of this folder")
+            if not show_benches(place, "Benches of this folder"):
+                say_empty("No bench in this folder yet. Start the one above.")
 
     @ui.page("/bench")
     async def bench(at: str = "") -> None:
-        with framed(at or "Bench", headed=False):
+        with framed(at or "Bench", place, under=[BENCHES], headed=False):
             folder = within(place, at)
             made = folder is not None and (folder / PAGE).is_file()
             if folder is None or not at or not (made or bench_job(place, at)):
@@ -86,7 +89,10 @@ class BenchForm:
             "Controllers, classical planners and learned policies drive on the same "
             "worlds, and are compared."
         ).classes("note")
-        options = [BUILTIN, *planner_names(), PRIVILEGED, *policies_in(self._place)]
+        own = policies_in(self._place)
+        if not own:
+            say_empty(NO_POLICIES, link=NEW)
+        options = [BUILTIN, *planner_names(), PRIVILEGED, *own]
         with ui.row().classes("w-full items-end gap-4"):
             self._entrants = _choice(options, [BUILTIN, "follow-the-gap"], "entrants")
             self._sets = _choice(list(shipped_names()), ["unknown"], "task sets")
@@ -230,19 +236,19 @@ def _choice(options: list[str], value: list[str], label: str) -> ui.select:
     return chosen.props("use-chips").classes("w-full sm:w-80")
 
 
-def show_benches(place: Path, title: str) -> None:
-    """Links to the benches of the folder, if there are any."""
+def show_benches(place: Path, title: str) -> bool:
+    """Links to the benches of the folder; returns whether there are any."""
     begun = {job.file.about: job for job in reversed(jobs(place)) if bench_words(job)}
     names = {*folders_with(place, RESULTS), *begun}
-    if not names:
-        return
-    heading(title)
+    if names:
+        heading(title)
     for name in sorted(names):
         job = begun.get(name)
         with ui.row().classes("items-center gap-3"):
             ui.link(name, address_of("/bench", name))
             status_badge(status_of(place / name, job))
             ui.label(bench_words(job) if job else "").classes("note text-sm")
+    return bool(names)
 
 
 def bench_words(job: StudioJob) -> str:

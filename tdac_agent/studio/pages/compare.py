@@ -27,6 +27,7 @@ from tdac_agent.studio.pages.layout import (
     say_missing,
     shown_first,
 )
+from tdac_agent.studio.pages.trail import RUNS
 
 MOST_LINES = 3000
 """Lines of a diff that are shown."""
@@ -37,7 +38,7 @@ def add(place: Path) -> None:
 
     @ui.page("/compare")
     async def compare(one: str = "", other: str = "") -> None:
-        with framed("Two runs", headed=False):
+        with framed("Two runs", place, under=[RUNS], headed=False):
             runs = {}
             for at in (one, other):
                 folder = within(place, at)

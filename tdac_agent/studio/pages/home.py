@@ -62,7 +62,7 @@ def add(place: Path) -> None:
     async def page(
         source: str = FIRST, task: str = "", obstacles: str = "", robot: str = ""
     ) -> None:
-        with framed("New controller"):
+        with framed("New controller", place):
             await StartPage(place).show(source, task, obstacles, robot)
 
 
@@ -91,7 +91,7 @@ class StartPage:
                 )
                 self._build_start()
             with ui.column().classes("beside min-w-0 gap-2"):
-                self._map = ClickableMap(self._clicked)
+                self._map = ClickableMap(self._clicked, self._turned)
         await shown_first()
         if self._turn == 0:  # nobody was faster than the page
             await self._open(source)
@@ -130,6 +130,7 @@ class StartPage:
         self._view, self._draft = view, TaskDraft.of(view, name, kept)
         self._map.show(view.png)
         self._map.begin(f"{kind} {name}", view.reading, view.notes)
+        self._map.take(view, self._draft.start)
         self._source.show_polarity(view.kind == "map")
         self._form.show(self._draft, view)
         await self._check()
@@ -154,6 +155,7 @@ class StartPage:
             self._source.show_polarity(True)
         self._map.mark("")
         self._map.begin("", "", ())
+        self._map.take(None)
         self._form.tell(text, good=False)
         self._refresh_command()
 
@@ -171,6 +173,14 @@ class StartPage:
             await self._change(self._draft.facing(place))
         else:
             await self._change(self._draft.with_goal(nearest, unit))
+
+    async def _turned(self, angle: float) -> str:
+        """Turns the start heading, clockwise on the picture, rad."""
+        draft, view = self._draft, self._view
+        if draft is None or view is None or draft.start is None:
+            return "Place the start first."
+        await self._change(draft.turned(math.copysign(1.0, view.scale[1]) * angle))
+        return f"The heading is {math.degrees(self._draft.heading or 0.0):.0f}°."
 
     async def _change(self, draft: TaskDraft) -> None:
         """Shows another draft, and checks it."""

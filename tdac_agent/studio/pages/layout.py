@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from html import escape
 from pathlib import Path
@@ -16,6 +16,7 @@ from tdac_agent.studio.jobs import stop_job
 from tdac_agent.studio.pages.frames import FITTED
 from tdac_agent.studio.pages.named_parts import NAMED
 from tdac_agent.studio.pages.style import PRIMARY, STYLE
+from tdac_agent.studio.pages.trail import Step, trail_html
 
 PATIENCE = 120.0
 """Seconds that a browser may need to show a page."""
@@ -28,11 +29,15 @@ LINKS = {
 
 
 @contextmanager
-def framed(title: str, *, headed: bool = True) -> Generator[None]:
-    """The frame of a page, with links to the others.
+def framed(
+    title: str, place: Path, *, under: Sequence[Step] = (), headed: bool = True
+) -> Generator[None]:
+    """The frame of a page: links to the others, and the way to this one.
 
     Args:
         title: What the page is about.
+        place: Folder of the studio.
+        under: The pages above it, from one of `LINKS` on.
         headed: Whether the title stands as a heading; otherwise the page has its own.
     """
     ui.add_css(STYLE)
@@ -46,7 +51,11 @@ def framed(title: str, *, headed: bool = True) -> Generator[None]:
             link = ui.link(name, address)
             if name == title:
                 link.props("aria-current=page")
+            elif under and name == under[0].name:
+                link.props("aria-current=true")
     with ui.column().classes("w-full gap-3 px-1"):
+        trail = ui.html(trail_html(title, place, under), sanitize=False, tag="nav")
+        trail.classes("trail").props("aria-label='Where you are'")
         if headed:
             heading(title, 1)
         yield
@@ -69,6 +78,23 @@ def say_missing(kind: str, at: str, page: str) -> None:
     with ui.row().classes("items-baseline gap-1"):
         ui.label("It may have been moved or deleted.")
         ui.link(f"To all {kind}s", LINKS[page])
+
+
+def say_empty(text: str, *, link: Step | None = None, command: str = "") -> None:
+    """Says in a sentence that there is nothing to show yet, and what to do next.
+
+    Args:
+        text: The sentence.
+        link: Page on which to do it.
+        command: Command that does it, too.
+    """
+    with ui.column().classes("empty"):
+        with ui.row().classes("items-baseline gap-2"):
+            ui.label(text)
+            if link is not None:
+                ui.link(link.name, link.address)
+        if command:
+            ShownCommand().show(command)
 
 
 async def shown_first() -> None:

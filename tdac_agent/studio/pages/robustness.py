@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from functools import partial
 from pathlib import Path
 
@@ -10,13 +11,18 @@ from nicegui import ui
 from tdac_agent.studio.folder import STATE, as_word, made_within
 from tdac_agent.studio.jobs import job_of, start, stop_job
 from tdac_agent.studio.pages.films import show_film
-from tdac_agent.studio.pages.layout import heading
+from tdac_agent.studio.pages.layout import heading, say_empty
 from tdac_agent.studio.run_status import readable_run
 from tdac_agent.verification.episode_report import EpisodeReport
 from tdac_envs.core.intake import RECORD_BYTES, read_file
 
 EPISODES = 200
 SHOWN = 6
+NONE_MEASURED = (
+    "Nothing has been measured yet. Press Measure to drive it with other starts, range "
+    "noise, slip and delay, or type:"
+)
+NO_FAILURE = "No episode failed. To find the smallest deviation with which one does:"
 
 
 class Robustness:
@@ -39,6 +45,8 @@ class Robustness:
                     "Stop", on_click=partial(stop_job, place, self._out)
                 ).props("flat")
                 self._now = ui.label().classes("note")
+            with ui.column().classes("w-full") as self._none:
+                say_empty(NONE_MEASURED, command=shlex.join(["tdac", *self._words()]))
             self._found = ui.column().classes("w-full gap-1")
             self._film = ui.column().classes("w-full")
         self._card.visible = False
@@ -61,6 +69,7 @@ class Robustness:
             report = EpisodeReport.model_validate_json(text)
         except (OSError, ValueError):
             return
+        self._none.visible = False
         if text != self._seen:
             self._seen = text
             self._show(report)
@@ -77,6 +86,9 @@ class Robustness:
             name = f"episode {(report.closest or first) - first + 1}"
             for line in report.gap_lines(units, name):
                 ui.label(f"{line}.")
+            if report.successes == report.count:
+                search = ["tdac", "falsify", as_word(self._at)]
+                say_empty(NO_FAILURE, command=shlex.join(search))
             with ui.row().classes("items-center gap-2"):
                 ui.label("Failures first, then the slowest; click one to watch it:")
                 for episode in report.worst[:SHOWN]:
@@ -88,9 +100,12 @@ class Robustness:
 
     def _begin(self) -> None:
         made_within(self._place, self._out)
+        start(self._place, [*self._words(), "--out", self._out], self._out)
+
+    def _words(self) -> list[str]:
+        """The words of the command line, without the folder of the results."""
         count = str(int(self._count.value or EPISODES))
-        words = ["verify", as_word(self._at), "--robust", count, "--out", self._out]
-        start(self._place, words, self._out)
+        return ["verify", as_word(self._at), "--robust", count]
 
     def _watch(self, seed: int, name: str) -> None:
         """Draws a video of an episode, and shows it."""

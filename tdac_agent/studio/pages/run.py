@@ -25,6 +25,7 @@ from tdac_agent.studio.pages.layout import (
 )
 from tdac_agent.studio.pages.questions import Questions
 from tdac_agent.studio.pages.robustness import Robustness
+from tdac_agent.studio.pages.trail import above_run
 from tdac_agent.studio.run_status import (
     SELECTED,
     asked_by,
@@ -42,6 +43,9 @@ from tdac_envs.core.errors import TdacError
 ELSEWHERE = "{}: its verdict is only what its files claim."
 NOTHING = "use this machine: its candidates run in the sandbox"
 FIRST = "The first candidate appears here as soon as it has been tested."
+NO_CANDIDATE = (
+    "No candidate has been tested yet. Press Continue, or type the command above."
+)
 LETTERS = "k: iteration; j: number of the repair, 0 for the first version."
 SECONDS = 1.0
 """Between two looks at the folder."""
@@ -52,7 +56,7 @@ def add(place: Path) -> None:
 
     @ui.page("/run")
     async def page(at: str = "") -> None:
-        with framed(at or "Run", headed=False):
+        with framed(at or "Run", place, under=above_run(place, at), headed=False):
             folder = within(place, at)
             known = folder is not None and (folder.is_dir() or job_of(place, at))
             if folder is None or not at or not known:
@@ -234,6 +238,8 @@ def _remarks(state: RunState, job: StudioJob | None) -> Iterator[tuple[str, bool
     failed = initial_controller_text(state.run) if state.run else ""
     if failed:
         yield failed, True
+    if state.run and not state.run.attempts and not state.running:
+        yield NO_CANDIDATE, False
     if state.status == "selected":
         yield SELECTED, False
     elif state.run and not state.run.on_set and not state.running:

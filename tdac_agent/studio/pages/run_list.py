@@ -7,7 +7,6 @@ import time
 from datetime import datetime
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 from nicegui import events, ui
 
@@ -23,37 +22,23 @@ from tdac_agent.studio.pages.layout import (
     framed,
     heading,
     report_frame,
+    say_empty,
     say_missing,
     shown_first,
 )
+from tdac_agent.studio.pages.run_tables import NONE_BEGUN, TABLE_STYLE, RunTables
+from tdac_agent.studio.pages.trail import NEW, RUNS
+from tdac_agent.studio.run_groups import RunGroup, campaign_command, grouped
 from tdac_envs.core.intake import read_zip
 
 NONE = "–"
+NO_RUNS = "No run in this folder yet. Let a first controller be written:"
 SECONDS = 5.0
 """Between two looks at the folder."""
 MOST_ROWS = 2_000
 MOST_UPLOAD = 256 << 20
 MOST_UNPACKED = 1 << 30
 _known: dict[Path, tuple[tuple[int, ...], dict[str, Any]]] = {}
-COLUMNS = [
-    {"name": name, "label": name, "field": name, "align": "left", "sortable": True}
-    for name in ("run", "task", "writer", "status", "progress", "cost", "started")
-]
-# On a narrow page each run is a card, so that no column is hidden.
-CARDS = """
-.runs tbody tr { display: grid; grid-template-columns: 2.6rem 1fr 1fr; padding: .5rem;
-  border-bottom: 1px solid var(--idle); }
-.runs thead { display: none; }
-.runs tbody td { border: none; height: auto; padding: .15rem .3rem;
-  white-space: normal; overflow-wrap: anywhere; }
-.runs tbody td:nth-child(1) { grid-row: 1 / 5; }
-.runs tbody td:nth-child(2) { grid-column: 2 / 4; font-weight: 600; }
-.runs tbody td:nth-child(n+3)::before { position: static; display: block;
-  background: none; font-size: .75rem; color: var(--soft); }
-""" + "".join(
-    f'.runs tbody td:nth-child({number})::before {{ content: "{column["label"]}"; }}\n'
-    for number, column in enumerate(COLUMNS[1:], 3)
-)
 
 
 def add(place: Path) -> None:
@@ -61,8 +46,8 @@ def add(place: Path) -> None:
 
     @ui.page("/runs")
     async def page() -> None:
-        with framed("Runs"):
-            ui.add_css(f"@media (max-width: 699px) {{ {CARDS} }}")
+        with framed("Runs", place):
+            ui.add_css(TABLE_STYLE)
             run_list = RunList(place)
             _show_upload(place)
             await shown_first()
@@ -71,13 +56,16 @@ def add(place: Path) -> None:
 
     @ui.page("/campaign")
     async def campaign(at: str = "") -> None:
-        with framed(at or "Campaign", headed=False):
+        with framed(at or "Campaign", place, under=[RUNS], headed=False):
             folder = within(place, at)
             if folder is None or not (folder / CONFIG_FILE).is_file():
                 say_missing("campaign", at, "Runs")
                 return
             heading(at, 1)
-            report_frame(at, str(time.time_ns()))
+            if folders_of(folder):
+                report_frame(at, str(time.time_ns()))
+            else:
+                say_empty(NONE_BEGUN, command=campaign_command(at))
 
 
 class RunList:
@@ -89,30 +77,31 @@ class RunList:
 
     def __init__(self, place: Path) -> None:
         self._place = place
-        self._rows: list[dict[str, Any]] | None = None
-        self._table: ui.table | None = None
         self._others: list[StudioJob] | None = None
-        self._list = ui.column().classes("w-full")
-        with self._list:
-            ui.label("reading the folder …").classes("note")
+        self._waiting = ui.label("reading the folder …").classes("note")
+        self._empty = ui.column().classes("w-full")
+        with self._empty:
+            say_empty(NO_RUNS, link=NEW, command="tdac synth")
+        self._tables = RunTables()
         self._beside = ui.column().classes("w-full gap-3")
+        self._empty.visible = False
 
     async def look(self) -> None:
         """Shows what has changed in the folder."""
-        rows = await asyncio.to_thread(rows_in, self._place)
-        if self._table is not None and rows != self._rows:
-            self._table.update_rows(rows, clear_selection=False)
-        elif self._table is None and (rows or self._rows is None):
-            self._list.clear()
-            with self._list:
-                self._table = _show_table(rows)
-        self._rows = rows
+        groups = await asyncio.to_thread(_groups_in, self._place)
+        self._waiting.visible = False
+        self._tables.show(groups)
+        self._empty.visible = not any(group.rows for group in groups)
         at_work = [job for job in jobs(self._place) if job.running]
         if at_work != self._others:
             self._others = at_work
             self._beside.clear()
             with self._beside:
                 _show_others(self._place, at_work)
+
+
+def _groups_in(place: Path) -> list[RunGroup]:
+    return grouped(rows_in(place), folders_with(place, CONFIG_FILE))
 
 
 def rows_in(place: Path) -> list[dict[str, Any]]:
@@ -143,7 +132,7 @@ def _cells(place: Path, row: dict[str, Any]) -> dict[str, Any]:
     if row["status"] not in DELIVERED and "k" in row:
         iteration += f" of {row['iterations']}"
     iteration += variations_text(row) if "k" in row else ""
-    cost = row.get("cost")
+    cost = row.get("cost", 0.0)
     return {
         "run": run,
         "address": address_of("/run", run) if "steps" not in row else "",
@@ -152,6 +141,7 @@ def _cells(place: Path, row: dict[str, Any]) -> dict[str, Any]:
         "status": row["status"],
         "progress": f"{row['steps']:,} steps" if "steps" in row else iteration,
         "cost": format_usd(cost) if cost else NONE,
+        "usd": cost,
         "started": _when(row.get("started", "")),
     }
 
@@ -163,59 +153,8 @@ def _when(started: str) -> str:
         return started[:16]
 
 
-def _show_table(rows: list[dict[str, Any]]) -> ui.table | None:
-    if not rows:
-        ui.label("No runs in this folder yet.")
-        return None
-    table = ui.table(
-        columns=COLUMNS,
-        rows=rows,
-        row_key="run",
-        selection="multiple",
-        pagination={"rowsPerPage": 25},
-    ).classes("w-full runs")
-    table.add_slot(
-        "body-cell-status",
-        '<q-td :props="props"><span :class="`status ${props.value.replaceAll(\' \', '
-        "'-')}`\">{{ props.value }}</span></q-td>",
-    )
-    table.add_slot(
-        "body-cell-run",
-        '<q-td :props="props"><a v-if="props.row.address" :href="props.row.address">'
-        "{{ props.row.run }}</a><span v-else>{{ props.row.run }}</span></q-td>",
-    )
-    with table.add_slot("top-left"):
-        search = ui.input("search").props("dense clearable")
-        search.bind_value_to(table, "filter")
-    with table.add_slot("top-right"):
-        button = ui.button(icon="compare_arrows").props("outline no-caps")
-        button.classes("max-sm:mt-3")
-
-    def chosen() -> list[str]:
-        return [row["run"] for row in table.selected if row["address"]]
-
-    def compare() -> None:
-        one, other = map(quote, chosen())
-        ui.navigate.to(f"/compare?one={one}&other={other}")
-
-    def selected() -> None:
-        ready = len(chosen()) == 2
-        button.text = "Compare them" if ready else "Select two runs to compare them"
-        button.set_enabled(ready)
-
-    button.on_click(compare)
-    table.on_select(selected)
-    selected()
-    return table
-
-
 def _show_others(place: Path, at_work: list[StudioJob]) -> None:
-    """Campaigns and benches, and commands that still run."""
-    campaigns = folders_with(place, CONFIG_FILE)
-    if campaigns:
-        heading("Campaigns")
-    for at in campaigns:
-        ui.link(at, address_of("/campaign", at))
+    """Benches, and commands that still run."""
     show_benches(place, "Benches")
     if at_work:
         heading("Running now")

@@ -8,11 +8,15 @@ from pathlib import Path
 from nicegui import events, ui
 
 from tdac_agent.studio.pages.layout import heading, keep_upload
-from tdac_agent.studio.sources import OWN, is_source, source_of, sources_in
+from tdac_agent.studio.sources import OWN, is_source, own_sources, source_of, sources_in
 
 MOST_BYTES = 64 << 20
 ACCEPTED = "image, map.yaml + image, .map, .npy, .wbt"
 POLARITIES = {"": "detect", "dark": "are dark", "light": "are light"}
+NONE_OWN = (
+    "This folder has no map or world of its own yet. Drop one above, or begin with the "
+    "bundled one that is chosen."
+)
 # A file that is dropped beside the box would replace the page.
 DROP = """<script>
 addEventListener("dragover", (event) => event.preventDefault());
@@ -67,6 +71,8 @@ class SourceChoice:
                 type="warning",
             ),
         ).props('flat accept="{}"'.format(",".join(OWN)))
+        self._none = ui.label(NONE_OWN).classes("note text-sm")
+        self._none.visible = not own_sources(place)
         with ui.row().classes("items-center gap-2") as self._read:
             ui.label("obstacles")
             self._polarity = ui.toggle(
@@ -107,4 +113,5 @@ class SourceChoice:
             return
         self._source.set_options(sources_in(self._place))
         self._upload.reset()
+        self._none.visible = False
         self._source.value = source

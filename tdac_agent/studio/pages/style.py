@@ -1,21 +1,21 @@
 """The style of all pages, light and dark."""
 
+from tdac_agent.html_report.status_style import STATUS_STYLE
+
 PRIMARY = "#1d5fae"
 """Colour of what can be pressed; white on it has a contrast of 6."""
-STYLE = """
+STYLE = (
+    STATUS_STYLE
+    + """
 :root {
   --page: #f6f6f3; --ink: #23262e; --code: #eceae3; --line: #d4d2c8; --edge: #bdbab0;
-  --bad: #a3280f; --fine: #12694a; --soft: #5d6068; --link: #1d5fae;
-  --strong: #3d4048; --idle: #e4e2da; --verified: #cfe9dc; --passed: #cfe6ec;
-  --selected: #dcdcf3; --running: #d6e4f5; --failed: #f4d9d2; --differs: #fbf0da;
+  --soft: #5d6068; --link: #1d5fae; --strong: #3d4048; --differs: #fbf0da;
   --added-pale: #e3f5ec; --added: #075e3d; --removed-pale: #fcebe4;
   --removed: #9a2c05; --hunk: #6a61b8; --hunk-pale: #f2f1fa; --paper: white;
 }
 body.body--dark {
   --page: #14171c; --ink: #e6e9ee; --code: #262b33; --line: #3a424d; --edge: #5a636f;
-  --bad: #ff9d78; --fine: #5fd3a3; --soft: #a3acb8; --link: #8db8f0;
-  --strong: #c3cad3; --idle: #333a44; --verified: #17462f; --passed: #123d4b;
-  --selected: #2c2c58; --running: #1d3a5c; --failed: #54291a; --differs: #403410;
+  --soft: #a3acb8; --link: #8db8f0; --strong: #c3cad3; --differs: #403410;
   --added-pale: #12372a; --added: #7fe0b4; --removed-pale: #46241a;
   --removed: #ffae8c; --hunk: #b3abff; --hunk-pale: #262a40; --paper: #1d2127;
 }
@@ -37,12 +37,18 @@ code.command { display: block; background: var(--code); padding: .6em .8em;
 code.command span { display: inline-block; max-width: 100%; }
 .board { width: 100%; border: 1px solid var(--line); border-radius: 6px;
   overflow: hidden; }
+.keys { width: 100%; }
+.keys:focus { outline: none; }
+.keys:focus-visible .board { outline: 3px solid var(--link); outline-offset: 2px; }
+@media (pointer: coarse) { #map-keys { display: none; } }
+kbd { font: inherit; font-size: .85em; padding: 0 .4em; border-radius: 4px;
+  border: 1px solid var(--edge); background: var(--paper); color: var(--ink); }
 .board img { width: 100%; cursor: crosshair; }
 .choosing { display: grid; gap: 1.5rem; width: 100%; }
 @media (min-width: 1024px) {
   .choosing { grid-template-columns: 26rem minmax(0, 1fr); }
   .beside { position: sticky; top: 4rem; align-self: start;
-    --room: (100vh - 9rem); } /* height for the map */
+    --room: (100vh - 14rem); } /* height for the map */
 }
 @media (max-width: 1023px) {
   .choosing { grid-template-columns: minmax(0, 1fr); }
@@ -52,17 +58,17 @@ code.command span { display: inline-block; max-width: 100%; }
     background: var(--page); border-top: 1px solid var(--line); }
 }
 .world { width: min(100%, 78vh); }
-.problem { color: var(--bad); } .fine { color: var(--fine); }
+.problem { color: var(--bad); } .fine { color: var(--good); }
 .note { color: var(--soft); }
+.trail { font-size: .85rem; color: var(--soft); }
+.trail ol { display: flex; flex-wrap: wrap; margin: 0; padding: 0; list-style: none; }
+.trail li { overflow-wrap: anywhere; }
+.trail li + li::before { content: "›" / ""; margin: 0 .5em; }
+.trail a { color: var(--link); }
+.empty { border: 1px dashed var(--edge); border-radius: 8px; padding: .8em 1em;
+  width: 100%; gap: .5rem; }
 iframe.report { border: 1px solid var(--line); border-radius: 6px; width: 100%;
   height: 82vh; background: var(--paper); }
-.status { border-radius: 999px; padding: .1em .7em; font-weight: 600;
-  background: var(--idle); }
-.status.verified, .status.trained, .status.finished { background: var(--verified); }
-.status.passed { background: var(--passed); }
-.status.selected { background: var(--selected); }
-.status.running { background: var(--running); }
-.status.not-verified, .status.not-finished { background: var(--failed); }
 .q-uploader { width: 100%; max-width: 32rem; border: 2px dashed var(--edge);
   border-radius: 8px; background: none; }
 .q-uploader:hover, .q-uploader:focus-within { border-color: var(--link); }
@@ -78,7 +84,7 @@ iframe.report { border: 1px solid var(--line); border-radius: 6px; width: 100%;
 .compared { width: 100%; border-collapse: collapse; background: var(--paper);
   font-size: .9rem; }
 .compared td, .compared th { text-align: left; vertical-align: top; padding: .3em .6em;
-  border-bottom: 1px solid var(--idle); overflow-wrap: anywhere; width: 35%; }
+  border-bottom: 1px solid var(--line); overflow-wrap: anywhere; width: 35%; }
 .compared td:first-child, .compared th:first-child { width: 1.6em; font-weight: 700;
   color: var(--bad); padding-right: 0; }
 .compared td:nth-child(2) { color: var(--soft); width: auto; }
@@ -93,8 +99,10 @@ iframe.report { border: 1px solid var(--line); border-radius: 6px; width: 100%;
 .diff del { background: var(--removed-pale); color: var(--removed); }
 .diff b { color: var(--hunk); background: var(--hunk-pale); font-weight: 400; }
 #lost:not([hidden]) { position: fixed; inset: auto 0 0 0; z-index: 9999;
-  padding: .8em 1.2em; background: var(--bad); color: white; overflow-wrap: anywhere; }
+  padding: .8em 1.2em; background: var(--bad); color: var(--page);
+  overflow-wrap: anywhere; }
 #popup { display: none; } /* NiceGUI's own word about it */
 pre.output { white-space: pre-wrap; overflow-wrap: anywhere; font-size: .8rem;
   max-height: 16rem; overflow: auto; width: 100%; margin: 0; }
 """
+)

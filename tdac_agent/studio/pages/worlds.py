@@ -23,8 +23,10 @@ from tdac_agent.studio.pages.layout import (
     address_of,
     framed,
     heading,
+    say_empty,
     shown_first,
 )
+from tdac_agent.studio.pages.trail import NEW
 from tdac_agent.studio.pages.writers import Writers
 from tdac_agent.synthesis.options import RACE, USUAL
 from tdac_agent.synthesis.workload import MOST_EPISODES
@@ -40,6 +42,9 @@ LEAST = 2
 """Episodes of a run on a set: one for a test, one for the selection."""
 SECONDS = 0.05
 """Between two frames of a drive, at least."""
+NO_POLICIES = (
+    "No controller of your own is in this folder yet, so the list has ours alone."
+)
 KEYS = "Drive with the arrow keys or W A S D; R begins again."
 
 
@@ -48,7 +53,7 @@ def add(place: Path) -> None:
 
     @ui.page("/worlds")
     async def page(level: str = "unknown") -> None:
-        with framed("Worlds"):
+        with framed("Worlds", place):
             await WorldsPage(place).show(level)
 
 
@@ -111,7 +116,10 @@ class WorldsPage:
 
     def _build_watching(self) -> None:
         heading("Watch two policies on this world")
-        options = ["builtin", *planner_names(), *policies_in(self._place)]
+        own = policies_in(self._place)
+        if not own:
+            say_empty(NO_POLICIES, link=NEW)
+        options = ["builtin", *planner_names(), *own]
         with ui.row().classes("items-end gap-3"):
             self._one = ui.select(options, value="builtin", label="left").classes(
                 "w-64"

@@ -13,14 +13,17 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
-from studio_process import Studio
+from studio_process import Studio, running_studio
 
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.studio.jobs import STATE, jobs
 from tdac_agent.verification.verify_episodes import verify_episodes
 
 SECONDS = 60
-SIZES = {"desktop": (1440, 900), "laptop": (1180, 800), "phone": (390, 844)}
+SIZES = {
+    "desktop": (1440, 900), "laptop": (1180, 800), "narrow": (1024, 768),
+    "phone": (390, 844),
+}  # fmt: skip
 # A controller that drives straight on, into a wall.
 BLIND = """
 def policy(obs):
@@ -375,6 +378,70 @@ def test_a_controller_for_a_set_of_worlds(page, studio):
     says(page, "The first candidate appears here as soon as it has been tested.")
     wait(page, lambda b: b.find_elements(By.CSS_SELECTOR, ".status.selected"))
     says(page, "Only hidden worlds, which nobody has seen, can verify it.")
+
+
+def test_a_campaign_is_a_card_with_its_runs_folded(page, studio):
+    """What is not verified comes first; on 1024 px nothing scrolls sideways."""
+    campaign = studio.place / "campaigns" / "folded"
+    runs = campaign / "runs" / "maze-builtin-with-a-long-name-0123456789abcdef"
+    for number, status in enumerate(("verified", "not verified", "verified"), 1):
+        shutil.copytree(DEMO, runs / f"r{number:04d}")
+        record = runs / f"r{number:04d}" / "run.json"
+        run = json.loads(record.read_text())
+        run |= {"status": status, "cost": 0.25 * number, "tokens_in": 1}
+        record.write_text(json.dumps(run))
+    (campaign / "campaign.yaml").write_text("name: folded\n")
+    (studio.place / "campaigns/new").mkdir()
+    (studio.place / "campaigns/new/campaign.yaml").write_text("name: new\n")
+    resize(page, "narrow")
+    page.get(f"{studio.base}/runs")
+    card = "//*[contains(@class,'campaign')][.//h2='campaigns/folded']"
+    found = wait(page, lambda b: b.find_element(By.XPATH, card))
+    rows = found.find_elements(By.CSS_SELECTOR, "tbody tr")
+    assert not rows[0].is_displayed()
+    page.execute_script("arguments[0].click()", found.find_element(
+        By.CSS_SELECTOR, ".q-expansion-item .q-item"
+    ))  # fmt: skip
+    wait(page, lambda b: rows[0].is_displayed())
+    assert [row.text.split("/")[1].split()[0] for row in rows] == [
+        "r0002", "r0001", "r0003",
+    ]  # fmt: skip
+    assert "verified" in found.text.splitlines()[1]
+    assert page.execute_script(OVERFLOW) <= 0
+    inner = "const e = arguments[0]; return e.scrollWidth - e.clientWidth"
+    for table in page.find_elements(By.CSS_SELECTOR, ".q-table__middle"):
+        assert page.execute_script(inner, table) <= 0
+    assert "tdac campaign campaigns/new/campaign.yaml --out campaigns/new" in (
+        text_of(page)
+    )
+    found.find_element(By.LINK_TEXT, "Report").click()
+    wait(page, lambda b: "/campaign?at=" in b.current_url)
+    with framed(page):
+        says(page, "runs verified")
+    page.get(f"{studio.base}/run?at={(runs / 'r0001').relative_to(studio.place)}")
+    trail = wait(page, lambda b: b.find_element(By.CSS_SELECTOR, "nav.trail"))
+    trail.find_element(By.LINK_TEXT, "campaigns/folded").click()
+    wait(page, lambda b: "/campaign?at=" in b.current_url)
+    shutil.rmtree(studio.place / "campaigns")
+    resize(page, "desktop")
+
+
+def test_pages_without_anything_say_what_to_do(browser, tmp_path):
+    """An empty folder: a sentence on each page, with a link or a command."""
+    with running_studio(tmp_path) as empty:
+        browser.get(empty.address)
+        wait(browser, lambda b: "token" not in b.current_url)
+        says(browser, "This folder has no map or world of its own yet.")
+        browser.get(f"{empty.base}/runs")
+        says(browser, "No run in this folder yet.")
+        assert "tdac synth" in text_of(browser)
+        assert browser.find_elements(By.CSS_SELECTOR, ".empty a[href='/']")
+        browser.get(f"{empty.base}/benches")
+        says(browser, "No bench in this folder yet. Start the one above.")
+        says(browser, "No controller of your own is in this folder yet")
+        browser.get(f"{empty.base}/worlds")
+        says(browser, "No controller of your own is in this folder yet")
+        browser.get_log("browser")  # its end
 
 
 @pytest.mark.slow
