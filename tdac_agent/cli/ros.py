@@ -91,7 +91,7 @@ def drive(options: DriveOptions) -> int:
         origin=options.origin,
         transform_tolerance=options.transform_tolerance,
         resample_scan=options.resample_scan,
-        max_jump=options.max_jump,
+        max_jump=options.max_jump or 0.0,
         max_deviation=options.max_deviation,
         any_start=options.any_start,
         any_map=options.any_map,

@@ -217,6 +217,22 @@ def test_a_simulation_that_ends(task, settings, package, domain):
 
 
 @pytest.mark.slow
+def test_a_simulation_that_begins_again(task, settings, package, domain):
+    """Its clock goes back: the node ends, and does not drive on in the new one."""
+    with NodeProcess(package, domain) as node:
+        bus = Bus(domain)
+        Simulator(robot_of(task, settings), bus, patience=30.0).run(1.0)
+        clock = bus.writer("clock")
+        end = time.monotonic() + 30.0
+        while node.process.poll() is None and time.monotonic() < end:
+            clock.write(msg.Clock(time_of(1.0)))
+            time.sleep(0.02)
+        printed = node.output()
+    assert "failed: the clock went back by" in printed
+    assert node.process.returncode == 1
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_random_faults(task, settings, package, stated, steps, domain, seed):
     """Four faults in a drive: no contact, each stop within its stated distance."""
