@@ -89,7 +89,12 @@ def drive(options: DriveOptions) -> int:
         dead_man=dead_man,
         sim_time=not options.real_time,
         origin=options.origin,
+        transform_tolerance=options.transform_tolerance,
+        resample_scan=options.resample_scan,
+        max_jump=options.max_jump,
+        max_deviation=options.max_deviation,
         any_start=options.any_start,
+        any_map=options.any_map,
         say=lambda text: print_plain(console, text),
     )
     last = node.run(options.seconds)

@@ -99,6 +99,33 @@ class DriveOptions:
     any_start: bool = option(
         False, "Begin where the robot stands, though no verified drive began there."
     )
+    any_map: bool = option(
+        False,
+        "The localiser may have another map than the controller; both must have one "
+        "frame.",
+    )
+    resample_scan: bool = option(
+        False,
+        "Take scans with another or a varying number of rays than the robot file, and "
+        "with gaps, as those of the LDS-02.",
+    )
+    max_jump: float = option(
+        0.0,
+        "Largest distance of a pose from where the commands lead, m.  [default: the "
+        "radius of the robot]",
+        metavar="METRES",
+    )
+    max_deviation: float = option(
+        0.25,
+        "Largest standard deviation of x and y that the localiser may state, m.",
+        metavar="METRES",
+    )
+    transform_tolerance: float = option(
+        0.0,
+        "How far the localiser stamps map to odom ahead, s: `transform_tolerance` of "
+        "AMCL.",
+        metavar="SECONDS",
+    )
     origin: tuple[float, float, float] | None = option(
         None,
         "Take the pose from /odom, whose origin has this pose on the map (m, rad).  "

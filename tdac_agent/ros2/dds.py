@@ -39,18 +39,20 @@ def _qos(reliable: bool, depth: int, *, lasting: bool = False) -> Qos:
 
 
 SENSOR, STATE, TRANSFORMS = _qos(False, 5), _qos(True, 10), _qos(True, 100)
+STATIC = _qos(True, 100, lasting=True)
 LATCHED, NEWEST = _qos(True, 1, lasting=True), _qos(False, 1)
 TOPICS: dict[str, tuple[type, Qos]] = {
     "scan": (msg.LaserScan, SENSOR),
     "odom": (msg.Odometry, STATE),
     "tf": (msg.TFMessage, TRANSFORMS),
-    "tf_static": (msg.TFMessage, LATCHED),
+    "tf_static": (msg.TFMessage, STATIC),
+    "map": (msg.OccupancyGrid, LATCHED),
     "amcl_pose": (msg.PoseWithCovarianceStamped, LATCHED),
     "clock": (msg.Clock, NEWEST),
     "cmd_vel": (msg.Twist, STATE),
 }
 """Topics of a drive; their quality of service is that of ROS 2's profiles for sensor
-data, odometry, tf, AMCL, the clock and commands."""
+data, odometry, tf, maps, AMCL, the clock and commands."""
 
 
 class Bus:

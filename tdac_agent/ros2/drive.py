@@ -33,6 +33,8 @@ from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_json
 
 OURS = "tdac_agent.ros2.package"
 """The package of the modules that are exported."""
+BASE = "base_link"
+"""Frame of the robot's body: the middle of its axle, x ahead."""
 MOST_FRAMES = 100
 """Most frames of tf that are kept; a robot and its map have fewer."""
 TOGETHER, MISSING = 1.0, 0.05
@@ -44,6 +46,28 @@ ANSWER = 2.0
 """Longest wait for an answer in simulated time, s of the wall clock."""
 CLOCK_STANDS = 10.0
 """Time after which a clock that stands still ends the drive, s of the wall clock."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """A frame of tf.
+
+    Attributes:
+        parent: The frame that it is in.
+        pose: Its pose there.
+        tilt: Largest of x and y of its quaternion, absolute.
+        stamp: Its time, s; infinite if it is static.
+    """
+
+    parent: str
+    pose: tuple[float, float, float]
+    tilt: float
+    stamp: float
+
+    @property
+    def is_static(self) -> bool:
+        """Whether it is sent once, for ever."""
+        return math.isinf(self.stamp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,9 +162,13 @@ class Node:
         dead_man: Time after which the robot stops by itself, s.
         sim_time: Whether the time is that of /clock; otherwise that of this machine.
         origin: Pose of the odometry's origin on the map; None for tf.
-        any_start: Whether to begin anywhere.
+        transform_tolerance: How far the localiser stamps its transform ahead, s.
         policy: What answers; by default the package's controller in its worker.
         say: Called with each new state.
+        **declared: Further settings of the core, such as `any_start`.
+
+    Raises:
+        RunError: A setting is impossible, or the controller is not the exported one.
     """
 
     def __init__(
@@ -151,16 +179,22 @@ class Node:
         dead_man: float,
         sim_time: bool,
         origin: tuple[float, float, float] | None = None,
-        any_start: bool = False,
+        transform_tolerance: float = 0.0,
         policy: Any = None,
         say: Callable[[str], None] = lambda _: None,
+        **declared: Any,
     ) -> None:
         try:
+            package.motion.check_pose_parameters(
+                "tf" if origin is None else "odom",
+                origin or (0.0, 0.0, 0.0),
+                transform_tolerance,
+            )
             settings = core_settings(
                 package.settings,
                 kind=package.core.Settings,
                 dead_man=dead_man,
-                any_start=any_start,
+                **declared,
             )
             if policy is None:
                 policy = package.worker.Worker(
@@ -172,10 +206,11 @@ class Node:
         self.dt = settings.dt
         self._package, self._bus, self._say = package, bus, say
         self._sim_time, self._origin = sim_time, origin
-        names = ("scan", "odom", "tf", "amcl_pose", "clock")
+        self._tolerance = transform_tolerance
+        names = ("scan", "odom", "tf", "tf_static", "map", "amcl_pose", "clock")
         self._in = {name: bus.reader(name) for name in names}
         self._out = bus.writer("cmd_vel")
-        self._frames: dict[str, tuple[str, tuple[float, float, float]]] = {}
+        self._frames: dict[str, _Frame] = {}
         self._said = ""
         self._clock, self._end, self._complete = -1.0, math.inf, False
 
@@ -240,9 +275,14 @@ class Node:
         """Takes what has arrived."""
         for clock in self._in["clock"].take():
             self._clock = seconds_of(clock.clock)
-        for message in self._in["tf"].take():
-            for each in message.transforms:
-                self._place(each)
+        for message in self._in["map"].take():
+            own = message.info
+            origin = self._pose_of(own.origin, "position")
+            self.core.localiser_map((own.width, own.height), own.resolution, origin)
+        for name in ("tf_static", "tf"):
+            for message in self._in[name].take():
+                for each in message.transforms:
+                    self._place(each, is_static=name == "tf_static")
         for message in self._in["odom"].take():
             if self._origin is not None:
                 pose = self._package.motion.compose(
@@ -254,28 +294,80 @@ class Node:
             if self._origin is None:
                 self.core.localised(_variances(message))
         for message in self._in["scan"].take():
+            mount = self._mount(message.header.frame_id)
+            if mount is None:
+                continue
             layout = self._package.scans.Layout(
                 len(message.ranges),
                 message.angle_min,
                 message.angle_increment,
                 message.range_min,
                 message.range_max,
+                mount,
             )
             self.core.scan(seconds_of(message.header.stamp), layout, message.ranges)
 
-    def _place(self, each: Any) -> None:
-        """Takes a transform; the pose is map to odom to base_link."""
-        pose = self._pose_of(each.transform, "translation")
+    def _place(self, each: Any, *, is_static: bool) -> None:
+        """Takes a transform, and the pose of `BASE` on the map if it is newer now."""
         is_new = each.child_frame_id not in self._frames
         if is_new and len(self._frames) >= MOST_FRAMES:
-            self._frames.clear()
-        self._frames[each.child_frame_id] = each.header.frame_id, pose
-        if each.child_frame_id == "base_link" and self._origin is None:
-            parent, own = self._frames["base_link"]
-            above = self._frames.get(parent)
-            if above is not None and above[0] == "map":
-                whole = self._package.motion.compose(above[1], own)
-                self.core.pose(seconds_of(each.header.stamp), *whole)
+            # Those that are not sent again stay.
+            self._frames = {k: f for k, f in self._frames.items() if f.is_static}
+            if len(self._frames) >= MOST_FRAMES:
+                return
+        turn = each.transform.rotation
+        self._frames[each.child_frame_id] = _Frame(
+            each.header.frame_id,
+            self._pose_of(each.transform, "translation"),
+            max(abs(turn.x), abs(turn.y)),
+            math.inf if is_static else seconds_of(each.header.stamp),
+        )
+        if is_static or self._origin is not None:
+            return
+        found = self._way("map", BASE)
+        if found is not None:
+            stamp = min(frame.stamp for frame in found)
+            if math.isinf(stamp):
+                return
+            if self._tolerance > 0.0:  # the topmost one is the localiser's
+                localised = found[-1].stamp
+                stamp = self._package.motion.stamp_of(stamp, localised, self._tolerance)
+            self.core.pose(stamp, *self._composed(found))
+
+    def _way(self, top: str, frame: str) -> list[_Frame] | None:
+        """The frames from one up to another above it; None if tf has no such way."""
+        found: list[_Frame] = []
+        while frame != top:
+            own = self._frames.get(frame)
+            if own is None or len(found) > MOST_FRAMES:
+                return None
+            found.append(own)
+            frame = own.parent
+        return found
+
+    def _composed(self, way: list[_Frame]) -> tuple[float, float, float]:
+        pose = 0.0, 0.0, 0.0
+        for frame in way:
+            pose = self._package.motion.compose(frame.pose, pose)
+        return pose
+
+    def _mount(self, frame: str) -> float | None:
+        """Yaw of the scanner on the robot, as in the node; None while it is unknown."""
+        found = self._way(BASE, frame)
+        if found is None:
+            self.core.refuse_scan(f"tf does not know where {frame:.40} is on {BASE}")
+            return None
+        x, y, yaw = self._composed(found)
+        tilt = max((each.tilt for each in found), default=0.0)
+        turn = tilt, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw)
+        try:
+            mount: float = self._package.scans.mounted(
+                self.core.settings.robot, (x, y), turn
+            )
+        except ValueError as error:
+            self.core.end(str(error))
+            return None
+        return mount
 
     def _pose_of(self, pose: Any, place: str) -> tuple[float, float, float]:
         at = getattr(pose, place)

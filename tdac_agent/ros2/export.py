@@ -132,6 +132,7 @@ def settings_of(task: Task) -> dict[str, Any]:
             f"{task.name} is a task in pixels: give a map with a resolution (map.yaml) "
             "and --metres, so that the controller observes metres"
         )
+    grid = setting.nominal.terrain.grid
     written, ends = setting.portable()["robot"], setting.ends()
     robot = setting.nominal.robot
     written = {key: each for key, each in written.items() if key != "image"}
@@ -149,6 +150,11 @@ def settings_of(task: Task) -> dict[str, Any]:
         "goal": ends["goal"],
         "goal_tolerance": ends["tolerance"],
         "movers": bool(task.spec.movers),
+        "map": {
+            "size": [grid.width, grid.height],
+            "resolution": grid.resolution,
+            "origin": list(grid.origin),
+        },
         "robot": written,
     }
 
@@ -189,7 +195,7 @@ def core_settings(
     Args:
         settings: Contents of `settings.json`.
         kind: Class of the settings, as the package's own core has it.
-        **declared: What the user declares: `dead_man`, `max_age`, `any_start`.
+        **declared: What the user declares, such as `dead_man` and `any_start`.
 
     Raises:
         ValueError: A value is missing or not valid.
@@ -202,6 +208,7 @@ def core_settings(
             goal=tuple(settings["goal"]),
             goal_tolerance=settings["goal_tolerance"],
             robot=settings["robot"],
+            own_map=settings["map"],
             **declared,
         )
     except (KeyError, TypeError, AttributeError) as error:

@@ -57,6 +57,7 @@ class Robot:
         way: Length of the driven path, m.
         contact: What was touched, or an empty text.
         reached: Whether the goal is reached.
+        cells: The occupied cells of its map, bool, `[y, x]`.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class Robot:
         self._env = Map2DEnv.of(replace(env.setup, metric=setting.task_units.frame))
         self._scale = setting.task_units.per_pixel
         self.settings, self.dt = settings, float(settings["dt"])
+        self.cells: NDArray[np.bool_] = setting.nominal.terrain.grid.cells
         self.dead_man = dead_man
         self._wheels = Wheels(settings["robot"], self.dt)
         self._seen, _ = self._env.reset(seed=seed)

@@ -1,4 +1,4 @@
-"""A simulated robot over DDS: /scan, /odom, /tf and /clock out, /cmd_vel in."""
+"""A simulated robot over DDS: /scan, /odom, /tf, /map, /clock out, /cmd_vel in."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Simulator:
         self._courses = [Course(fault) for fault in faults]
         self._active: set[str] = set()
         self._patience, self._watch, self._bag = patience, watch, bag
-        names = ("scan", "odom", "tf", "tf_static", "amcl_pose", "clock")
+        names = ("scan", "odom", "tf", "tf_static", "map", "amcl_pose", "clock")
         self._out = {name: bus.writer(name) for name in names}
         self._commands = bus.reader("cmd_vel")
         self._other: Any = None
@@ -316,6 +316,19 @@ class Simulator:
         mount = (float(offset[0]), float(offset[1]), 0.0)
         static = _transform(time_of(0.0), "base_link", "base_scan", mount)
         self._send("tf_static", msg.TFMessage([static]))
+        self._send("map", self._map())
+
+    def _map(self) -> Any:
+        """The map as a map server publishes it; its first row is the lowest one."""
+        own, cells = self._robot.settings["map"], self._robot.cells
+        (width, height), (x, y, yaw) = own["size"], own["origin"]
+        header, origin = (
+            msg.Header(frame_id="map"),
+            msg.Pose(msg.Point(x, y), _turn(yaw)),
+        )
+        info = msg.MapMetaData(header.stamp, own["resolution"], width, height, origin)
+        data = np.where(cells[::-1], 100, 0).reshape(-1).tolist()
+        return msg.OccupancyGrid(header, info, data)
 
     def _report(self, outcome: str) -> DriveReport:
         robot = self._robot

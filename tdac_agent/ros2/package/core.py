@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .motion import compose, Wheels, wrapped
+from .motion import compose, other_map, Wheels, wrapped
 from .scans import Guard, Layout, LayoutError, Scanner
 
 PERIODS = 3
@@ -55,6 +55,9 @@ class Settings:
         any_start: Whether to drive from a start that no verified drive had.
         start_on: When the drive begins: `pose`, as soon as the data fit, or `service`, when
             `Core.start` is called.
+        any_map: Whether the localiser may have another map than the controller.
+        own_map: Size, resolution and origin of the controller's map; see `motion.other_map`.
+            None compares none.
     """
 
     dt: float
@@ -70,8 +73,15 @@ class Settings:
     resample_scan: bool = False
     any_start: bool = False
     start_on: str = 'pose'
+    any_map: bool = False
+    own_map: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
+        for name in ('dt', 'horizon', 'goal_tolerance'):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise SettingsError(f'{name}: expected above 0, got {getattr(self, name)!r}')
+        if not sum(map(abs, (*self.start, *self.goal))) < FARTHEST:
+            raise SettingsError(f'expected numbers, got start {self.start}, goal {self.goal}')
         limit = PERIODS * self.dt
         if not 0.0 < self.dead_man <= limit + 1e-9:
             raise SettingsError(
@@ -167,7 +177,8 @@ class Core:
         self._jump, self._jump_stamp, self._unsure = '', -math.inf, ''
         self._refused = ''
         self._motion: deque[tuple[float, float, float]] = deque(maxlen=100)
-        self._asked = self._planned = False
+        self._now = -math.inf
+        self._asked = self._planned = self._begun = False
         self._held = settings.start_on == 'service'
         self.publishers = 1
         self.commands = 0
@@ -175,12 +186,12 @@ class Core:
 
     def scan(self, stamp: float, layout: Layout, ranges: Any) -> None:
         """Take a scan; older ones than the last, and ones without values, do not count."""
-        if self.final is not None or not stamp > self._scan_stamp:
+        if self.final is not None or not self._is_new(stamp, self._scan_stamp):
             return
         try:
             self._scanner.use(layout)
         except LayoutError as error:
-            self._refused = f': {error}'
+            self.refuse_scan(str(error))
             if not self.settings.resample_scan:  # the next scan may have another header
                 self._end('failed', str(error))
             return
@@ -189,9 +200,15 @@ class Core:
             self._ranges, self._scan_stamp, self._refused = task, stamp, ''
             self._guard.see(guard, self._scanner.guard_angles())
 
+    def refuse_scan(self, why: str) -> None:
+        """Say why scans do not count."""
+        self._refused = f': {why}'
+
     def pose(self, stamp: float, x: float, y: float, yaw: float) -> None:
         """Take a pose in the map's frame; older ones than the last do not count."""
-        if not stamp > self._pose_stamp or not abs(x) + abs(y) + abs(yaw) < FARTHEST:
+        if not abs(x) + abs(y) + abs(yaw) < FARTHEST:
+            return
+        if not self._is_new(stamp, self._pose_stamp):
             return
         pose = (x, y, wrapped(yaw))
         if self._pose_stamp > -math.inf:
@@ -211,6 +228,16 @@ class Core:
                 f'the pose is unsure: standard deviation {off:.2f} m and {turn:.2f} rad, at '
                 f'most {self.settings.max_deviation:g} m and {TURNED:g} rad (max_deviation)')
 
+    def localiser_map(
+        self, size: tuple[int, int], resolution: float, origin: tuple[float, float, float]
+    ) -> None:
+        """End the drive if the localiser has another map than the controller."""
+        own = self.settings.own_map
+        if own is None or self.settings.any_map or self.final is not None:
+            return
+        if why := other_map(own, size, resolution, origin):
+            self._end('failed', why)
+
     def has(self, stamp: float) -> bool:
         """Whether scan and pose of this moment have arrived."""
         return min(self._scan_stamp, self._pose_stamp) >= stamp - 1e-6
@@ -221,6 +248,7 @@ class Core:
 
     def start(self, now: float) -> tuple[bool, str]:
         """Begin the drive, if all fits now; return whether it does, and what to say."""
+        now = self._time(now)
         if self.final is not None:
             return False, f'{self.final.state}: {self.final.reason}'
         if not self._held:
@@ -231,11 +259,12 @@ class Core:
 
     def check_timer(self, name: str, values: list[float | None]) -> None:
         """End the drive if the robot's timer, as its driver says, is missing or too long."""
-        limit = PERIODS * self.settings.dt
+        limit = self.settings.dead_man
         value = values[0] if values else None
         if value is None or not 0.0 < value <= limit + 1e-9:
             got = 'no number' if value is None else f'{value:g}'
-            self._end('failed', f'{name}: expected above 0 and at most {limit:g} s, got {got}')
+            why = f'{name}: expected above 0 and at most dead_man, {limit:g} s, got {got}'
+            self._end('failed', why)
 
     def drove(self, v: float, omega: float) -> None:
         """Take another command than the last one as driven, as in a recorded drive."""
@@ -248,12 +277,26 @@ class Core:
         Return the command of a control period.
 
         Args:
-            now: Time.
+            now: Time. If it goes back by more than a period, as when a simulation begins
+                again, the drive ends.
             wait: How long the controller may take for an answer, wall-clock seconds.
         """
+        now = self._time(now)
         command = self._next(now, wait)
         self._motion.append((now, command.v, command.omega))
         return command
+
+    def _time(self, now: float) -> float:
+        """Return the time, which never goes back."""
+        back = self._now - now
+        if back > self.settings.dt and self.final is None:
+            self._end('failed', f'the clock went back by {back:.3g} s: start the node again')
+        self._now = max(self._now, now)
+        return self._now
+
+    def _is_new(self, stamp: float, last: float) -> bool:
+        """Return whether data are newer than the last ones, or those were of no such time."""
+        return stamp > last or math.inf > last - self._now > self.settings.oldest
 
     def _next(self, now: float, wait: float) -> Command:
         if self.final is not None:
@@ -261,10 +304,12 @@ class Core:
         why = self._unfit(now)
         if self._asked:
             answer = self._policy.answer(0.0)
-            if answer is None or self._planned is False or answer[0] == 'error':
+            if answer is None or not self._planned or answer[0] == 'error':
                 return self._take(answer, why, now)
             self._asked = False  # a late answer, to an observation that is old
         if why or self._held:
+            if not self._planned and self.settings.start_on == 'service':
+                self._held = True  # the call was for then, not for whenever it fits
             why = why or 'ready: call the service start'
             return self._stand('stopped' if self._planned else 'waiting', why)
         if math.dist(self._pose[:2], self.settings.goal) <= self.settings.goal_tolerance:
@@ -302,6 +347,7 @@ class Core:
         if self._guard.blocked(v, omega, self.settings.full_speed, moved):
             self._wheels.last = before
             return self._stand('stopped', 'something is ahead within the stopping distance')
+        self._begun = True
         return Command(v, omega, 'driving')
 
     def _unfit(self, now: float) -> str:
@@ -319,8 +365,8 @@ class Core:
         steady = STEADY * self.settings.dt
         if self._pose_stamp - self._jump_stamp < steady:
             return f'{self._jump}: it must be steady for {steady:g} s'
-        begins = not self._planned and not self._asked
-        return self._wrong_start() if begins and not self.settings.any_start else ''
+        may_begin = self._begun or self.settings.any_start
+        return '' if may_begin else self._wrong_start()
 
     def _wrong_start(self) -> str:
         x, y, yaw = self.settings.start

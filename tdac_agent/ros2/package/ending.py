@@ -9,17 +9,26 @@ from typing import Any
 
 ZEROS = 7
 """How often the last command is sent."""
+ENDS = [
+    getattr(signal, name) for name in ('SIGINT', 'SIGTERM', 'SIGHUP') if hasattr(signal, name)]
+"""Signals that end the node; SIGHUP comes when its terminal is closed, or ssh is lost."""
 
 
 def take_signals() -> None:
-    """Let the first SIGINT or SIGTERM raise KeyboardInterrupt, and ignore further ones."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _interrupt)
+    """
+    Let the first of `ENDS` raise KeyboardInterrupt, and ignore further ones.
+
+    SIGHUP stays ignored under nohup.
+    """
+    for number in ENDS:
+        is_kept = number not in (signal.SIGINT, signal.SIGTERM)
+        if not is_kept or signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _interrupt)
 
 
 def ignore_signals() -> None:
-    """Ignore SIGINT and SIGTERM from now on."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    """Ignore the signals of `ENDS` from now on."""
+    for number in ENDS:
         signal.signal(number, signal.SIG_IGN)
 
 

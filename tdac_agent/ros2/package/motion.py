@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import math
 from typing import Any
 
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float:
-    """Yaw of a quaternion, in (-pi, pi]."""
+    """Yaw of a quaternion, in (-pi, pi]; NaN if its length is not 1, as tf2 reckons."""
+    if not abs(x * x + y * y + z * z + w * w - 1.0) < 0.01:
+        return math.nan
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
@@ -33,6 +36,51 @@ def stamp_of(whole: float, localised: float, tolerance: float) -> float:
         tolerance: How far the localiser stamps ahead.
     """
     return min(whole, localised - tolerance)
+
+
+def check_pose_parameters(source: str, origin: Sequence[float], tolerance: float) -> None:
+    """Raise ValueError if the parameters of the pose are impossible; see `drive.yaml`."""
+    if source not in ('tf', 'odom'):
+        raise ValueError(f'pose_source: expected tf or odom, got {source!r}')
+    if len(origin) != 3 or not all(map(math.isfinite, origin)):
+        raise ValueError(f'origin: expected x, y, yaw, got {list(origin)}')
+    if not 0.0 <= tolerance < math.inf:
+        raise ValueError(f'transform_tolerance: expected 0 or more, got {tolerance:g}')
+
+
+def other_map(
+    own: dict[str, Any],
+    size: tuple[int, int],
+    resolution: float,
+    origin: tuple[float, float, float],
+) -> str:
+    """
+    Return how a map differs from the one of the verification, or an empty text.
+
+    Only the header is compared: a map that was scanned again has another size or origin,
+    so its places are not those of the task.
+
+    Args:
+        own: The map of the verification: `size`, `resolution`, `origin`.
+        size: Cells: width, height.
+        resolution: Length of a cell, m.
+        origin: Pose of its lower left corner.
+    """
+    x, y, yaw = own['origin']
+    off = math.dist(origin[:2], (x, y))
+    turn = abs(wrapped(origin[2] - yaw)) if math.isfinite(origin[2]) else math.inf
+    apart = abs(resolution - own['resolution']) * max(own['size'])
+    if tuple(size) == tuple(own['size']) and off + apart < 0.1 * own['resolution'] and turn < 1e-3:
+        return ''
+
+    def text(size: Any, resolution: float, origin: Any) -> str:
+        place = ', '.join(f'{each:.4g}' for each in origin)
+        return f'{size[0]} x {size[1]} cells of {resolution:.4g} m from ({place})'
+
+    return (
+        f'the localiser has another map: {text(size, resolution, origin)}, verified with '
+        f'{text(own["size"], own["resolution"], own["origin"])}; give it that map (or, if both '
+        f'have one frame, set any_map)')
 
 
 def inverse(pose: tuple[float, float, float]) -> tuple[float, float, float]:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
 from geometry_msgs.msg import PoseWithCovarianceStamped, Twist, TwistStamped
-from nav_msgs.msg import Odometry
-from rcl_interfaces.msg import ParameterType
+from nav_msgs.msg import OccupancyGrid, Odometry
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 from rcl_interfaces.srv import GetParameters
 import rclpy
+from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from rclpy.signals import SignalHandlerOptions
@@ -29,6 +29,7 @@ DEFAULTS: dict[str, Any] = {
     'scan_topic': 'scan',
     'odom_topic': 'odom',
     'covariance_topic': 'amcl_pose',
+    'map_topic': 'map',
     'command_topic': 'cmd_vel',
     'stamped': False,
     'pose_source': 'tf',
@@ -46,6 +47,7 @@ DEFAULTS: dict[str, Any] = {
     'resample_scan': False,
     'start_on': 'service',
     'any_start': False,
+    'any_map': False,
 }
 
 
@@ -54,8 +56,12 @@ class DriveNode(Node):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__('drive')
-        own = {name: self.declare_parameter(name, value).value for name, value in DEFAULTS.items()}
+        own = {  # read-only, since a later value would change nothing
+            name: self.declare_parameter(name, value, ParameterDescriptor(read_only=True)).value
+            for name, value in DEFAULTS.items()}
         self.own = own
+        motion.check_pose_parameters(
+            own['pose_source'], own['origin'], own['transform_tolerance'])
         folder = Path(get_package_share_directory(PACKAGE)) / 'controller'
         text = (folder / 'settings.json').read_text(encoding='utf-8')  # raw read: installed
         written = json.loads(text)
@@ -65,10 +71,10 @@ class DriveNode(Node):  # type: ignore[misc]
             robot=written['robot'], dead_man=own['dead_man'], max_age=own['max_age'],
             max_jump=own['max_jump'], max_deviation=own['max_deviation'],
             resample_scan=own['resample_scan'], any_start=own['any_start'],
-            start_on=own['start_on'])
+            start_on=own['start_on'], any_map=own['any_map'], own_map=written['map'])
         self.core = core.Core(settings, worker.Worker(folder, written['controller_sha256']))
         self._wait = 0.5 * settings.dt
-        self._mounts: dict[str, float | None] = {}
+        self._mounts: dict[str, float] = {}
         self._said = ''
         self._buffer = Buffer()
         self._listener = TransformListener(self._buffer, self)
@@ -84,6 +90,8 @@ class DriveNode(Node):  # type: ignore[misc]
         elif own['covariance_topic']:
             self.create_subscription(
                 PoseWithCovarianceStamped, own['covariance_topic'], self._on_localised, kept)
+        if not own['any_map']:
+            self.create_subscription(OccupancyGrid, own['map_topic'], self._on_map, kept)
         self.get_logger().info(f'stops within (m): {settings.stops_within()}')
         self.publish(core.Command(0.0, 0.0, 'waiting'))
         self._dead_man = self._ask_dead_man()
@@ -131,20 +139,20 @@ class DriveNode(Node):  # type: ignore[misc]
     def _mount(self, frame: str) -> float | None:
         """Return the yaw of the scanner on the robot; None while tf does not know it."""
         if frame not in self._mounts:
+            base = self.own['base_frame']
             try:
-                found = self._buffer.lookup_transform(self.own['base_frame'], frame, Time())
+                found = self._buffer.lookup_transform(base, frame, Time())
             except TransformException:
+                self.core.refuse_scan(f'tf does not know where {frame} is on {base}')
                 return None
             place, turn = found.transform.translation, found.transform.rotation
-            offset = self.core.settings.robot.get('scanner_offset') or (0.0, 0.0)
-            off = math.dist((place.x, place.y), offset)
-            if off > 0.02:
-                self.core.end(
-                    f'the scanner is at ({place.x:.3f}, {place.y:.3f}) m on the robot, the '
-                    f'robot file has ({offset[0]:g}, {offset[1]:g})')
-            if abs(turn.x) > 0.02 or abs(turn.y) > 0.02:
-                self.core.end('the scanner is tilted or upside down: not supported')
-            self._mounts[frame] = motion.yaw_of(turn.x, turn.y, turn.z, turn.w)
+            try:
+                self._mounts[frame] = scans.mounted(
+                    self.core.settings.robot, (place.x, place.y),
+                    (turn.x, turn.y, turn.z, turn.w))
+            except scans.LayoutError as error:
+                self.core.end(str(error))
+                return None
         return self._mounts[frame]
 
     def _on_odom(self, message: Odometry) -> None:
@@ -153,6 +161,12 @@ class DriveNode(Node):  # type: ignore[misc]
         pose = motion.compose(tuple(self.own['origin']), own)
         self._on_localised(message)
         self.core.pose(_seconds(message.header.stamp), *pose)
+
+    def _on_map(self, message: OccupancyGrid) -> None:
+        own = message.info
+        place, turn = own.origin.position, own.origin.orientation
+        yaw = motion.yaw_of(turn.x, turn.y, turn.z, turn.w)
+        self.core.localiser_map((own.width, own.height), own.resolution, (place.x, place.y, yaw))
 
     def _on_localised(self, message: Any) -> None:
         own = message.pose.covariance
@@ -178,6 +192,7 @@ class DriveNode(Node):  # type: ignore[misc]
 
     def _tick(self) -> None:
         if not self._check_dead_man():
+            self.publish(core.Command(0.0, 0.0, 'waiting', 'no answer of dead_man_node yet'))
             return
         if self.own['pose_source'] == 'tf':
             self._look_up()
@@ -215,7 +230,7 @@ def main(args: Any = None) -> None:
         rclpy.spin(node)
     except KeyboardInterrupt:
         pass
-    except (core.SettingsError, OSError, ValueError) as error:
+    except (OSError, ParameterException, ValueError) as error:
         raise SystemExit(f'drive: {error}') from None
     finally:
         ending.ignore_signals()

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from .motion import yaw_of
+
 MOST_MISSING = 0.2
 """Largest share of rays without a value in a scan that counts."""
 MOST_ZERO = 0.5
@@ -17,6 +19,8 @@ Largest share of rays that read nothing, zeros of a near obstacle among them.
 A flat wall is in less than half of all directions.
 """
 MOST_RAYS = 20_000
+MOST_OFF = 0.02
+"""Largest distance of the scanner from where the robot file has it."""
 _NEAR, _NONE = -1.0, 1e9
 
 
@@ -48,6 +52,30 @@ class Layout:
     def angles(self) -> np.ndarray[Any, Any]:
         """Angles from the robot's heading, in order."""
         return np.asarray(self.mount + self.first + self.step * np.arange(self.count))
+
+
+def mounted(
+    robot: dict[str, Any], place: tuple[float, float], turn: tuple[float, float, float, float]
+) -> float:
+    """
+    Return the yaw of the scanner on the robot.
+
+    Args:
+        robot: See `settings.json`.
+        place: Where the scanner is on the robot.
+        turn: Its quaternion: x, y, z, w.
+
+    Raises LayoutError if it is not where the robot file has it, or not level.
+    """
+    offset = robot.get('scanner_offset') or (0.0, 0.0)
+    if not math.dist(place, offset) <= MOST_OFF:
+        raise LayoutError(
+            f'the scanner is at ({place[0]:.3f}, {place[1]:.3f}) m on the robot, the robot '
+            f'file has ({offset[0]:g}, {offset[1]:g})')
+    yaw = yaw_of(*turn)
+    if math.isnan(yaw) or max(abs(turn[0]), abs(turn[1])) > 0.02:
+        raise LayoutError('the scanner is tilted or upside down: not supported')
+    return yaw
 
 
 class Scanner:
@@ -151,8 +179,9 @@ class Scanner:
         Ranges of the task's rays, float32, and those of `guard_angles` for the guard.
 
         The first is None if too many rays have no value. Of the second, NaN is unknown, and inf
-        is free. A range of 0 is one without a return, as many drivers publish it; between 0
-        and the smallest range, something is too near. Where the robot file says that a ray
+        is free. A range of 0 is one without a return, as many drivers publish it; one between
+        0 and the smallest range, or -inf, is something too near, which the guard sees at the
+        smallest range. Where the robot file says that a ray
         reads 0 below the smallest range, a 0 counts as a value only in directions in which
         something can be so near, and only if at most `MOST_ZERO` of the rays read nothing.
         """
@@ -182,7 +211,7 @@ class Scanner:
             least = self._layout.range_min if self.blind is None else self.blind
             task = np.where(found == _NEAR, least, _filled(found, lost))
             task = task.astype(np.float32)
-        guard = np.where(near, np.nan, np.where(raw > self.range_max, np.inf, raw))
+        guard = np.maximum(np.where(raw > self.range_max, np.inf, raw), self._layout.range_min)
         guard = np.where(missing, np.nan, guard)
         return task, self._resampled(guard) if self.resample else guard
 
@@ -247,14 +276,30 @@ class Guard:
         rest = self.points - (x, y)
         points = rest @ np.array([[cosine, -sine], [sine, cosine]])
         far = self.stop * min(abs(v) / full, 1.0) + abs(v) * self.latency
-        way = np.linspace(0.0, math.copysign(far, v), 9)
-        turn = way * (omega / v)
-        half = 0.5 * turn
-        chord = way * np.sinc(half / math.pi)
-        centres = np.stack([chord * np.cos(half), chord * np.sin(half)], axis=1)
-        away = np.hypot(*(points[:, None, :] - centres[None, :, :]).transpose(2, 0, 1))
-        touched = (away < self.radius) & (away < away[:, :1] - 1e-4)
-        return bool(touched.any())
+        away = np.hypot(*points.T)
+        nearest = _from_arc(points, math.copysign(far, v), far * omega / abs(v))
+        return bool(((nearest < self.radius) & (nearest < away - 1e-4)).any())
+
+
+def _from_arc(points: np.ndarray[Any, Any], way: float, turn: float) -> np.ndarray[Any, Any]:
+    """
+    Distances of points, shape (n, 2), from an arc that begins at the origin along x.
+
+    Args:
+        points: The points.
+        way: Length of the arc; below 0 it leads backwards.
+        turn: Change of the heading along it.
+    """
+    x, y = points.T
+    if abs(turn) < 1e-6:
+        return np.asarray(np.hypot(x - np.clip(x, min(way, 0.0), max(way, 0.0)), y))
+    radius = way / turn  # of a circle around (0, radius); signed
+    end = radius * math.sin(turn), radius * (1.0 - math.cos(turn))
+    away = np.minimum(np.hypot(x, y), np.hypot(x - end[0], y - end[1]))
+    # How far along the circle a point lies, in the direction of the arc.
+    along = np.arctan2(x / radius, 1.0 - y / radius) * math.copysign(1.0, turn) % math.tau
+    ring = np.abs(np.hypot(x, y - radius) - abs(radius))
+    return np.asarray(np.where(along < abs(turn), ring, away))
 
 
 def _turns(angle: Any) -> Any:

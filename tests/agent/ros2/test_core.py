@@ -14,8 +14,16 @@ from hypothesis import strategies as st
 
 from tdac_agent.ros2.export import core_settings
 from tdac_agent.ros2.package.core import Command, Core, SettingsError
-from tdac_agent.ros2.package.motion import Wheels, compose, stamp_of, wrapped, yaw_of
-from tdac_agent.ros2.package.scans import Guard, Layout, LayoutError, Scanner
+from tdac_agent.ros2.package.motion import (
+    Wheels,
+    check_pose_parameters,
+    compose,
+    other_map,
+    stamp_of,
+    wrapped,
+    yaw_of,
+)
+from tdac_agent.ros2.package.scans import Guard, Layout, LayoutError, Scanner, mounted
 from tdac_agent.ros2.package.worker import Worker
 from tdac_agent.ros2.robot import Robot
 
@@ -212,17 +220,19 @@ def test_a_foot_before_the_scanner_stays(settings):
     omega=st.floats(-3, 3),
     x=st.floats(-0.3, 0.3),
     y=st.floats(-0.3, 0.3),
+    stop=st.sampled_from([0.045, 0.4, 2.0]),
 )
-def test_the_guard_sees_what_it_would_touch(v, omega, x, y):
-    """Compared with 500 places along the arc: nothing that comes nearer is missed."""
-    robot = {"radius": 0.1, "stopping_distance": 0.045}
+def test_the_guard_sees_what_it_would_touch(v, omega, x, y, stop):
+    """Compared with 5000 places along the arc: nothing that comes nearer is missed."""
+    robot = {"radius": 0.1, "stopping_distance": stop}
+    x, y = x * (1.0 + 5.0 * stop), y * (1.0 + 5.0 * stop)
     guard = Guard(robot, 0.1)
     angle, away = math.atan2(y, x), math.hypot(x, y)
     guard.see(np.array([away]), np.array([angle]))
     pose, least = (0.0, 0.0, 0.0), away
-    way = 0.045 * abs(v) / 0.3 + 0.1 * abs(v)
-    for _ in range(500):
-        time = way / 500 / abs(v) if v else 0.0
+    way = stop * abs(v) / 0.3 + 0.1 * abs(v)
+    for _ in range(5000):
+        time = way / 5000 / abs(v) if v else 0.0
         half = 0.5 * omega * time
         pose = compose(
             pose, (v * time * math.cos(half), v * time * math.sin(half), 2 * half)
@@ -233,6 +243,28 @@ def test_the_guard_sees_what_it_would_touch(v, omega, x, y):
     blocked = guard.blocked(v, omega, 0.3, (0.0, 0.0, 0.0))
     assert blocked or not touches
     assert not (blocked and free)
+
+
+def test_a_thin_pole_beside_a_long_way_is_seen(settings):
+    """A robot that needs 2 m to stop sees what it would graze on the way."""
+    robot = {**settings["robot"], "radius": 0.2, "stopping_distance": 2.0}
+    guard = Guard(robot, 0.1)
+    for x in np.linspace(0.3, 2.0, 40):
+        guard.see(np.array([math.hypot(x, 0.195)]), np.array([math.atan2(0.195, x)]))
+        assert guard.blocked(1.0, 0.0, 1.0, (0.0, 0.0, 0.0)), x
+
+
+def test_what_is_too_near_to_be_measured_is_ahead(settings):
+    """A range between 0 and the smallest one, or -inf, is no free way."""
+    for least in (0.05, -math.inf):
+        scanner = Scanner({**settings["robot"], "below_min": "range_min"})
+        scanner.use(Layout(60, 0.0, math.tau / 60, 0.1, 3.0))
+        guard = Guard(settings["robot"], 0.1)
+        guard.see(scanner.read([2.0] * 60)[1], scanner.guard_angles())
+        assert not guard.blocked(0.3, 0.0, 0.3, (0.0, 0.0, 0.0))
+        guard.see(scanner.read([least] + [2.0] * 59)[1], scanner.guard_angles())
+        assert guard.blocked(0.3, 0.0, 0.3, (0.0, 0.0, 0.0))
+        assert not guard.blocked(-0.3, 0.0, 0.3, (0.0, 0.0, 0.0))
 
 
 def test_the_goal_ends_the_drive(make_core, settings):
@@ -275,6 +307,40 @@ def test_waits_at_the_start(make_core, robot):
     assert drive(core, robot, 0.2)[-1].state == "driving"
 
 
+def test_a_robot_that_is_carried_away_while_it_plans_does_not_drive(make_core, robot):
+    """The start counts until the first motion; back at the start, it begins."""
+    core = make_core()
+    core._policy.waits = True
+    drive(core, robot, 0.3)
+
+    def elsewhere(core, robot, now):
+        x, y, yaw = robot.read().pose
+        core.pose(now, x + 0.5, y, yaw)
+        core.scan(now, robot.layout, robot.read().ranges)
+
+    drive(core, robot, 2.0, elsewhere)
+    core._policy.waits = False
+    commands = drive(core, robot, 1.0, elsewhere)
+    assert {(c.v, c.omega) for c in commands} == {(0.0, 0.0)}
+    assert "0.50 m and 0.00 rad from the verified start" in commands[-1].reason
+    assert drive(core, robot, 1.5)[-1].state == "driving"
+
+
+def test_a_call_counts_for_its_moment(make_core, robot):
+    """If the drive must not begin in the next period, it needs another call."""
+    core = make_core(start_on="service")
+    drive(core, robot, 0.3)
+    assert core.start(robot.time - robot.dt)[0]
+    core.publishers = 2
+    drive(core, robot, 0.1)
+    core.publishers = 1
+    commands = drive(core, robot, 1.0)
+    assert {(c.v, c.omega, c.state) for c in commands} == {(0.0, 0.0, "waiting")}
+    assert "call the service start" in commands[-1].reason
+    assert core.start(robot.time - robot.dt)[0]
+    assert drive(core, robot, 0.1)[-1].state == "driving"
+
+
 def test_the_drive_is_held_until_it_is_started(make_core, robot):
     """With `service`, nothing moves before the call; an early call begins nothing."""
     core = make_core(start_on="service")
@@ -302,8 +368,53 @@ def test_a_timer_that_is_missing_or_too_long_ends_the_drive(make_core, values, g
     assert core.final is None
     core.check_timer("cmd_vel_timeout of /base", values)
     assert core.final.reason == (
-        f"cmd_vel_timeout of /base: expected above 0 and at most 0.3 s, got {got}"
+        "cmd_vel_timeout of /base: expected above 0 and at most dead_man, 0.3 s, "
+        f"got {got}"
     )
+
+
+def test_a_timer_that_is_longer_than_declared_ends_the_drive(make_core):
+    """The stated distances are those of the declared one."""
+    core = make_core(dead_man=0.1)
+    core.check_timer("cmd_vel_timeout of /base", [0.2])
+    assert "at most dead_man, 0.1 s, got 0.2" in core.final.reason
+
+
+def test_a_clock_that_goes_back_ends_the_drive(make_core, robot):
+    """A simulation that begins again, or a clock that is set: never again a motion."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    for step in range(20):  # beyond the time at which it went back
+        see(core, robot, 0.1 * step)
+        command = core.tick(0.1 * step, 0.0)
+        assert (command.v, command.omega, command.state) == (0.0, 0.0, "failed")
+    assert command.reason == "the clock went back by 0.4 s: start the node again"
+    assert core.start(0.0) == (False, f"failed: {command.reason}")
+
+
+def test_a_clock_that_is_slewed_by_less_than_a_period_ends_nothing(make_core, robot):
+    """Meanwhile time stands still, so that no data look newer than they are."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    see(core, robot, 0.5)
+    assert core.tick(0.5, 0.0).state == "driving"
+    assert core.tick(0.42, 0.0).state == "driving"
+    see(core, robot, 0.6)
+    assert core.tick(0.6, 0.0).state == "driving"
+
+
+@pytest.mark.parametrize("missing", ["scan", "pose"])
+def test_one_stamp_of_the_future_blocks_no_later_data(make_core, robot, missing):
+    """The robot stands because of it, and goes on with the next scan and pose."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    late = robot.time + 1000.0
+    see(core, robot, late, **{"scan": False, "pose": False, missing: True})
+    command = core.tick(robot.time, 0.0)
+    assert command.v == 0.0
+    assert f"the {missing} is more than 0.3 s ahead of the clock" in command.reason
+    # The pose did not move as commanded in 1000 s, so it must be steady first.
+    assert drive(core, robot, 1.5)[-1].state == "driving"
 
 
 def test_a_clock_that_differs_is_named(make_core, robot):
@@ -334,6 +445,99 @@ def test_the_timer_of_the_robot_is_required(settings, dead_man):
     """A robot that does not stop by itself within three periods is not driven."""
     with pytest.raises(SettingsError, match="dead_man: expected"):
         core_settings(settings, dead_man=dead_man)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"dt": math.nan},
+        {"horizon": 0},
+        {"goal_tolerance": math.inf},
+        {"start": (math.nan, 0.0, 0.0)},
+        {"goal": (0.0, 1e9)},
+    ],
+)
+def test_a_task_of_impossible_numbers_is_refused(make_core, changes):
+    """`settings.json` may have been edited."""
+    with pytest.raises(SettingsError, match="expected"):
+        make_core(**changes)
+
+
+@pytest.mark.parametrize(
+    ("source", "origin", "tolerance", "why"),
+    [
+        ("odometry", (0, 0, 0), 0.0, "pose_source: expected tf or odom"),
+        ("odom", (0.0, 0.0), 0.0, "origin: expected x, y, yaw"),
+        ("odom", (0.0, math.nan, 0.0), 0.0, "origin: expected x, y, yaw"),
+        ("tf", (0, 0, 0), -1.0, "transform_tolerance: expected 0 or more"),
+        ("tf", (0, 0, 0), math.nan, "transform_tolerance: expected 0 or more"),
+    ],
+)
+def test_parameters_of_the_pose_that_are_impossible(source, origin, tolerance, why):
+    """The node ends at its start, with one line."""
+    with pytest.raises(ValueError, match=why):
+        check_pose_parameters(source, origin, tolerance)
+    check_pose_parameters("odom", [1.0, 2.0, 0.5], 1.0)
+
+
+MAP = {"size": [60, 40], "resolution": 0.05, "origin": [-1.0, -1.0, 0.0]}
+
+
+@pytest.mark.parametrize(
+    ("size", "resolution", "origin"),
+    [
+        ((61, 40), 0.05, (-1.0, -1.0, 0.0)),
+        ((40, 60), 0.05, (-1.0, -1.0, 0.0)),
+        ((60, 40), 0.051, (-1.0, -1.0, 0.0)),
+        ((60, 40), math.nan, (-1.0, -1.0, 0.0)),
+        ((60, 40), 0.05, (-1.01, -1.0, 0.0)),
+        ((60, 40), 0.05, (math.nan, -1.0, 0.0)),
+        ((60, 40), 0.05, (-1.0, -1.0, 0.01)),
+        ((60, 40), 0.05, (-1.0, -1.0, math.nan)),
+    ],
+)
+def test_a_localiser_with_another_map_ends_the_drive(
+    make_core, robot, size, resolution, origin
+):
+    """A map that was scanned again has another size or origin; `any_map` takes it."""
+    core = make_core(own_map=MAP)
+    core.localiser_map(size, resolution, origin)
+    command = drive(core, robot, 0.2)[-1]
+    assert (command.v, command.state) == (0.0, "failed")
+    assert "the localiser has another map: " in command.reason
+    assert "verified with 60 x 40 cells of 0.05 m from (-1, -1, 0)" in command.reason
+    core = make_core(own_map=MAP, any_map=True)
+    core.localiser_map(size, resolution, origin)
+    assert drive(core, robot, 0.2)[-1].state == "driving"
+
+
+def test_the_map_of_the_verification_is_taken(make_core, settings):
+    """With the resolution of a message, which is float32."""
+    assert settings["map"] == MAP
+    core = make_core()
+    core.localiser_map((60, 40), float(np.float32(0.05)), (-1.0, -1.0, 1e-17))
+    assert core.final is None
+    big = {"size": [4000, 4000], "resolution": 0.05, "origin": [0.0, 0.0, math.pi]}
+    turned = (0.0, 0.0, -math.pi)
+    assert other_map(big, (4000, 4000), float(np.float32(0.05)), turned) == ""
+
+
+@pytest.mark.parametrize(
+    ("place", "turn", "why"),
+    [
+        ((0.0, 0.0), (0.0, 0.0, 0.0, 1.0), "the robot file has (-0.03, 0)"),
+        ((math.nan, 0.0), (0.0, 0.0, 0.0, 1.0), "the robot file has"),
+        ((-0.03, 0.0), (1.0, 0.0, 0.0, 0.0), "tilted or upside down"),
+        ((-0.03, 0.0), (0.0, 0.0, 0.0, 0.0), "tilted or upside down"),
+    ],
+)
+def test_a_scanner_that_is_not_where_the_robot_file_says(settings, place, turn, why):
+    """Its place and that it is level; it may be turned."""
+    with pytest.raises(LayoutError) as error:
+        mounted(settings["robot"], place, turn)
+    assert why in str(error.value)
+    turned = mounted(settings["robot"], (-0.03, 0.0), (0.0, 0.0, 1.0, 0.0))
+    assert turned == pytest.approx(math.pi)
 
 
 def test_a_scan_of_another_robot_is_refused(make_core, settings):
@@ -717,6 +921,12 @@ def test_yaw_of_a_quaternion(yaw):
     found = yaw_of(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
     assert math.isclose(math.cos(found), math.cos(yaw), abs_tol=1e-9)
     assert math.isclose(math.sin(found), math.sin(yaw), abs_tol=1e-9)
+
+
+@pytest.mark.parametrize("w", [0.0, 0.9, 2.0, math.nan, math.inf])
+def test_what_is_no_turn_is_no_pose(w):
+    """A quaternion of another length than 1, such as one of zeros."""
+    assert math.isnan(yaw_of(0.0, 0.0, 0.0, w))
 
 
 @given(a=st.tuples(PLACES, PLACES, ANGLES), b=st.tuples(PLACES, PLACES, ANGLES))

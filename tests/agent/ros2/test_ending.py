@@ -34,11 +34,15 @@ def test_the_last_command_is_sent_over_three_periods():
     assert sent[-1] - sent[0] >= 0.3
 
 
-@pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_second_signal_skips_no_zero(first):
     """After the first signal, others change nothing until the last zero is sent."""
     command = [sys.executable, "-c", PROGRAM]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    # As in a terminal; these tests may run under nohup.
+    kept = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    signal.signal(signal.SIGHUP, kept)
+    with process:
         assert process.stdout.readline() == "ready\n"
         process.send_signal(first)
         assert process.stdout.readline() == "zero\n"
@@ -47,3 +51,16 @@ def test_a_second_signal_skips_no_zero(first):
         rest = process.communicate(timeout=60)[0].split()
     assert rest == ["zero"] * (ZEROS - 1) + ["end"]
     assert process.returncode == 0
+
+
+def test_under_nohup_a_closed_terminal_changes_nothing():
+    """The node goes on until it is told to end."""
+    command = ["nohup", sys.executable, "-c", PROGRAM]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGHUP)
+        with pytest.raises(subprocess.TimeoutExpired):
+            process.wait(timeout=1.0)
+        process.send_signal(signal.SIGTERM)
+        rest = process.communicate(timeout=60)[0].split()
+    assert rest == ["zero"] * ZEROS + ["end"]

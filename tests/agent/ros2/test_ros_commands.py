@@ -86,6 +86,21 @@ def test_flags_that_are_wrong(tdac, run):
     refused(tdac("ros", "drive", run), "is not a package of tdac export ros2")
 
 
+@pytest.mark.parametrize(
+    ("flags", "why"),
+    [
+        (["--max-jump", "-1"], "max_jump: expected 0 or more, got -1"),
+        (["--max-deviation", "-1"], "max_deviation: expected 0 or more, got -1"),
+        (["--dead-man", "0.5"], "dead_man: expected"),
+        (["--transform-tolerance", "-1"], "transform_tolerance: expected 0 or more"),
+    ],
+)
+def test_settings_of_a_drive_that_are_impossible(tdac, package, flags, why):
+    """They have the names of the node's parameters."""
+    pytest.importorskip("cyclonedds", reason="no wheel of Cyclone DDS")
+    refused(tdac("ros", "drive", package, "--domain", "17", *flags), why)
+
+
 def test_the_extra_is_named(tdac, run, monkeypatch):
     """Without Cyclone DDS, one line says what to install."""
     found = importlib.util.find_spec

@@ -1,5 +1,6 @@
 """An exported package drives the simulated robot over DDS, whatever goes wrong."""
 
+import dataclasses
 import marshal
 import math
 import os
@@ -12,13 +13,15 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from floor_task import Ready, forward
 
 pytest.importorskip("cyclonedds", reason="no wheel of Cyclone DDS")
 
 from tdac_agent.errors import RunError
 from tdac_agent.ros2 import messages as msg
-from tdac_agent.ros2.dds import Bus
+from tdac_agent.ros2.dds import Bus, time_of
 from tdac_agent.ros2.drive import Node, open_package
 from tdac_agent.ros2.export import core_settings
 from tdac_agent.ros2.faults import STOPPING, Fault, drawn_faults, read_fault
@@ -321,6 +324,166 @@ def test_messages_of_strangers_move_nothing(package, domain, here, origin):
         sent.append(node.core.tick(time.time(), 0.0))
     assert {(each.v, each.omega) for each in sent} == {(0.0, 0.0)}
     assert len(node._frames) <= 100
+
+
+class Listening:
+    """A node of this process, to which a test sends what it likes.
+
+    Attributes:
+        core: Its core, with a policy that drives straight ahead.
+    """
+
+    def __init__(self, package, domain, **flags):
+        bus = Bus(domain)
+        names = ("scan", "odom", "tf", "tf_static", "map", "amcl_pose")
+        self._out = {name: bus.writer(name) for name in names}
+        flags = {"dead_man": 0.3, "policy": Ready(forward), **flags}
+        self._node = Node(open_package(package), bus, sim_time=True, **flags)
+        self.core = self._node.core
+
+    def hear(self, *messages):
+        """Sends messages, as (topic, message), one after the other."""
+        for name, message in messages:
+            self._out[name].write(message)
+            time.sleep(0.02)
+            self._node._hear()
+
+    def moves(self, now):
+        """Whether the command of a time is a motion."""
+        return self.core.tick(now, 0.0).v > 0.0
+
+
+def placed(stamp, parent, child, pose):
+    """A transform on /tf, or on /tf_static if it has no time."""
+    x, y, yaw = pose
+    turn = msg.Quaternion(0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
+    move = msg.Transform(msg.Vector3(x, y), turn)
+    header = msg.Header(time_of(stamp or 0.0), parent)
+    own = msg.TFMessage([msg.TransformStamped(header, child, move)])
+    return ("tf_static" if stamp is None else "tf"), own
+
+
+def scanned(stamp, ranges, first=0.0):
+    """A scan of a whole turn."""
+    header = msg.Header(time_of(stamp), "base_scan")
+    step, last = math.tau / len(ranges), first + math.tau
+    angles = first, last, step
+    return "scan", msg.LaserScan(header, *angles, 0.0, 0.1, 0.1, 3.0, list(ranges))
+
+
+SCANNER = placed(None, "base_link", "base_scan", (-0.03, 0.0, 0.0))
+FREE = [2.0] * 60
+
+
+def test_a_pose_through_the_frames_of_a_turtlebot(package, settings, domain, here):
+    """Its odometry moves base_footprint, and base_link stands on it, in /tf_static."""
+    node = Listening(package, domain)
+    start = tuple(settings["start"])
+    node.hear(
+        SCANNER,
+        placed(None, "base_footprint", "base_link", (0.0, 0.0, 0.0)),
+        placed(2.0, "map", "odom", start),
+        placed(1.0, "odom", "base_footprint", (0.0, 0.0, 0.0)),
+        scanned(1.0, FREE),
+    )
+    assert node.moves(1.0)
+
+
+@pytest.mark.parametrize(("tolerance", "moves"), [(1.0, False), (0.0, True)])
+def test_a_localiser_that_is_silent(package, settings, domain, here, tolerance, moves):
+    """With the tolerance of AMCL it is noticed, however new the odometry is."""
+    node = Listening(package, domain, transform_tolerance=tolerance, any_start=True)
+    node.hear(SCANNER, placed(2.0, "map", "odom", settings["start"]))
+    for now in (1.0, 1.1, 1.2, 1.35):
+        still = placed(now, "odom", "base_link", (0.0, 0.0, 0.0))
+        node.hear(still, scanned(now, FREE))
+        last = node.core.tick(now, 0.0)
+        node.core.drove(0.0, 0.0)
+        assert last.v > 0.0 or now == 1.35
+    assert (last.v > 0.0) == moves
+    assert moves or last.reason == "the last pose is older than 0.3 s"
+
+
+def test_a_scanner_that_looks_back_is_turned(package, settings, domain, here):
+    """A mounting that tf does not know counts as none; a wrong place ends the drive."""
+    node = Listening(package, domain)
+    wall = [0.2 if min(i, 60 - i) <= 4 else 2.0 for i in range(60)]
+    back = placed(None, "base_link", "base_scan", (-0.03, 0.0, math.pi))
+    node.hear(
+        placed(1.0, "map", "odom", settings["start"]),
+        placed(1.0, "odom", "base_link", (0.0, 0.0, 0.0)),
+        scanned(1.0, wall, first=-math.pi),
+    )
+    reason = node.core.tick(1.0, 0.0).reason
+    assert reason == "no scan yet: tf does not know where base_scan is on base_link"
+    node.hear(back, scanned(1.0, wall, first=-math.pi))
+    assert "something is ahead" in node.core.tick(1.0, 0.0).reason
+    seen = node.core.observation()["ranges"]
+    assert np.allclose(seen, wall)
+    elsewhere = placed(None, "base_link", "base_scan", (0.03, 0.0, math.pi))
+    node.hear(elsewhere, scanned(1.1, wall, first=-math.pi))
+    assert node.core.final.reason.startswith("the scanner is at (0.030, 0.000) m")
+
+
+def test_a_localiser_with_another_map(package, settings, task, domain, here):
+    """The map of the simulated robot is taken, the one of another place is not."""
+    node = Listening(package, domain)
+    own = Simulator(robot_of(task, settings), Bus(domain))._map()
+    node.hear(("map", own))
+    assert node.core.final is None
+    own.info.width += 1
+    node.hear(("map", own))
+    assert "has another map: 61 x 40 cells of 0.05 m" in node.core.final.reason
+    other = Listening(package, domain, any_map=True)
+    other.hear(("map", own))
+    assert other.core.final is None
+
+
+@pytest.mark.parametrize("resample", [False, True])
+def test_scans_with_other_numbers_of_rays(package, settings, domain, here, resample):
+    """Such as those of the LDS-02: they need `resample_scan`."""
+    node = Listening(package, domain, resample_scan=resample)
+    node.hear(
+        SCANNER,
+        placed(1.0, "map", "odom", settings["start"]),
+        placed(1.0, "odom", "base_link", (0.0, 0.0, 0.0)),
+        scanned(1.0, [2.0] * 55, first=0.05),
+    )
+    assert node.moves(1.0) == resample
+    node.hear(scanned(1.1, [2.0] * 63, first=0.02))
+    last = node.core.tick(1.1, 0.0)
+    assert (last.state == "driving") == resample
+    assert resample or "set resample_scan if only the number" in last.reason
+
+
+class Varying(Robot):
+    """A robot whose scans have another number of rays each time."""
+
+    count = 60
+
+    def step(self):
+        super().step()
+        self.count = 57 + (self.count * 7) % 11
+
+    @property
+    def layout(self):
+        own = super().layout
+        return dataclasses.replace(own, count=self.count, step=math.tau / self.count)
+
+    def read(self):
+        reading = super().read()
+        nearest = np.round(np.arange(self.count) * 60 / self.count).astype(int) % 60
+        return dataclasses.replace(reading, ranges=reading.ranges[nearest])
+
+
+@pytest.mark.slow
+def test_a_drive_with_scans_of_varying_size(task, settings, package, domain):
+    """`tdac ros drive --resample-scan` reaches the goal with them."""
+    with NodeProcess(package, domain, "--resample-scan") as node:
+        robot = Varying(task, settings, dead_man=0.3)
+        report = Simulator(robot, Bus(domain), patience=30.0).run(60.0)
+        printed = node.output()
+    assert (report.outcome, report.contact) == ("reached", ""), printed
 
 
 @pytest.mark.parametrize(

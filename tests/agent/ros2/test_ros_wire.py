@@ -49,6 +49,13 @@ MESSAGES = [
             msg.Pose(msg.Point(1.0, 2.0, 3.0), TURN), [float(i) for i in range(36)]
         ),
     ),
+    msg.OccupancyGrid(
+        HEADER,
+        msg.MapMetaData(
+            HEADER.stamp, 0.05, 3, 2, msg.Pose(msg.Point(-1.0, 2.0, 0.0), TURN)
+        ),
+        [0, 100, -1, 50, 0, 0],
+    ),
     msg.TFMessage(
         [
             msg.TransformStamped(
@@ -97,7 +104,7 @@ def test_topics_have_the_names_types_and_qos_of_ros(task, settings):
     other = DomainParticipant(DOMAIN)
     reader = BuiltinDataReader(other, BuiltinTopicDcpsPublication)
     end, seen = time.monotonic() + 10.0, {}
-    while len(seen) < 6 and time.monotonic() < end:
+    while len(seen) < 7 and time.monotonic() < end:
         for each in reader.take(100):
             if hasattr(each, "topic_name") and each.topic_name.startswith("rt/"):
                 seen[each.topic_name] = each
@@ -107,6 +114,7 @@ def test_topics_have_the_names_types_and_qos_of_ros(task, settings):
         "rt/odom": "nav_msgs::msg::dds_::Odometry_",
         "rt/tf": "tf2_msgs::msg::dds_::TFMessage_",
         "rt/tf_static": "tf2_msgs::msg::dds_::TFMessage_",
+        "rt/map": "nav_msgs::msg::dds_::OccupancyGrid_",
         "rt/amcl_pose": "geometry_msgs::msg::dds_::PoseWithCovarianceStamped_",
         "rt/clock": "rosgraph_msgs::msg::dds_::Clock_",
     }
@@ -116,7 +124,7 @@ def test_topics_have_the_names_types_and_qos_of_ros(task, settings):
         "rt/scan",
         "rt/clock",
     }
-    for name in ("rt/tf_static", "rt/amcl_pose"):
+    for name in ("rt/tf_static", "rt/map", "rt/amcl_pose"):
         lasting = seen[name].qos[Policy.Durability]
         assert lasting == Policy.Durability.TransientLocal
     assert seen["rt/scan"].qos[Policy.Durability] == Policy.Durability.Volatile
