@@ -200,7 +200,9 @@ def rollouts(
         for number in numbers:
             place = folder / f"controller-{number}"
             place.mkdir()
-            source = entrant.source
+            source, file = entrant.source, entrant.policy.file
+            if source is None and file is not None:
+                source = file.read_bytes()
             assert source is not None
             worlds.supply(_Folder(place), number, Program(source))  # type: ignore[arg-type]
             record: Record = worlds.record(number)

@@ -21,7 +21,8 @@ from tdac_envs.grid.grid import OccupancyGrid
 from tdac_envs.grid.map_units import PIXELS, MapUnits
 from tdac_envs.grid.plan import Path as Path2D
 from tdac_envs.grid.plan import path_length
-from tdac_envs.map2d.source import units_of
+from tdac_envs.map2d.robot_options import options_of
+from tdac_envs.map2d.source import metric_units, units_of
 from tdac_envs.map2d.task import Terrain, make_task
 from tdac_envs.mapping.bundled import BundledMap, bundled_map, bundled_maps
 from tdac_envs.mapping.candidates import MapCandidate
@@ -31,6 +32,7 @@ from tdac_envs.mapping.params import MapParams, ReadingOptions
 from tdac_envs.mapping.preprocessing import preprocess_with_candidates
 from tdac_envs.mapping.ros_writer import ROS_FILES, write_ros_map
 from tdac_envs.mapping.wording import obstacles_text, scale_text
+from tdac_envs.robots.bundled import load_robot
 
 SHOWN, EXPLAINED = 8, 2
 LEGEND = (
@@ -68,7 +70,7 @@ def run(options: MapOptions, flags: TaskFlags) -> None:
             source,
             task.start,
             task.goal,
-            task.robot_radius,
+            _radius(task, str(path)),
             preset=options.preset,
             snap=task.snap,
             heading=task.heading or 0.0,
@@ -95,13 +97,22 @@ def run(options: MapOptions, flags: TaskFlags) -> None:
     _print_reading(console, params, ranked[0], units)
     if task.start is not None:  # candidates have figures only if there is a task
         _print_candidates(console, ranked, units)
-        _print_drive(console, params, shortest, units)
+        _print_drive(console, params, shortest, units, flags.robot)
     _print_files(console, params, folder, units)
     if options.ros:
         yaml = folder / ROS_FILES[0]
         print_plain(
             console, f"the grid as a ROS map: {yaml} ({params.resolution:g} m per px)"
         )
+
+
+def _radius(flags: TaskFlags, source: str) -> float | None:
+    """The body's radius, px: as typed, or else of the robot that the flags name."""
+    if flags.robot is None or flags.robot_radius is not None:
+        return flags.robot_radius
+    metric = metric_units(source, flags.resolution)
+    own = options_of(load_robot(flags.robot), metric, False, disturbed=False)
+    return float(own["robot_radius"])
 
 
 def _or_else(flags: TaskFlags, bundled: BundledMap) -> TaskFlags:
@@ -128,14 +139,22 @@ def _shortest_path(grid: OccupancyGrid, params: MapParams) -> Path2D | None:
 
 
 def _print_drive(
-    console: Console, params: MapParams, shortest: Path2D | None, units: MapUnits
+    console: Console,
+    params: MapParams,
+    shortest: Path2D | None,
+    units: MapUnits,
+    robot: str | None,
 ) -> None:
     """Prints the shortest path and, in metres, the robot."""
     if shortest is not None:
         length = units.length(path_length(shortest), 0)
         console.print(f"shortest path {length}: with every shortcut for this body")
     if units != PIXELS:
-        console.print(escape(robot_text(params.robot, units)), soft_wrap=True)
+        text = robot_text(params.robot, units)
+        if robot is not None:
+            radius = units.written_length(params.robot.radius)
+            text = f"robot: {robot}, radius {radius:g} {units.name}"
+        console.print(escape(text), soft_wrap=True)
         print_sentences(
             console,
             "metres of the map's frame; here, start and goal are the centres of the "

@@ -209,12 +209,14 @@ def figure_bytes(figure: Figure, kind: str = "svg") -> bytes:
     cannot see it.
     """
     stream = io.BytesIO()
-    stamp: dict[str, str | None] | None
-    stamp = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    if kind == "svg" and figure.get_label():
-        stamp = {"Date": None, "Title": str(figure.get_label())}
+    stamps: dict[str, dict[str, str | None]] = {
+        "svg": {"Date": None},
+        "pdf": {"CreationDate": None},
+    }
+    if figure.get_label():
+        stamps["svg"]["Title"] = str(figure.get_label())
     with rc_context({"svg.hashsalt": "tdac"}):  # for the ids of elements
-        figure.savefig(stream, format=kind, dpi=150, metadata=stamp)
+        figure.savefig(stream, format=kind, dpi=150, metadata=stamps.get(kind))
     return stream.getvalue()
 
 

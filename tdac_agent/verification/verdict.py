@@ -83,11 +83,12 @@ def not_covered(report: EpisodeReport) -> str:
     drove_with, missing = report.provenance.disturbance, ["other worlds"]
     if drove_with is not None:
         wheels = drove_with.wheel_gains or drove_with.wheel_radius_error
-        delay = drove_with.delay or drove_with.pose_delay or drove_with.scan_delay
+        sensed_late = drove_with.pose_delay or drove_with.scan_delay
         parts = {
             "noise of ranges": drove_with.range_noise,
             "slip": drove_with.wheel_slip,
-            "delays": delay,
+            "late actions": drove_with.delay or drove_with.motor_lag,
+            "late readings": sensed_late,
             "unequal wheels": wheels,
             "a wrong pose": drove_with.pose_noise and drove_with.heading_noise,
             "missing ranges": drove_with.range_dropout,

@@ -153,6 +153,22 @@ def test_a_heading_of_the_map_command(tdac, ros):
     assert (code, err) == (2, "error: --heading needs --start X Y\n")
 
 
+def test_the_radius_of_a_named_robot(tdac, refused, ros):
+    """`--robot` is enough; the table keeps its body away from walls."""
+    ends = "--start", *START, "--goal", *GOAL
+    words = "map", ros, *ends, "--robot", "turtlebot3-burger"
+    code, out, _ = tdac(*words)
+    assert code == 0
+    assert "robot: turtlebot3-burger, radius 0.105 m" in out
+    params = json.loads(tdac(*words, "--json")[1])["params"]
+    assert params["robot"]["radius"] == pytest.approx(1.05)
+    params = json.loads(tdac(*words, "--radius", "0.2", "--json")[1])["params"]
+    assert params["robot"]["radius"] == pytest.approx(2.0)
+    assert "no robot file" in refused("map", ros, *ends, "--robot", "no.yaml")
+    grid = "map", ros.parent / "plan.png", "--robot", "turtlebot3-burger"
+    assert "the map has no resolution" in refused(*grid)
+
+
 def test_a_numpy_grid(tdac, done, refused, tmp_path):
     """What `gym.make` and `synth` read, `map` reads, too."""
     np.save(tmp_path / "grid.npy", small_cells())

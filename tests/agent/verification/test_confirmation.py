@@ -96,17 +96,19 @@ def test_a_good_controller_is_confirmed(small_task, good_source, warm, tmp_path)
     assert report.provenance.disturbance == DISTURBANCE
     assert report.scores is None  # it was selected by the test
     assert confirmed_text(report).startswith("arrives ≥ 95 % (")
-    assert "not covered: other worlds, delays" in verified_text(report)
+    assert "not covered: other worlds, late actions, late readings" in verified_text(
+        report
+    )
     assert seen[-1] == (93, report.successes)
     calm = report.provenance.model_copy(update={"disturbance": Disturbance.none()})
     quiet = verified_text(report.model_copy(update={"provenance": calm}))
-    assert "other worlds, noise of ranges, slip, delays" in quiet
+    assert "other worlds, noise of ranges, slip, late actions" in quiet
     burger = load_robot("turtlebot3-burger").disturbances()
     own = Disturbance.none().changed(burger)
     drove_with = report.provenance.model_copy(update={"disturbance": own})
     assert not_covered(report.model_copy(update={"provenance": drove_with})) == (
-        "other worlds, missing ranges, lost messages, another axle, other physics "
-        "(floor, motors, battery)"
+        "other worlds, late actions, missing ranges, lost messages, another axle, other "
+        "physics (floor, motors, battery)"
     )
     kept = EpisodeReport.model_validate_json((tmp_path / "episodes.json").read_text())
     assert kept == report
