@@ -16,6 +16,8 @@
 #                     after an interruption it goes on.
 #   make notebooks    The notebooks, executed and kept with their outputs. Selected ones:
 #                     make notebooks NOTEBOOKS="02 05"
+#   make pictures     The pictures of the docs whose inputs have changed. Selected ones:
+#                     make pictures PICTURES="studio.png"
 #   make docs         The site, in build/site, with its links checked. The outputs of its
 #                     notebooks must belong to their code; they are not executed.
 #   make linkcheck    Links to other sites; needs a network.
@@ -35,7 +37,7 @@ PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: synth test test-all slow slow-sample lint bench portability clients results-rl \
-	notebooks docs linkcheck clean
+	notebooks pictures docs linkcheck clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
@@ -67,6 +69,9 @@ results-rl: $(VENV)/.installed
 
 notebooks: $(VENV)/.test-installed
 	$(BIN)/python -m tools.notebooks $(NOTEBOOKS)
+
+pictures: $(VENV)/.test-installed
+	$(BIN)/python -m tools.pictures $(PICTURES)
 
 docs: $(VENV)/.docs-installed
 	$(BIN)/python -m tools.notebooks --check

@@ -1,11 +1,11 @@
 """Draws docs/movers.png: an office in which discs bounce off walls.
 
-Run `python tools/draw_movers.py`.
+Usage: python -m tools.draw_movers [FILE]
 """
 
 from __future__ import annotations
 
-from pathlib import Path
+import sys
 
 import gymnasium as gym
 import numpy as np
@@ -14,7 +14,6 @@ from PIL import Image
 import tdac_envs  # noqa: F401 - registers the environments
 
 STEPS = 60
-PICTURE = Path(__file__).resolve().parents[1] / "docs" / "movers.png"
 
 
 def main() -> None:
@@ -29,7 +28,8 @@ def main() -> None:
     for _ in range(STEPS):
         env.step(np.array([0.1, -0.1], np.float32))
     frame = Image.fromarray(env.render())
-    frame.quantize(256).save(PICTURE, optimize=True)
+    file = sys.argv[1] if sys.argv[1:] else "docs/movers.png"
+    frame.quantize(256).save(file, optimize=True)
 
 
 if __name__ == "__main__":

@@ -22,7 +22,8 @@ import numpy as np
 
 from tdac_agent import load_task, synthesize
 from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.runs.history import CandidateHistory, Told, gather_run
+from tdac_agent.html_report.story import changed_in, told_of
+from tdac_agent.runs.history import CandidateHistory, RunHistory, gather_run
 from tdac_envs.drawing.canvas import INK, PAPER, Image, blank, write_text
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drawing.video import write_video
@@ -43,27 +44,28 @@ def repair(out: Path) -> None:
         write_video(_frames(told), out / "repair.gif", FPS)
 
 
-def _frames(told: Told) -> Iterator[Image]:
-    for one in told.tried:
+def _frames(told: RunHistory) -> Iterator[Image]:
+    for number, one in enumerate(told.tried, 1):
         trajectory = dict(one.trajectories())["nominal"]
-        before, after = _captions(one)
+        before, after = _captions(one, number, trajectory.dt)
         yield from _episode(told, trajectory, before, after)
 
 
-def _captions(one: CandidateHistory) -> tuple[str, str]:
-    """What is written below a candidate that drives, and that has driven."""
+def _captions(one: CandidateHistory, number: int, dt: float) -> tuple[str, str]:
+    """What is written below a version that drives, and that has driven."""
     assert one.report is not None
-    name = f"Candidate {one.j + 1}"
-    if one.state == "passed":
-        return f"{name}, repaired", f"{name}: all tests passed. Verified."
-    failed = next(f for f in one.report.failures if f.diagnosis is not None)
-    assert failed.diagnosis is not None
-    text = failed.diagnosis.text.partition(". ")[0]
-    return name, f"{name}: {len(one.failed)} tests failed. {text}."
+    name = f"Version {number}"
+    before = f"{name}, of tdac's template, drives."
+    if number > 1:
+        before = (
+            f"The failure is told, and the template is tuned: {changed_in(one)}. "
+            f"{name} drives."
+        )
+    return before, f"{name}. {told_of(one.report, {'dt': dt})}"
 
 
 def _episode(
-    told: Told, trajectory: Trajectory, before: str, after: str
+    told: RunHistory, trajectory: Trajectory, before: str, after: str
 ) -> Iterator[Image]:
     assert told.task is not None
     nominal = told.task.nominal
@@ -125,17 +127,23 @@ def _thinned(source: cv2.VideoCapture, stride: int, width: int) -> Iterator[Imag
 
 
 def main() -> None:
-    """Draws all of them."""
+    """Draws all of them, or one."""
     parser = argparse.ArgumentParser(prog="python -m tools.moving_pictures")
     parser.add_argument("out", type=Path)
-    out = parser.parse_args().out
-    repair(out)
-    with tempfile.TemporaryDirectory() as name:
-        for task, file in (("maze", "map2d.gif"), ("epuck", "epuck.gif")):
-            folder = Path(name) / task
-            synthesize(load_task(task), learner="builtin", out=folder)
-            drive(str(folder), 7.0, out / file)
-    drive("builtin --set moving --split dev --index 3", 3.0, out / "ladder.gif", 360)
+    parser.add_argument("--only", default="", help="name of one, such as map2d.gif")
+    given = parser.parse_args()
+    out, only = given.out, given.only
+    if only in ("", "repair.gif"):
+        repair(out)
+    for task, file in (("maze", "map2d.gif"), ("epuck", "epuck.gif")):
+        if only in ("", file):
+            with tempfile.TemporaryDirectory() as name:
+                folder = Path(name) / task
+                synthesize(load_task(task), learner="builtin", out=folder)
+                drive(str(folder), 7.0, out / file)
+    if only in ("", "ladder.gif"):
+        episode = "builtin --set moving --split dev --index 3"
+        drive(episode, 3.0, out / "ladder.gif", 360)
 
 
 if __name__ == "__main__":

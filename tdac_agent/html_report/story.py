@@ -97,7 +97,7 @@ def _card(
         line = " ".join(f"{x:.0f},{y:.0f}" for x, y in places)
         end = (float(places[-1, 0]), float(places[-1, 1]))
         contact = drive["contact"] and tuple(drive["contact"])
-    changed = _changed(one) if number else ""
+    changed = changed_in(one) if number else ""
     told = told_of(one.report, drive)
     return Card(one, number + 1, told, line, end, contact, changed, skipped)
 
@@ -151,7 +151,7 @@ def _touched(thing: str | None) -> str:
     return thing if thing.startswith("mover ") else f"the {thing}"
 
 
-def _changed(one: CandidateHistory) -> str:
+def changed_in(one: CandidateHistory) -> str:
     """How a version differs from the one before."""
     if is_new_file(one.diff):
         return "a new file"
