@@ -2,9 +2,9 @@
 
     python -m tools.moving_pictures docs
 
-`repair.gif` shows a run of `tdac synth --task cave`: its first candidate fails, the
-diagnosis is that of its report, and the repaired one arrives. The others show an
-episode in each environment.
+`repair.gif` shows a run of `tdac synth --task office --from controller.py`: the given
+controller plans for a point and hits a corner, and the built-in template repairs it.
+The texts are those of its report. The others show an episode in each environment.
 """
 
 from __future__ import annotations
@@ -28,18 +28,21 @@ from tdac_envs.drawing.canvas import INK, PAPER, Image, blank, write_text
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drawing.video import write_video
 from tdac_envs.map2d.picture import MapScene
+from tools import for_a_point
 
 WIDTH, FPS, SPEED = 600, 12, 7.0
 """Width of a picture, px; frames a second; simulated seconds a second."""
 HOLD = 3.0
 """Seconds for which a text is shown at the end of an episode."""
-LINE, ROWS = 22, 4
+LINE, ROWS = 22, 2
 
 
 def repair(out: Path) -> None:
     """Draws `repair.gif`."""
     with tempfile.TemporaryDirectory() as name:
-        run = synthesize(load_task("cave"), learner="builtin", out=Path(name) / "run")
+        run, near = Path(name) / "run", for_a_point.write(Path(name))
+        words = "--task", for_a_point.TASK, "--from", str(near), "--out", str(run)
+        for_a_point.tdac("synth", *words)
         told = gather_run(run)
         write_video(_frames(told), out / "repair.gif", FPS)
 
@@ -55,11 +58,11 @@ def _captions(one: CandidateHistory, number: int, dt: float) -> tuple[str, str]:
     """What is written below a version that drives, and that has driven."""
     assert one.report is not None
     name = f"Version {number}"
-    before = f"{name}, of tdac's template, drives."
+    before = f"{name} plans its path for a point."
     if number > 1:
         before = (
-            f"The failure is told, and the template is tuned: {changed_in(one)}. "
-            f"{name} drives."
+            "The template is told where and why, and repairs it: "
+            f"{changed_in(one)}. {name} drives."
         )
     return before, f"{name}. {told_of(one.report, {'dt': dt})}"
 
