@@ -23,7 +23,7 @@ include_patterns = [
     "docs/**.md",
     "notebooks/*.ipynb",
     "results/**/README.md",
-    "results/feedback/PLAN.md",
+    "results/*/PLAN.md",
     "results/ladder/BEFORE.md",
     "results/mutation*.md",
     "CHANGELOG.md",

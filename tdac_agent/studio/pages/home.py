@@ -179,9 +179,9 @@ class StartPage:
         draft, view = self._draft, self._view
         if draft is None or view is None or draft.start is None:
             return "Place the start first."
-        draft = draft.turned(math.copysign(1.0, view.scale[1]) * angle)
-        await self._change(draft)
-        return f"The heading is {math.degrees(draft.heading or 0.0):.0f}°."
+        turned = draft.turned(math.copysign(1.0, view.scale[1]) * angle)
+        await self._change(turned)
+        return f"The heading is {math.degrees(turned.heading or 0.0):.0f}°."
 
     async def _change(self, draft: TaskDraft) -> None:
         """Shows another draft, and checks it."""

@@ -40,7 +40,6 @@ code.command span { display: inline-block; max-width: 100%; }
 .keys { width: 100%; }
 .keys:focus { outline: none; }
 .keys:focus-visible .board { outline: 3px solid var(--link); outline-offset: 2px; }
-@media (pointer: coarse) { #map-keys { display: none; } }
 kbd { font: inherit; font-size: .85em; padding: 0 .4em; border-radius: 4px;
   border: 1px solid var(--edge); background: var(--paper); color: var(--ink); }
 .board img { width: 100%; cursor: crosshair; }
@@ -53,6 +52,8 @@ kbd { font: inherit; font-size: .85em; padding: 0 .4em; border-radius: 4px;
 @media (max-width: 1023px) {
   .choosing { grid-template-columns: minmax(0, 1fr); }
   .beside { order: -1; --room: 55vh; }
+  /* What is below the map would push its controls out of sight. */
+  .keys:not(:focus-visible) ~ #map-keys { display: none; }
   /* What was found is in sight while the map above it is clicked. */
   .found { position: sticky; bottom: 0; z-index: 2; padding: .4em 0; width: 100%;
     background: var(--page); border-top: 1px solid var(--line); }

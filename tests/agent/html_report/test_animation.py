@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from without_marks import reading
 
 from tdac_agent import load_task
 from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.html_report import make_page
 from tdac_agent.html_report.animation import RAD, TOLERANCE, animations, thinned
 from tdac_agent.html_report.scene import scene_of
 from tdac_agent.runs.history import gather_run
@@ -128,7 +128,7 @@ def test_movers_as_numbers(copied):
         )
         assert np.abs(drawn / 4 - places).max() <= TOLERANCE + 0.125 + 1e-6
         assert mover["radius"] == pytest.approx(scene.radius * 5 / 6, abs=0.06)
-    assert "movers, with their last second" in make_page(copied).html.decode()
+    assert "movers, with their last second" in reading(copied)
 
 
 def test_a_page_without_movers(page):

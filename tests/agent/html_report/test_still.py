@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 from script import AHEAD, NO_RULES, Script, code
 from unconfirmed import synthesize
+from without_marks import reading
 
 from tdac_agent import load_task
-from tdac_agent.html_report import make_page
 from tdac_agent.html_report.still import still_of
 from tdac_agent.runs.history import gather_run
 
@@ -39,7 +39,7 @@ def run(tmp_path_factory, warm):
 
 def test_the_page_shows_the_robot_where_it_came_nearest(run):
     pytest.importorskip("mujoco")
-    page = make_page(run).html.decode()
+    page = reading(run)
     (found,) = STILL.findall(page)
     image = np.asarray(Image.open(io.BytesIO(base64.b64decode(found))))
     assert image.ndim == 3

@@ -8,10 +8,10 @@ from changed_run import journal
 from few_worlds import KNOWN, half_of
 from mcp_agent import converse, over_stdio, record
 from script import STILL
+from without_marks import reading
 
 from tdac_agent import load_task
 from tdac_agent.environments.map2d.builtin import MapParameters, template_for
-from tdac_agent.html_report import make_page
 
 PNG = b"\x89PNG\r\n\x1a\n"
 TOOLS = {"read_task", "submit", "failures", "picture", "submissions", "choose"}
@@ -69,7 +69,7 @@ def test_from_nothing_to_verified_on_a_bundled_task(tmp_path, good_on_maze, done
     assert (out / "trajectory.png").is_file()
     diff = (out / "iterations" / "k03" / "j0" / "controller.diff").read_text()
     assert "-def not_main" in diff
-    page = make_page(out).html.decode()
+    page = reading(out)
     assert "unconfined: scripted 7" in page
     assert "tdac asked no model" in page
     text = done("runs", tmp_path)
@@ -112,7 +112,7 @@ def test_from_nothing_to_verified_on_a_small_set(serve, easy, solver, out):
     assert events.index("choose") < events.index("hidden.start")
     assert stat.S_IMODE(os.stat(out).st_mode) == 0o700
     assert stat.S_IMODE(os.stat(out / "sealed").st_mode) == 0o700
-    assert "unconfined: scripted 7" in make_page(out).html.decode()
+    assert "unconfined: scripted 7" in reading(out)
 
 
 @pytest.mark.slow

@@ -11,10 +11,10 @@ import pytest
 import yaml
 from script import NO_RULES, STILL, Script, code
 from unconfirmed import synthesize
+from without_marks import reading
 
 from tdac_agent import load_task
 from tdac_agent.errors import Fault, RunError
-from tdac_agent.html_report import make_page
 from tdac_agent.models.provider import PermanentFault, Reply
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.prompt import generate_prompt
@@ -148,7 +148,7 @@ def test_a_run_with_pictures_is_shown_but_not_resumed(policy_task, halted, warm)
     kept = json.loads((halted / "run.json").read_text())
     assert kept["vision"]
     assert is_own_folder(load_run(halted))
-    assert "a failure, with each question" in make_page(halted).html.decode()
+    assert "a failure, with each question" in reading(halted)
     with pytest.raises(RunError) as caught:
         synthesize(policy_task, Script(), out=halted, judge=warm)
     assert str(caught.value).endswith(

@@ -16,8 +16,10 @@ def running_studio(place):
     """A studio that runs in a folder until the end of the block."""
     running = Studio(place)
     running.start()
-    yield running
-    running.kill()
+    try:
+        yield running
+    finally:
+        running.kill()
 
 
 @dataclass

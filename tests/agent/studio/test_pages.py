@@ -430,7 +430,7 @@ def test_pages_without_anything_say_what_to_do(browser, tmp_path):
     """An empty folder: a sentence on each page, with a link or a command."""
     with running_studio(tmp_path) as empty:
         browser.get(empty.address)
-        wait(browser, lambda b: "token" not in b.current_url)
+        wait(browser, lambda b: b.title.startswith("New"))
         says(browser, "This folder has no map or world of its own yet.")
         browser.get(f"{empty.base}/runs")
         says(browser, "No run in this folder yet.")

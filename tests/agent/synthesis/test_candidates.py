@@ -11,9 +11,9 @@ import pytest
 from script import AHEAD, NO_RULES, STILL, code
 from small import write_small_task
 from unconfirmed import synthesize
+from without_marks import reading
 
 from tdac_agent.errors import RunError
-from tdac_agent.html_report.page import make_page
 from tdac_agent.metrics import frames_of
 from tdac_agent.models.provider import PermanentFault
 from tdac_agent.problems.choice import problem_of
@@ -116,7 +116,7 @@ def test_equal_answers_are_tested_once(ask, good_source):
         assert attempt.failed_tests == first.failed_tests
         assert f"- k={k} j=0: same code as k=1 j=0" in model.prompts["edit", 1, 1]
     assert frames_of([run]).runs[["tau", "done"]].values.tolist() == [[1, 3]]
-    page = make_page(run.folder).html.decode()
+    page = reading(run.folder)
     assert page.count("Not tested again: an earlier candidate has the same code") == 2
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from script import NO_RULES, STILL, Script, code
 from unconfirmed import synthesize
+from without_marks import reading
 
-from tdac_agent.html_report import make_page
 from tdac_agent.models.provider import Reply
 from tdac_agent.models.retry import RetryPolicy
 from tdac_agent.prompting.given_rules import (
@@ -72,7 +72,7 @@ def test_what_was_learnt_on_one_task_is_given_to_the_next(
     }
     book = load_rules(tmp_path / "next")
     assert [(rule.born, rule.tried) for rule in book.rules] == [(0, 1), (0, 1)]
-    page = make_page(tmp_path / "next").html.decode()
+    page = reading(tmp_path / "next")
     assert "[code] Return plain floats." in page
     assert "--rules next/given_rules.md" in page
     assert read_given(tmp_path / "next" / "given_rules.md") == read_given(file)

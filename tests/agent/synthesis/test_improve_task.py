@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from script import STILL, Script, code
 from small import write_small_task
+from without_marks import reading, unmarked
 
 from tdac_agent.errors import RunError
 from tdac_agent.html_report.page import make_page
@@ -151,7 +152,7 @@ def test_a_more_robust_variation_is_asked_for_and_delivered(
     row = row_of(out)
     assert (row["k"], row["variations"], row["tau"]) == (1, 6, 1)
     assert variations_text(row) == ", 6 variations"
-    page = make_page(out).html.decode()
+    page = reading(out)
     assert "Variations of what works" in page
     assert "varies iteration 1" in page
 
@@ -286,7 +287,7 @@ def test_an_interrupted_search_leaves_a_verified_run(
         assert words in tdac("runs", tmp_path)[1]
         page = make_page(out)
         assert page.verified == 0
-        html = page.html.decode()
+        html = unmarked(page.html.decode())
         assert "the search for a better one has not ended" in html
         assert "The controller that passed: controller.py" in html
         assert "Iteration 8</b>, a variation of what works" in html

@@ -9,9 +9,9 @@ import pytest
 from few_worlds import KNOWN, half_of, write_set
 from script import AHEAD, NO_RULES, STILL, Paid, code
 from unconfirmed import synthesize
+from without_marks import reading
 
 from tdac_agent.errors import RunError
-from tdac_agent.html_report.page import make_page
 from tdac_agent.html_report.set_part import MOST_DRAWN
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.runs.selection_record import Selection
@@ -152,7 +152,7 @@ def half(solver):
 def test_the_report_draws_failures_of_the_selected_controller(write, on_set, half, out):
     """Beside the counts of each candidate; nothing is drawn of a run from elsewhere."""
     write(on_set, code(half), iterations=1, patience=0, refine=False)
-    found, page = selection(out).candidates[0], make_page(out).html.decode()
+    found, page = selection(out).candidates[0], reading(out)
     driven = found.feedback_worlds + found.validation_worlds
     failed = driven - found.feedback_reached - found.validation_reached
     assert 0 < failed < driven
@@ -163,10 +163,10 @@ def test_the_report_draws_failures_of_the_selected_controller(write, on_set, hal
     reached = f"{found.validation_reached} of {found.validation_worlds}"
     assert f'<td class="n">{reached}</td>' in page
     assert ">no motion</th>" in page  # a cause of failures
-    assert make_page(out).html.decode() == page
+    assert reading(out) == page
     record = json.loads((out / "run.json").read_text())
     (out / "run.json").write_text(json.dumps({**record, "mark": ""}))
-    page = make_page(out).html.decode()
+    page = reading(out)
     said = "Not drawn: the folder contains a run that this installation did not begin"
     assert said in page
     assert 'alt="feedback world' not in page
@@ -206,7 +206,7 @@ def test_then_verify_drives_once_on_hidden_worlds(write, on_set, solver, out):
     assert json.loads(text)["hidden"]["lineage"] == 1
     reached = "{successes} of {count}".format(**json.loads(text))
     said = f"On hidden worlds, it then reached the goal in {reached}."
-    assert said in make_page(out).html.decode()
+    assert said in reading(out)
     secret = salt.read_bytes()
     for path in out.rglob("*"):
         if path.is_file() and path != salt:

@@ -7,9 +7,9 @@ import pytest
 from script import AHEAD, Script, code
 from small import write_small_task
 from unconfirmed import synthesize
+from without_marks import reading
 
 from tdac_agent import load_task
-from tdac_agent.html_report import make_page
 from tdac_agent.verification.diagnosis.report import OtherEpisode, SecondOpinion
 from tdac_agent.verification.diagnosis.second_opinion import as_test, opinion_text
 from tdac_agent.verification.verify import verify
@@ -128,7 +128,7 @@ def test_a_run_asks_for_it_and_its_page_says_so(tmp_path, good_source, warm):
         judge=warm,
     )
     assert run.passed
-    page = make_page(tmp_path / "run").html.decode()
+    page = reading(tmp_path / "run")
     line = "second opinion (MuJoCo "
     assert page.count(line) == 1
     assert "6 of 6 arrive; smallest gap " in page[page.index(line) :][:120]
