@@ -124,7 +124,12 @@ def compare(
     messages = read_bag(bag)
     topics = _topics(bag, messages)
     with Policy(source, task, tier) as policy:
-        own = core_settings(settings, dead_man=PERIODS * settings["dt"], any_start=True)
+        own = core_settings(
+            settings,
+            dead_man=PERIODS * settings["dt"],
+            any_start=True,
+            recover=True,  # a bag has no calls of services
+        )
         drive = _Drive(Core(own, _Sandboxed(policy)), settings, topics)
         for each in messages:
             drive.take(each)
