@@ -365,7 +365,7 @@ def _values(made: RosPackage, settings: dict[str, Any]) -> dict[str, Any]:
         "omega_float": round(_turn_rate(robot), 4),
         "brakes": float(robot.get("max_acceleration") or SMOOTHER[0]),
         "turn_brakes": float(robot.get("max_turn_acceleration") or SMOOTHER[1]),
-        "timer": f"{2 * dt:g}",
+        "timer": f"{1.5 * dt:g}",
         "start": [f"{value:g}" for value in settings["start"]],
         "goal": [f"{value:g}" for value in settings["goal"]],
         "scanner": f"{way} {_fan_text(robot['ray_angles'])}, up to "

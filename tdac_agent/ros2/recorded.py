@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,8 @@ APART = 5.0
 """Stamps that differ more from the times of recording are of another clock, s."""
 MOST = 1e6
 """Number below which places (m), speeds (m/s) and turn rates (rad/s) are."""
+STANDS = 5e-4
+"""Way between two poses below which the robot stands, m or rad."""
 REACH = 1.0
 """Farthest obstacle of which a gap is computed, m."""
 MOST_SHOWN = 10
@@ -81,6 +84,8 @@ class RecordedReport:
         map_gap: Smallest gap to the map by the poses, m; None beyond `REACH`.
         scan_gap: Smallest gap by the scans, m; None without a return.
         place: Where the map's gap was smallest: x, y, m.
+        rolled: From the last command, if it was a motion, to the last pose that
+            moved, s: what `dead_man` must cover; None if the drive ended with a zero.
         outcome: State of the replayed node at the end.
     """
 
@@ -96,6 +101,7 @@ class RecordedReport:
     map_gap: float | None
     scan_gap: float | None
     place: tuple[float, float] | None
+    rolled: float | None
     outcome: str
 
     @property
@@ -331,6 +337,19 @@ class _Drive:
             self._found.append(Difference(round(since, 3), there, here, self._last))
         self._core.drove(v, omega)
 
+    def _rolled(self) -> float | None:
+        """From a last command that was a motion to the end of the motion, s."""
+        if self._began is None or not self._commands or not any(self._commands[-1][1:]):
+            return None
+        last = self._began + self._commands[-1][0]
+        moved = last
+        for (_, before), (stamp, after) in pairwise(self.poses):
+            off = math.dist(before[:2], after[:2]) + abs(math.sin(after[2] - before[2]))
+            if off > STANDS:
+                moved = max(moved, stamp)
+        # At the end of the bag the robot must stand, or the time is not known.
+        return None if moved >= self.poses[-1][0] > last else round(moved - last, 3)
+
     def report(self, task: Task) -> RecordedReport:
         """What the bag shows, at its end."""
         commands = self._commands
@@ -353,6 +372,7 @@ class _Drive:
             map_gap=None if gap is None else round(gap, 5),
             scan_gap=None if self._gap == math.inf else round(self._gap, 5),
             place=place,
+            rolled=self._rolled(),
             outcome=self._last,
         )
 

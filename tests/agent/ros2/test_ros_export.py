@@ -177,7 +177,7 @@ def test_the_readme_says_what_was_not_run(package):
 
 
 def test_unknown_cells_that_count_as_free_are_named(tmp_path):
-    """By the thresholds of the map's file, grey 205 may be free: the package says so."""
+    """By the thresholds of the map, grey 205 may be free: the package says so."""
     task = load_task(write_task(tmp_path))
     file = tmp_path / "map.yaml"
     own = yaml.safe_load(file.read_text())
@@ -197,7 +197,7 @@ def test_the_smoother_has_the_limits_of_the_robot(package, settings):
     text = (package / "launch" / "smoother.launch.py").read_text()
     compile(text, "smoother", "exec")
     assert "'max_velocity': [0.3, 0.0, 3.0]" in text
-    assert "'velocity_timeout': 0.2" in text
+    assert "'velocity_timeout': 0.15" in text
     rviz = yaml.safe_load((package / "rviz" / "drive.rviz").read_text())
     shown = rviz["Visualization Manager"]["Displays"]
     topics = {each.get("Topic", {}).get("Value") for each in shown}

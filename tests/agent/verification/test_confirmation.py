@@ -107,8 +107,8 @@ def test_a_good_controller_is_confirmed(small_task, good_source, warm, tmp_path)
     own = Disturbance.none().changed(burger)
     drove_with = report.provenance.model_copy(update={"disturbance": own})
     assert not_covered(report.model_copy(update={"provenance": drove_with})) == (
-        "other worlds, late actions, missing ranges, lost messages, another axle, other "
-        "physics (floor, motors, battery)"
+        "other worlds, late actions, missing ranges, lost messages, another axle, "
+        "other physics (floor, motors, battery)"
     )
     kept = EpisodeReport.model_validate_json((tmp_path / "episodes.json").read_text())
     assert kept == report
