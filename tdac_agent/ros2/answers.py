@@ -66,7 +66,8 @@ def timed(source: bytes, task: Task, tier: str = "auto") -> Answers:
         tier: Sandbox tier.
     """
     setting = map_setting(task.setting)
-    budget, seconds = SHARE * setting.nominal.dt, []
+    budget = SHARE * setting.nominal.dt
+    seconds: list[float] = []
     env = setting.make_env()
     env = Map2DEnv.of(replace(env.setup, metric=setting.task_units.frame))
     observation, _ = env.reset(seed=0)

@@ -18,8 +18,13 @@ import numpy as np
 
 from tdac_agent.environments.map2d.setting import Map2DSetting
 from tdac_agent.errors import RunError
-from tdac_agent.ros2.package.core import LOST, PERIODS, Settings, usual_deviation
 from tdac_agent.ros2.package.scans import Guard
+from tdac_agent.ros2.package.settings import (
+    LOST,
+    PERIODS,
+    Settings,
+    usual_deviation,
+)
 from tdac_agent.ros2.package.worker import SUMS, sums_of
 from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.run_record import Run, load_run
@@ -36,7 +41,10 @@ from tdac_envs.mapping.ros_rule import SAVED_UNKNOWN
 from tdac_envs.mapping.ros_writer import write_ros_map
 
 PACKAGE = Path(__file__).parent / "package"
-COPIED = ("core.py", "motion.py", "scans.py", "worker.py", "ending.py", "node.py")
+COPIED = (
+    *("core.py", "settings.py", "motion.py", "scans.py"),
+    *("worker.py", "ending.py", "node.py"),
+)
 """Modules of the package, byte for byte those of this one."""
 CONTROLLER = "controller"
 """Folder of the package with what the controller reads."""

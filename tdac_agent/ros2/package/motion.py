@@ -1,4 +1,4 @@
-"""Frames and wheels: poses of a map, and commands within the limits of a robot."""
+"""Frames, stamps and wheels: poses of a map, commands within the limits of a robot."""
 
 from __future__ import annotations
 
@@ -32,6 +32,17 @@ def check_pose_parameters(source: str, origin: Sequence[float]) -> None:
         raise ValueError(f'pose_source: expected tf or odom, got {source!r}')
     if len(origin) != 3 or not all(map(math.isfinite, origin)):
         raise ValueError(f'origin: expected x, y, yaw, got {list(origin)}')
+
+
+def unfit_stamp(name: str, age: float, oldest: float) -> str:
+    """Return why data of an age are too old or too new, or an empty text."""
+    if age == math.inf:
+        return f'no {name} yet'
+    if age > oldest:
+        return f'the last {name} is older than {oldest:g} s'
+    if -age > oldest:
+        return f'the {name} is more than {oldest:g} s ahead of the clock (use_sim_time?)'
+    return ''
 
 
 def other_map(
