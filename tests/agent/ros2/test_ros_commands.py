@@ -39,7 +39,7 @@ def test_export_says_what_it_wrote(tdac, run, tmp_path):
     text = " ".join(printed.out.split())
     assert "(ROS 2 package tdac_floor)" in text
     assert "not verified: the package says so" in text
-    assert "stops within 0.195 m" in text
+    assert "stops within 0.405 m" in text
     assert "the rclpy wrapper was not run" in text
     assert "The map's unknown cells are walls." in text
     words = "export", "ros2", run, "--out", tmp_path / "b", "--unverified", "--json"
@@ -108,7 +108,7 @@ def test_flags_that_are_wrong(tdac, run):
         (["--max-jump", "-1"], "max_jump: expected 0 or more, got -1"),
         (["--max-deviation", "-1"], "max_deviation: expected 0 or more, got -1"),
         (["--dead-man", "0.5"], "dead_man: expected"),
-        (["--transform-tolerance", "-1"], "transform_tolerance: expected 0 or more"),
+        (["--max-localiser-age", "9"], "max_localiser_age: expected 0.1 to 2 s"),
     ],
 )
 def test_settings_of_a_drive_that_are_impossible(tdac, package, flags, why):
