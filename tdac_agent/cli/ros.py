@@ -93,7 +93,7 @@ def drive(options: DriveOptions) -> int:
         max_speed=options.max_speed,
         recover=options.recover,
         resample_scan=options.resample_scan,
-        max_jump=options.max_jump,
+        max_jump=options.max_jump or 0.0,
         max_deviation=options.max_deviation,
         any_start=options.any_start,
         any_map=options.any_map,

@@ -109,8 +109,8 @@ class DriveOptions:
         "Take scans with another or a varying number of rays than the robot file, and "
         "with gaps, as those of the LDS-02.",
     )
-    max_jump: float = option(
-        0.0,
+    max_jump: float | None = option(
+        None,
         "Largest distance of a pose from where the commands lead, m.  [default: the "
         "radius of the robot]",
         metavar="METRES",

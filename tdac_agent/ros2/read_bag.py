@@ -7,6 +7,7 @@ import importlib.util
 import os
 import sqlite3
 import stat
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePath
@@ -42,6 +43,65 @@ class Recorded:
     kind: str
     time: float
     message: Any
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """Names of the topics that show a drive; no pose topic means tf."""
+
+    scan: str
+    command: str
+    pose: str | None
+    has_clock: bool
+
+
+def topics_of(bag: Path, messages: list[Recorded]) -> Topics:
+    """The topics of a bag that show a drive.
+
+    Args:
+        bag: The bag, for messages.
+        messages: What it has.
+
+    Raises:
+        RunError: Scans, commands or poses are missing, or there are several.
+    """
+    kinds = Counter((each.kind, each.topic) for each in messages)
+
+    def one(what: str, end: str, *wanted: str) -> str | None:
+        names = sorted({topic for kind, topic in kinds if kind in wanted})
+        best = [name for name in names if name.rstrip("/").endswith(end)]
+        if end == "pose":  # other topics of poses are goals and guesses
+            names = best = [name for name in best if not name.endswith("initialpose")]
+        if len(best or names) > 1:
+            few = ", ".join((best or names)[:5])
+            raise RunError(f"{bag} has several {what}: {few}")
+        return next(iter(best or names), None)
+
+    scan = one("scans", "scan", SCAN)
+    command = one(
+        "topics of commands", "cmd_vel", "geometry_msgs/msg/Twist", TWIST_STAMPED
+    )
+    for what, name in (
+        ("sensor_msgs/LaserScan", scan),
+        ("geometry_msgs/Twist", command),
+    ):
+        if name is None:
+            raise RunError(f"{bag} has no {what}: record /scan, /tf and /cmd_vel")
+    assert scan is not None
+    assert command is not None
+    pose = None
+    if not any(kind == TF for kind, _ in kinds):
+        pose = one("poses", "pose", POSE, POSE_COVARIANCE)
+        if pose is None:
+            raise RunError(
+                f"{bag} has no pose: record /tf (map to base_link), or a pose topic"
+            )
+    return Topics(scan, command, pose, any(kind == CLOCK for kind, _ in kinds))
+
+
+def counts_of(messages: list[Recorded], topic: str) -> set[int]:
+    """The numbers of rays of the scans of a topic."""
+    return {len(each.message.ranges) for each in messages if each.topic == topic}
 
 
 def read_bag(path: Path, most: int = MOST_BYTES) -> list[Recorded]:

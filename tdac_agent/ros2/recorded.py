@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -21,13 +20,14 @@ from tdac_agent.ros2.package.motion import compose, yaw_of
 from tdac_agent.ros2.package.scans import Layout
 from tdac_agent.ros2.read_bag import (
     CLOCK,
-    POSE,
     POSE_COVARIANCE,
-    SCAN,
     TF,
     TWIST_STAMPED,
     Recorded,
+    Topics,
+    counts_of,
     read_bag,
+    topics_of,
 )
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.tasks.task import Task
@@ -125,13 +125,18 @@ def compare(
     """
     settings = settings_of(task)
     messages = read_bag(bag)
-    topics = _topics(bag, messages)
+    topics = topics_of(bag, messages)
     with Policy(source, task, tier) as policy:
+        robot = settings["robot"]
+        rays = {len(robot["ray_angles"])}
         own = core_settings(
             settings,
             dead_man=PERIODS * settings["dt"],
             any_start=True,
             recover=True,  # a bag has no calls of services
+            # A node drives with other scans only if it has this parameter.
+            resample_scan=robot["is_scanner"]
+            and counts_of(messages, topics.scan) != rays,
         )
         drive = _Drive(Core(own, _Sandboxed(policy)), settings, topics)
         for each in messages:
@@ -139,52 +144,6 @@ def compare(
     if drive.poses == []:
         raise RunError(f"{bag} has no pose: tf from map to base_link, or a pose topic")
     return drive.report(task)
-
-
-@dataclass(frozen=True, slots=True)
-class _Topics:
-    """Names of the topics that are used; no pose topic means tf."""
-
-    scan: str
-    command: str
-    pose: str | None
-    has_clock: bool
-
-
-def _topics(bag: Path, messages: list[Recorded]) -> _Topics:
-    """Chooses the topics of a bag."""
-    kinds = Counter((each.kind, each.topic) for each in messages)
-
-    def one(what: str, end: str, *wanted: str) -> str | None:
-        names = sorted({topic for kind, topic in kinds if kind in wanted})
-        best = [name for name in names if name.rstrip("/").endswith(end)]
-        if end == "pose":  # other topics of poses are goals and guesses
-            names = best = [name for name in best if not name.endswith("initialpose")]
-        if len(best or names) > 1:
-            few = ", ".join((best or names)[:5])
-            raise RunError(f"{bag} has several {what}: {few}")
-        return next(iter(best or names), None)
-
-    scan = one("scans", "scan", SCAN)
-    command = one(
-        "topics of commands", "cmd_vel", "geometry_msgs/msg/Twist", TWIST_STAMPED
-    )
-    for what, name in (
-        ("sensor_msgs/LaserScan", scan),
-        ("geometry_msgs/Twist", command),
-    ):
-        if name is None:
-            raise RunError(f"{bag} has no {what}: record /scan, /tf and /cmd_vel")
-    assert scan is not None
-    assert command is not None
-    pose = None
-    if not any(kind == TF for kind, _ in kinds):
-        pose = one("poses", "pose", POSE, POSE_COVARIANCE)
-        if pose is None:
-            raise RunError(
-                f"{bag} has no pose: record /tf (map to base_link), or a pose topic"
-            )
-    return _Topics(scan, command, pose, any(kind == CLOCK for kind, _ in kinds))
 
 
 class _Sandboxed:
@@ -208,7 +167,7 @@ class _Sandboxed:
 class _Drive:
     """The state of a replay: what has been read, and what the core says to it."""
 
-    def __init__(self, core: Core, settings: dict[str, Any], topics: _Topics) -> None:
+    def __init__(self, core: Core, settings: dict[str, Any], topics: Topics) -> None:
         self._core, self._settings, self._topics = core, settings, topics
         self._frames: dict[str, tuple[str, Pose]] = {}
         self._shift: float | None = None

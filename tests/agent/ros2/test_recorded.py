@@ -4,6 +4,7 @@ import dataclasses
 import math
 import os
 
+import numpy as np
 import pytest
 
 pytest.importorskip("mcap", reason="mcap is not installed")
@@ -16,7 +17,11 @@ from tdac_agent.cli.main import main
 from tdac_agent.cli.play import drive
 from tdac_agent.errors import RunError
 from tdac_agent.ros2.bag import Bag, write_bag
+from tdac_agent.ros2.export import core_settings
 from tdac_agent.ros2.faults import Fault
+from tdac_agent.ros2.package.core import Core
+from tdac_agent.ros2.package.scans import Layout
+from tdac_agent.ros2.package.worker import Worker
 from tdac_agent.ros2.read_bag import TWIST, read_bag
 from tdac_agent.ros2.recorded import compare
 from tdac_agent.ros2.robot import Robot
@@ -95,6 +100,39 @@ def test_other_commands_are_named(bag, source, task, tmp_path):
     assert report.stood == 1
     assert report.stops == 1
     assert not report.passed
+
+
+def test_a_drive_with_scans_of_varying_size(
+    package, settings, task, source, robot, tmp_path, here
+):
+    """Those of an LDS-02 are resampled, as by the node that drove."""
+    worker = Worker(package / "controller", settings["controller_sha256"])
+    own = core_settings(settings, dead_man=0.3, resample_scan=True)
+    core, bag = Core(own, worker), Bag()
+    bag.transform("/tf_static", 1.0, ("base_link", "base_scan"), (-0.03, 0.0, 0.0))
+    for step in range(400):
+        now, reading = 1.0 + 0.1 * step, robot.read()
+        count = 57 + step % 7
+        turn = float(np.float32(math.tau / count))
+        ranges = reading.ranges[np.arange(count) * 60 // count]
+        bag.moment(now, reading.pose.tolist())
+        empty = np.zeros(0, np.float32)
+        fields = 0.0, 6.2, turn, 0.0, 0.1, float(np.float32(0.1)), 3.0, ranges, empty
+        header = bag.header(now, "base_scan")
+        bag.add("/scan", now, "sensor_msgs/msg/LaserScan", header, *fields)
+        core.pose(now, *reading.pose)
+        core.scan(now, Layout(count, 0.0, turn, fields[5], 3.0), ranges)
+        command = core.tick(now, 60.0)
+        bag.twist("/cmd_vel", now, command.v, command.omega)
+        if command.state == "reached":
+            break
+        robot.obey(command.v, command.omega)
+        robot.step()
+    assert command.state == "reached", command
+    (tmp_path / "x.mcap").write_bytes(bag.finish())
+    report = compare(tmp_path / "x.mcap", source, task)
+    assert (report.same, report.commands) == (step + 1, step + 1)
+    assert report.passed
 
 
 @pytest.mark.parametrize("plugin", StoragePlugin)

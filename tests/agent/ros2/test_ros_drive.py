@@ -220,6 +220,22 @@ def test_a_simulation_that_ends(task, settings, package, domain):
 
 
 @pytest.mark.slow
+def test_a_simulation_that_begins_again(task, settings, package, domain):
+    """Its clock goes back: the node ends, and does not drive on in the new one."""
+    with NodeProcess(package, domain) as node:
+        bus = Bus(domain)
+        Simulator(robot_of(task, settings), bus, patience=30.0).run(1.0)
+        clock = bus.writer("clock")
+        end = time.monotonic() + 30.0
+        while node.process.poll() is None and time.monotonic() < end:
+            clock.write(msg.Clock(time_of(1.0)))
+            time.sleep(0.02)
+        printed = node.output()
+    assert "failed: the clock went back by" in printed
+    assert node.process.returncode == 1
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_random_faults(task, settings, package, stated, steps, domain, seed):
     """Four faults in a drive: no contact, each stop within its stated distance."""
@@ -403,7 +419,7 @@ def test_a_pose_through_the_frames_of_a_turtlebot(package, settings, domain, her
 def test_a_localiser_that_is_silent(
     package, settings, domain, here, ahead, last_tick, why
 ):
-    """It is noticed within a second, however new the odometry is, whatever it stamps."""
+    """It is noticed within a second, however new the odometry is."""
     node = Listening(package, domain, any_start=True)
     node.core._policy.policy = lambda _: ("action", (0.2, -0.2))
     for tick in range(20):
