@@ -77,7 +77,7 @@ class NodeProcess:
     """A node in a process of its own, forked from one that has all imports."""
 
     def __init__(self, package, domain, *, real_time=False, any_start=False):
-        how = {"sim_time": not real_time, "any_start": any_start}
+        how = {"sim_time": not real_time, "any_start": any_start, "recover": True}
         self._process = FORKS.Process(target=run_node, args=(package, domain, how))
         self._process.start()
 

@@ -20,6 +20,7 @@ from tdac_agent.cli.webots_flags import (
 )
 from tdac_agent.environments.epuck.export import SPARE, Project, export_webots
 from tdac_agent.harbor.folder import WORLDS, export_set, export_task
+from tdac_agent.ros2.answers import time_answers
 from tdac_agent.ros2.export import NOT_RUN, export_ros2
 from tdac_agent.webots.report import WebotsReport
 from tdac_agent.webots.run import run_controller
@@ -48,8 +49,10 @@ def run_ros2(options: ExportRos2Options) -> int:
     made = export_ros2(
         options.run, options.out, name=options.name, unverified=options.unverified
     )
+    answers = time_answers(options.run)
     if options.as_json:
         record = {**asdict(made), "folder": str(made.folder), "run_in_ros": False}
+        record["answers"] = asdict(answers)
         print_json({"schema_version": 1, **record})
         return 0
     console = Console()
@@ -60,6 +63,9 @@ def run_ros2(options: ExportRos2Options) -> int:
         console.print("[bold red]not verified[/]: the package says so")
     longest = max(made.stops.values())
     console.print(f"stops within {longest:.3f} m (README.md lists the causes)")
+    print_plain(console, made.unknown)
+    if warning := answers.warning():
+        console.print(f"[yellow]{warning}[/]", soft_wrap=True)
     console.print(f"[yellow]{NOT_RUN}[/]", soft_wrap=True)
     print_plain(
         console, f"drive it over DDS: tdac ros sim {options.run}, and in another"

@@ -48,6 +48,9 @@ def _show(report: RecordedReport, bag: Path, console: Console) -> None:
         table.add_row("stood instead", f"{report.stood} commands of zero")
     table.add_row("others", str(report.different))
     table.add_row("stops on the way", f"{report.stops}, {report.stopped:.2f} s")
+    if report.rolled is not None:
+        told = f"{report.rolled:.2f} s (dead_man is at least this)"
+        table.add_row("from the last command to the stop", told)
     for name, gap in (("map", report.map_gap), ("scans", report.scan_gap)):
         told = "none near" if gap is None else f"{1000 * gap:.1f} mm"
         at = ""

@@ -116,15 +116,26 @@ class DriveOptions:
         metavar="METRES",
     )
     max_deviation: float = option(
-        0.25,
-        "Largest standard deviation of x and y that the localiser may state, m.",
+        0.0,
+        "Largest standard deviation of x and y that the localiser may state, m.  "
+        "[default: three times the pose noise of the verification, at most the radius]",
         metavar="METRES",
     )
-    transform_tolerance: float = option(
-        0.0,
-        "How far the localiser stamps map to odom ahead, s: `transform_tolerance` of "
-        "AMCL.",
+    max_localiser_age: float = option(
+        1.0,
+        "Largest time in which the localiser does not renew its transform, s.",
         metavar="SECONDS",
+    )
+    max_speed: float = option(
+        0.0,
+        "Drive no faster, m/s.  [default: the speed of the robot]",
+        metavar="SPEED",
+    )
+    recover: bool = option(
+        False,
+        "Drive on by itself after each stop.  [default: a second publisher, a jump of "
+        "the pose, data that are missing for more than 2 s and a controller that is "
+        "mostly late end the drive]",
     )
     origin: tuple[float, float, float] | None = option(
         None,

@@ -44,6 +44,8 @@ SHARE = 0.6
 """Share of a period in which the controller may answer in real time."""
 ANSWER = 2.0
 """Longest wait for an answer in simulated time, s of the wall clock."""
+GONE = 10.0
+"""Time without a scan, after the first one, that ends the drive, s."""
 CLOCK_STANDS = 10.0
 """Time after which a clock that stands still ends the drive, s of the wall clock."""
 
@@ -162,7 +164,6 @@ class Node:
         dead_man: Time after which the robot stops by itself, s.
         sim_time: Whether the time is that of /clock; otherwise that of this machine.
         origin: Pose of the odometry's origin on the map; None for tf.
-        transform_tolerance: How far the localiser stamps its transform ahead, s.
         policy: What answers; by default the package's controller in its worker.
         say: Called with each new state.
         **declared: Further settings of the core, such as `any_start`.
@@ -179,7 +180,6 @@ class Node:
         dead_man: float,
         sim_time: bool,
         origin: tuple[float, float, float] | None = None,
-        transform_tolerance: float = 0.0,
         policy: Any = None,
         say: Callable[[str], None] = lambda _: None,
         **declared: Any,
@@ -188,7 +188,6 @@ class Node:
             package.motion.check_pose_parameters(
                 "tf" if origin is None else "odom",
                 origin or (0.0, 0.0, 0.0),
-                transform_tolerance,
             )
             settings = core_settings(
                 package.settings,
@@ -196,6 +195,7 @@ class Node:
                 dead_man=dead_man,
                 **declared,
             )
+            package.worker.check_files(package.folder / CONTROLLER)
             if policy is None:
                 policy = package.worker.Worker(
                     package.folder / CONTROLLER, package.settings["controller_sha256"]
@@ -206,7 +206,7 @@ class Node:
         self.dt = settings.dt
         self._package, self._bus, self._say = package, bus, say
         self._sim_time, self._origin = sim_time, origin
-        self._tolerance = transform_tolerance
+        self._scan_came, self._scan_at = False, math.inf
         names = ("scan", "odom", "tf", "tf_static", "map", "amcl_pose", "clock")
         self._in = {name: bus.reader(name) for name in names}
         self._out = bus.writer("cmd_vel")
@@ -226,6 +226,8 @@ class Node:
             self._send(self._package.core.Command(0.0, 0.0, "waiting"))
             while self.core.final is None:
                 self._tick()
+                if self.core.latched:
+                    self.core.end(f"{self.core.latched} (--recover drives on)")
                 if time.monotonic() > end:
                     self.core.end("out of time")
         finally:
@@ -266,6 +268,11 @@ class Node:
 
     def _decide(self, now: float, wait: float) -> None:
         self.core.publishers = self._bus.publishers("cmd_vel")
+        if self._scan_came or math.isinf(self._scan_at):
+            self._scan_at = now if self._scan_came else math.inf
+            self._scan_came = False
+        elif now - self._scan_at > GONE:
+            self.core.end(f"no scan for {GONE:g} s: the robot has gone")
         command = self.core.tick(now, wait)
         # What came meanwhile is older than the command, and needs none of its own.
         self._hear()
@@ -295,7 +302,15 @@ class Node:
                 self.core.localised(_variances(message))
         for message in self._in["scan"].take():
             mount = self._mount(message.header.frame_id)
+            self._scan_came = True
             if mount is None:
+                continue
+            try:
+                age = self._package.scans.oldest_ray(
+                    len(message.ranges), message.scan_time, message.time_increment
+                )
+            except ValueError as error:
+                self.core.refuse_scan(str(error))
                 continue
             layout = self._package.scans.Layout(
                 len(message.ranges),
@@ -305,7 +320,9 @@ class Node:
                 message.range_max,
                 mount,
             )
-            self.core.scan(seconds_of(message.header.stamp), layout, message.ranges)
+            self.core.scan(
+                seconds_of(message.header.stamp), layout, message.ranges, age
+            )
 
     def _place(self, each: Any, *, is_static: bool) -> None:
         """Takes a transform, and the pose of `BASE` on the map if it is newer now."""
@@ -329,9 +346,7 @@ class Node:
             stamp = min(frame.stamp for frame in found)
             if math.isinf(stamp):
                 return
-            if self._tolerance > 0.0:  # the topmost one is the localiser's
-                localised = found[-1].stamp
-                stamp = self._package.motion.stamp_of(stamp, localised, self._tolerance)
+            self.core.localiser(found[-1].stamp)  # infinite if it is static
             self.core.pose(stamp, *self._composed(found))
 
     def _way(self, top: str, frame: str) -> list[_Frame] | None:

@@ -18,7 +18,14 @@ import numpy as np
 
 from tdac_agent.environments.map2d.setting import Map2DSetting
 from tdac_agent.errors import RunError
-from tdac_agent.ros2.package.core import PERIODS, Settings
+from tdac_agent.ros2.package.scans import Guard
+from tdac_agent.ros2.package.settings import (
+    LOST,
+    PERIODS,
+    Settings,
+    usual_deviation,
+)
+from tdac_agent.ros2.package.worker import SUMS, sums_of
 from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.storage.files import read_inside, write_atomic
@@ -30,10 +37,14 @@ from tdac_agent.verification.confirmation import read_confirmation
 from tdac_agent.verification.verdict import verified_text
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.intake import RECORD_BYTES
+from tdac_envs.mapping.ros_rule import SAVED_UNKNOWN
 from tdac_envs.mapping.ros_writer import write_ros_map
 
 PACKAGE = Path(__file__).parent / "package"
-COPIED = ("core.py", "motion.py", "scans.py", "worker.py", "ending.py", "node.py")
+COPIED = (
+    *("core.py", "settings.py", "motion.py", "scans.py"),
+    *("worker.py", "ending.py", "node.py"),
+)
 """Modules of the package, byte for byte those of this one."""
 CONTROLLER = "controller"
 """Folder of the package with what the controller reads."""
@@ -41,6 +52,8 @@ SETTINGS = "settings.json"
 MARK = "tdac.mark"
 NOT_RUN = "The core was driven over DDS; the rclpy wrapper was not run."
 UNVERIFIED = "The controller is not verified."
+SMOOTHER = 2.5, 3.2
+"""Default accelerations of Nav2's velocity smoother, m/s² and rad/s²."""
 FOLDERS = "controller", "config", "launch", "maps", "resource", "rviz", "test"
 """Folders of a package beside that of its modules."""
 MAINTAINER = {"maintainer": "maintainer", "email": "maintainer@example.com"}
@@ -56,6 +69,7 @@ class RosPackage:
         verified: Whether its controller is verified.
         verdict: The verdict in a sentence.
         stops: Distances to standstill by cause, m.
+        unknown: What the map's unknown cells are, in a sentence.
     """
 
     folder: Path
@@ -63,6 +77,7 @@ class RosPackage:
     verified: bool
     verdict: str
     stops: dict[str, float]
+    unknown: str
 
 
 def export_ros2(
@@ -82,13 +97,13 @@ def export_ros2(
         TaskError: The task is not one that a robot can drive.
     """
     run, task = load_run(run_folder), load_task(run_folder)
+    settings = settings_of(task)
     if run.tau is None or not run.controller.is_file():
         raise RunError(f"{run_folder} has no controller that passed ({run.status})")
     verdict, why = _verdict(run)
     is_verified = bool(verdict)
     if not is_verified and not unverified:
         raise RunError(f"{why}; give --unverified to export it all the same")
-    settings = settings_of(task)
     own = _core_settings(settings)
     package = package_name(task.name) if name is None else _checked(name)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
@@ -103,7 +118,12 @@ def export_ros2(
         }
     )
     made = RosPackage(
-        out, package, is_verified, verdict or UNVERIFIED, own.stops_within()
+        out,
+        package,
+        is_verified,
+        verdict or UNVERIFIED,
+        own.stops_within(),
+        settings["unknown"],
     )
     existed = out.exists()
     try:
@@ -129,8 +149,9 @@ def settings_of(task: Task) -> dict[str, Any]:
         )
     if setting.view is None:
         raise TaskError(
-            f"{task.name} is a task in pixels: give a map with a resolution (map.yaml) "
-            "and --metres, so that the controller observes metres"
+            f"{task.name} is a task in pixels, which cannot be exported: robots "
+            "drive in metres; synthesize again on a map with a resolution (map.yaml), "
+            "with --metres"
         )
     grid = setting.nominal.terrain.grid
     written, ends = setting.portable()["robot"], setting.ends()
@@ -139,6 +160,8 @@ def settings_of(task: Task) -> dict[str, Any]:
     written["axle_length"] = written.pop("axle")
     written["ray_angles"] = [0.0 - float(angle) for angle in robot.angles()]
     written["is_scanner"] = robot.ray_angles is not None
+    noise = task.own_disturbance()
+    written["range_noise"], written["pose_noise"] = noise.range_noise, noise.pose_noise
     _check_robot(written, setting.nominal.dt, task.name)
     return {
         "schema_version": 1,
@@ -150,6 +173,7 @@ def settings_of(task: Task) -> dict[str, Any]:
         "goal": ends["goal"],
         "goal_tolerance": ends["tolerance"],
         "movers": bool(task.spec.movers),
+        "unknown": _unknown_text(setting.params.notes),
         "map": {
             "size": [grid.width, grid.height],
             "resolution": grid.resolution,
@@ -157,6 +181,17 @@ def settings_of(task: Task) -> dict[str, Any]:
         },
         "robot": written,
     }
+
+
+def _unknown_text(notes: tuple[str, ...]) -> str:
+    """What the map's unknown cells are for the controller."""
+    begin = f"grey {SAVED_UNKNOWN}, "  # the note of `ros_rule.ros_notes`
+    if any(each.startswith(begin) and "as free" in each for each in notes):
+        return (
+            "The map's unknown cells count as FREE by its free_thresh: the robot may "
+            "drive where nobody has looked. With free_thresh 0.196 they are walls."
+        )
+    return "The map's unknown cells are walls."
 
 
 def _check_robot(robot: dict[str, Any], dt: float, name: str) -> None:
@@ -269,6 +304,7 @@ def _write(
     write_workdir(out / CONTROLLER, task)
     write_atomic(out / CONTROLLER / "controller.py", source)
     write_atomic(out / CONTROLLER / SETTINGS, json.dumps(settings, indent=1) + "\n")
+    write_atomic(out / CONTROLLER / SUMS, sums_of(out / CONTROLLER))
     write_atomic(out / name / "__init__.py", "")
     for file in COPIED:
         write_atomic(out / name / file, (PACKAGE / file).read_bytes())  # raw read: ours
@@ -292,6 +328,7 @@ def _write(
         "setup.cfg": "setup.cfg",
         "drive.yaml": "config/drive.yaml",
         "drive.launch.py": "launch/drive.launch.py",
+        "smoother.launch.py": "launch/smoother.launch.py",
         "drive.rviz": "rviz/drive.rviz",
         "test_flake8.py": "test/test_flake8.py",
         "test_pep257.py": "test/test_pep257.py",
@@ -321,15 +358,22 @@ def _values(made: RosPackage, settings: dict[str, Any]) -> dict[str, Any]:
         "short": f"{warning}Drives {made.name} with a {word} controller",
         "description": f"{warning}Drives a robot to a goal on a known map with a "
         f"controller written and judged by tdac (SHA-256 "
-        f"{settings['controller_sha256']}). {made.verdict} {NOT_RUN}",
+        f"{settings['controller_sha256']}). {made.verdict} {made.unknown} {NOT_RUN}",
         "sha256": settings["controller_sha256"],
         "robot": robot,
         "full": f"{speed:g}",
         "rate": f"{1 / dt:g}",
         "limit": f"{PERIODS * dt:g}",
         "period": f"{dt:g}",
-        "silent": f"{1 + PERIODS * dt:g}",
-        "timer": f"{2 * dt:g}",
+        "deviation": f"{usual_deviation(robot):.3g}",
+        "lost": f"{LOST:g}",
+        "unknown": made.unknown,
+        "error": f"{_range_error(robot):.3f}",
+        "full_float": round(float(speed), 4),
+        "omega_float": round(_turn_rate(robot), 4),
+        "brakes": float(robot.get("max_acceleration") or SMOOTHER[0]),
+        "turn_brakes": float(robot.get("max_turn_acceleration") or SMOOTHER[1]),
+        "timer": f"{1.5 * dt:g}",
         "start": [f"{value:g}" for value in settings["start"]],
         "goal": [f"{value:g}" for value in settings["goal"]],
         "scanner": f"{way} {_fan_text(robot['ray_angles'])}, up to "
@@ -338,6 +382,17 @@ def _values(made: RosPackage, settings: dict[str, Any]) -> dict[str, Any]:
         "numpy": np.__version__,
         "python": platform.python_version(),
     }
+
+
+def _range_error(robot: dict[str, Any]) -> float:
+    """What the stop ahead adds for the error of a range, m."""
+    return Guard(robot, 0.0).error
+
+
+def _turn_rate(robot: dict[str, Any]) -> float:
+    """The largest turn rate of a robot, rad/s."""
+    full = 2.0 * robot["max_wheel_speed"] / robot["axle_length"]
+    return float(min(full, robot.get("max_turn_rate") or math.inf))
 
 
 def _fan_text(angles: list[float]) -> str:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdac_agent.environments.map2d.setting import map_setting
 from tdac_agent.errors import RunError
 from tdac_agent.evaluation.policy import Policy
 from tdac_agent.ros2.export import core_settings, settings_of
+from tdac_agent.ros2.map_gap import map_gap
 from tdac_agent.ros2.package.core import PERIODS, Core
 from tdac_agent.ros2.package.motion import compose, yaw_of
 from tdac_agent.ros2.package.scans import Layout
@@ -30,7 +31,6 @@ from tdac_agent.ros2.read_bag import (
 )
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.tasks.task import Task
-from tdac_envs.grid.map_units import MapUnits
 
 SAME = 1e-3
 """Largest difference of equal commands, as a share of the full speeds."""
@@ -38,8 +38,8 @@ APART = 5.0
 """Stamps that differ more from the times of recording are of another clock, s."""
 MOST = 1e6
 """Number below which places (m), speeds (m/s) and turn rates (rad/s) are."""
-REACH = 1.0
-"""Farthest obstacle of which a gap is computed, m."""
+STANDS = 5e-4
+"""Way between two poses below which the robot stands, m or rad."""
 MOST_SHOWN = 10
 MOST_HOPS = 20
 """Most frames between a robot and its map."""
@@ -78,9 +78,11 @@ class RecordedReport:
         stops: How often the commands stopped the robot on the way.
         stopped: How long, s.
         way: Driven path by the poses, m.
-        map_gap: Smallest gap to the map by the poses, m; None beyond `REACH`.
+        map_gap: Smallest gap to the map by the poses, m; None beyond `map_gap.REACH`.
         scan_gap: Smallest gap by the scans, m; None without a return.
         place: Where the map's gap was smallest: x, y, m.
+        rolled: From the last command, if it was a motion, to the last pose that
+            moved, s: what `dead_man` must cover; None if the drive ended with a zero.
         outcome: State of the replayed node at the end.
     """
 
@@ -96,6 +98,7 @@ class RecordedReport:
     map_gap: float | None
     scan_gap: float | None
     place: tuple[float, float] | None
+    rolled: float | None
     outcome: str
 
     @property
@@ -130,6 +133,7 @@ def compare(
             settings,
             dead_man=PERIODS * settings["dt"],
             any_start=True,
+            recover=True,  # a bag has no calls of services
             # A node drives with other scans only if it has this parameter.
             resample_scan=robot["is_scanner"]
             and counts_of(messages, topics.scan) != rays,
@@ -289,6 +293,19 @@ class _Drive:
             self._found.append(Difference(round(since, 3), there, here, self._last))
         self._core.drove(v, omega)
 
+    def _rolled(self) -> float | None:
+        """From a last command that was a motion to the end of the motion, s."""
+        if self._began is None or not self._commands or not any(self._commands[-1][1:]):
+            return None
+        last = self._began + self._commands[-1][0]
+        moved = last
+        for (_, before), (stamp, after) in pairwise(self.poses):
+            off = math.dist(before[:2], after[:2]) + abs(math.sin(after[2] - before[2]))
+            if off > STANDS:
+                moved = max(moved, stamp)
+        # At the end of the bag the robot must stand, or the time is not known.
+        return None if moved >= self.poses[-1][0] > last else round(moved - last, 3)
+
     def report(self, task: Task) -> RecordedReport:
         """What the bag shows, at its end."""
         commands = self._commands
@@ -296,7 +313,7 @@ class _Drive:
         end = moving[-1] if moving else 0.0
         commands = [each for each in commands if each[0] <= end]
         stops, stopped = _stops(commands)
-        gap, place = _map_gap(task, [pose for _, pose in self.poses])
+        gap, place = map_gap(task, [pose for _, pose in self.poses])
         ways = [pose[:2] for _, pose in self.poses]
         return RecordedReport(
             seconds=round(end, 3),
@@ -311,6 +328,7 @@ class _Drive:
             map_gap=None if gap is None else round(gap, 5),
             scan_gap=None if self._gap == math.inf else round(self._gap, 5),
             place=place,
+            rolled=self._rolled(),
             outcome=self._last,
         )
 
@@ -325,40 +343,6 @@ def _stops(commands: list[tuple[float, float, float]]) -> tuple[int, float]:
         elif since is not None:
             total, since = total + time - since, None
     return count, total
-
-
-def _map_gap(
-    task: Task, poses: list[Pose]
-) -> tuple[float | None, tuple[float, float] | None]:
-    """The smallest distance of the body from an occupied pixel, and where, m.
-
-    It is negative where the body overlaps one. None beyond `REACH`.
-    """
-    setting = map_setting(task.setting)
-    cells, units = setting.nominal.terrain.grid.cells, MapUnits.metres(setting.params)
-    scale, radius = units.per_pixel, setting.nominal.robot.radius
-    reach = math.ceil(REACH / scale)
-    # Outside the map, all is occupied.
-    padded = np.pad(cells, reach + 1, constant_values=True)
-    best, place = math.inf, None
-    for x, y, _ in poses:
-        i, j = units.pixels((x, y))
-        if not (0 <= i < cells.shape[1] and 0 <= j < cells.shape[0]):
-            return -radius * scale, (round(x, 4), round(y, 4))
-        column, row = round(i), round(j)
-        window = padded[
-            row + 1 : row + 2 * reach + 2, column + 1 : column + 2 * reach + 2
-        ]
-        rows, columns = np.nonzero(window)
-        if not rows.size:
-            continue
-        # Distance to the square of each occupied pixel.
-        right = np.maximum(np.abs(columns - reach + column - i) - 0.5, 0.0)
-        down = np.maximum(np.abs(rows - reach + row - j) - 0.5, 0.0)
-        away = float(np.hypot(right, down).min()) - radius
-        if away < best:
-            best, place = away, (round(x, 4), round(y, 4))
-    return (None, None) if place is None else (best * scale, place)
 
 
 def _flat(place: Any, turn: Any) -> Pose:

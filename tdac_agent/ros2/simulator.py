@@ -21,7 +21,7 @@ from tdac_agent.ros2.robot import Robot
 Pose = tuple[float, float, float]
 JUMP = (0.2, 0.22, 0.3)
 """A wrong pose: 0.3 m and 0.3 rad, in the robot's frame."""
-SURE, UNSURE = 0.01, 1.0
+SURE, UNSURE = 0.0004, 1.0
 """Variances of x and y that the localiser states, m²."""
 PATIENCE = 5.0
 """Longest wait for a command in simulated time, s of the wall clock."""

@@ -16,123 +16,18 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from .motion import compose, other_map, Wheels, wrapped
+from .motion import compose, other_map, unfit_stamp, Wheels, wrapped
 from .scans import Guard, Layout, LayoutError, Scanner
+from .settings import FARTHEST, LOST, PERIODS, Settings, SettingsError
 
-PERIODS = 3
-"""Control periods after which a scan or a pose is too old."""
-LATENCY = 1
-"""Control periods from a command to the wheels that are reckoned with; more is not covered."""
+__all__ = ['PERIODS', 'Command', 'Core', 'Policy', 'Settings', 'SettingsError']
 STEADY = 10
 """Control periods without a jump after which the pose counts again."""
-FARTHEST = 1e6
-"""No place on a map is so far away, m."""
 TURNED = 0.25
 """Largest jump and standard deviation of the yaw, rad."""
-
-
-class SettingsError(ValueError):
-    """What the package, the robot or the launch file says cannot be driven with."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    """
-    What the controller was verified with, and what the user declares.
-
-    Attributes:
-        dt: Control period.
-        horizon: Commands after which the drive ends without the goal.
-        start: Verified start: x, y, yaw.
-        goal: x, y.
-        goal_tolerance: Distance at which the goal counts as reached.
-        robot: See `settings.json`.
-        dead_man: Time after which the robot stops by itself without a command.
-        max_age: Largest age of a scan and of a pose; 0 for three periods.
-        max_jump: Largest distance of a pose from where the commands lead; 0 for the radius.
-        max_deviation: Largest standard deviation of x and of y, as the localiser says.
-        resample_scan: Whether a robot with a scanner takes scans with another number of rays.
-        any_start: Whether to drive from a start that no verified drive had.
-        start_on: When the drive begins: `pose`, as soon as the data fit, or `service`, when
-            `Core.start` is called.
-        any_map: Whether the localiser may have another map than the controller.
-        own_map: Size, resolution and origin of the controller's map; see `motion.other_map`.
-            None compares none.
-    """
-
-    dt: float
-    horizon: int
-    start: tuple[float, float, float]
-    goal: tuple[float, float]
-    goal_tolerance: float
-    robot: dict[str, Any]
-    dead_man: float
-    max_age: float = 0.0
-    max_jump: float = 0.0
-    max_deviation: float = 0.25
-    resample_scan: bool = False
-    any_start: bool = False
-    start_on: str = 'pose'
-    any_map: bool = False
-    own_map: dict[str, Any] | None = None
-
-    def __post_init__(self) -> None:
-        for name in ('dt', 'horizon', 'goal_tolerance'):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise SettingsError(f'{name}: expected above 0, got {getattr(self, name)!r}')
-        if not sum(map(abs, (*self.start, *self.goal))) < FARTHEST:
-            raise SettingsError(f'expected numbers, got start {self.start}, goal {self.goal}')
-        limit = PERIODS * self.dt
-        if not 0.0 < self.dead_man <= limit + 1e-9:
-            raise SettingsError(
-                f'dead_man: expected the seconds after which the robot stops by itself without '
-                f'a command, above 0 and at most {limit:g} (three periods), got '
-                f'{self.dead_man:g}; without such a timer the robot must not be driven')
-        if not 0.0 <= self.max_age <= limit + 1e-9:
-            raise SettingsError(
-                f'max_age: expected at most {limit:g} s (three periods), got {self.max_age:g}')
-        for name in ('max_jump', 'max_deviation'):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise SettingsError(f'{name}: expected 0 or more, got {getattr(self, name):g}')
-        if self.start_on not in ('pose', 'service'):
-            raise SettingsError(f'start_on: expected pose or service, got {self.start_on!r}')
-        for name in ('radius', 'axle_length', 'max_wheel_speed', 'stopping_distance'):
-            value = self.robot.get(name)
-            if not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
-                raise SettingsError(f'robot: expected {name} above 0, got {value!r}')
-
-    @property
-    def oldest(self) -> float:
-        """Largest age of a scan and of a pose."""
-        return self.max_age or PERIODS * self.dt
-
-    @property
-    def largest_jump(self) -> float:
-        """Largest distance of a pose from where the commands lead."""
-        return self.max_jump or float(self.robot['radius'])
-
-    @property
-    def full_speed(self) -> float:
-        """Largest speed of the body."""
-        robot = self.robot
-        return float(min(robot['max_wheel_speed'], robot.get('max_speed') or math.inf))
-
-    @property
-    def latency(self) -> float:
-        """Longest time from a command to the wheels that is reckoned with."""
-        return LATENCY * self.dt
-
-    def stops_within(self) -> dict[str, float]:
-        """Distance to standstill, from full speed, by what happens."""
-        v = self.full_speed
-        own = float(self.robot['stopping_distance']) + v * self.latency
-        return {
-            'a scan or a pose is late, lost or old': v * (self.oldest + self.dt) + own,
-            'the pose jumps or is unsure': v * self.dt + own,
-            'the controller is late, raises or is not finite': v * self.dt + own,
-            'something is ahead, the goal, SIGTERM, a silent second publisher': v * self.dt + own,
-            'the node is killed, frozen or unreachable': v * (self.dead_man + self.dt) + own,
-        }
+RECENT = 20
+"""Number of the last control periods in which most answers must not be late."""
+AGAIN = 'call the service start to drive on'
 
 
 class Policy(Protocol):
@@ -164,13 +59,24 @@ class Command:
 
 
 class Core:
-    """The state of a drive: what has arrived, what the controller said, what is safe."""
+    """
+    The state of a drive: what has arrived, what the controller said, what is safe.
+
+    Attributes:
+        publishers: How many publishers the topic of commands has, this one included.
+        commands: Answers of the controller so far.
+        latched: Why the robot stands until `start` is called; empty if it does not.
+        final: The last command, when the drive is over.
+    """
 
     def __init__(self, settings: Settings, policy: Policy) -> None:
         self.settings, self._policy = settings, policy
-        self._wheels = Wheels(settings.robot, settings.dt)
+        slow = {'max_speed': min(settings.max_speed, settings.full_speed)}
+        own = settings.robot | slow if settings.max_speed else settings.robot
+        self._wheels = Wheels(own, settings.dt)
         self._scanner = Scanner(settings.robot, settings.resample_scan)
         self._guard = Guard(settings.robot, settings.latency)
+        self._scan_age = 0.0
         self._ranges: np.ndarray[Any, Any] | None = None
         self._scan_stamp = self._pose_stamp = -math.inf
         self._pose = (0.0, 0.0, 0.0)
@@ -180,12 +86,25 @@ class Core:
         self._now = -math.inf
         self._asked = self._planned = self._begun = False
         self._held = settings.start_on == 'service'
+        self._fit = math.inf
+        self._late: deque[bool] = deque(maxlen=RECENT)
+        self._localiser: float | None = None
+        self._is_renewed, self._renewed = False, math.inf
+        self.latched = ''
         self.publishers = 1
         self.commands = 0
         self.final: Command | None = None
 
-    def scan(self, stamp: float, layout: Layout, ranges: Any) -> None:
-        """Take a scan; older ones than the last, and ones without values, do not count."""
+    def scan(self, stamp: float, layout: Layout, ranges: Any, age: float = 0.0) -> None:
+        """
+        Take a scan; older ones than the last, and ones without values, do not count.
+
+        Args:
+            stamp: Its time.
+            layout: Its header.
+            ranges: Its ranges.
+            age: How much older than the stamp its oldest ray may be; see `scans.oldest_ray`.
+        """
         if self.final is not None or not self._is_new(stamp, self._scan_stamp):
             return
         try:
@@ -198,6 +117,7 @@ class Core:
         task, guard = self._scanner.read(ranges)
         if task is not None:
             self._ranges, self._scan_stamp, self._refused = task, stamp, ''
+            self._scan_age = age
             self._guard.see(guard, self._scanner.guard_angles())
 
     def refuse_scan(self, why: str) -> None:
@@ -218,15 +138,25 @@ class Core:
                 self._jump_stamp = stamp
         self._pose, self._pose_stamp = pose, stamp
 
+    def localiser(self, stamp: float) -> None:
+        """
+        Take the stamp of the localiser's transform, which shows that it is alive if it is new.
+
+        A localiser may stamp ahead of its data, as AMCL does by its `transform_tolerance`, so only
+        the time counts in which the stamp does not change.
+        """
+        if stamp != self._localiser and math.isfinite(stamp):
+            self._localiser, self._is_renewed = stamp, True
+
     def localised(self, variances: tuple[float, float, float]) -> None:
         """Take the variances of x, y and yaw that a localiser states; 0 or less says nothing."""
         x, y, yaw = (math.inf if math.isnan(each) else each for each in variances)
         off, turn = math.sqrt(max(x, y, 0.0)), math.sqrt(max(yaw, 0.0))
         self._unsure = ''
-        if off > self.settings.max_deviation or turn > TURNED:
+        if off > self.settings.largest_deviation or turn > TURNED:
             self._unsure = (
                 f'the pose is unsure: standard deviation {off:.2f} m and {turn:.2f} rad, at '
-                f'most {self.settings.max_deviation:g} m and {TURNED:g} rad (max_deviation)')
+                f'most {self.settings.largest_deviation:g} m and {TURNED:g} rad (max_deviation)')
 
     def localiser_map(
         self, size: tuple[int, int], resolution: float, origin: tuple[float, float, float]
@@ -251,11 +181,22 @@ class Core:
         now = self._time(now)
         if self.final is not None:
             return False, f'{self.final.state}: {self.final.reason}'
-        if not self._held:
+        if not self._held and not self.latched:
             return True, 'the drive has begun'
         why = self._unfit(now)
-        self._held = bool(why)
-        return not why, why or 'the drive begins'
+        if why:
+            return False, why
+        said = 'the drive goes on' if self._begun else 'the drive begins'
+        self._held, self.latched, self._fit = False, '', now
+        self._late.clear()
+        return True, said
+
+    def stop(self, reason: str = 'the service stop was called') -> str:
+        """Stand from the next period on, until `start` is called; return the state."""
+        if self.final is not None:
+            return f'{self.final.state}: {self.final.reason}'
+        self.latched = reason
+        return f'stopped: {reason}; {AGAIN}'
 
     def check_timer(self, name: str, values: list[float | None]) -> None:
         """End the drive if the robot's timer, as its driver says, is missing or too long."""
@@ -301,18 +242,34 @@ class Core:
     def _next(self, now: float, wait: float) -> Command:
         if self.final is not None:
             return self.final
+        if self._is_renewed:
+            self._is_renewed, self._renewed = False, now
         why = self._unfit(now)
-        if self._asked:
-            answer = self._policy.answer(0.0)
-            if answer is None or not self._planned or answer[0] == 'error':
-                return self._take(answer, why, now)
-            self._asked = False  # a late answer, to an observation that is old
+        if self._begun and self._is_at_goal(now):
+            return self._end('reached', 'the goal')
+        self._latch(why, now)
+        if self.latched:
+            why = f'{self.latched}; {AGAIN}'
+        return self._waited(why, now) or self._ask(why, now, wait)
+
+    def _waited(self, why: str, now: float) -> Command | None:
+        """Return the command while an answer is due, or with the first plan; else None."""
+        if not self._asked:
+            return None
+        answer = self._policy.answer(0.0)
+        if answer is None or not self._planned or answer[0] == 'error':
+            return self._take(answer, why, now)
+        self._asked = False  # a late answer, to an observation that is old
+        return None
+
+    def _ask(self, why: str, now: float, wait: float) -> Command:
+        """Return the command of this period, if it may be one of motion."""
         if why or self._held:
             if not self._planned and self.settings.start_on == 'service':
                 self._held = True  # the call was for then, not for whenever it fits
             why = why or 'ready: call the service start'
             return self._stand('stopped' if self._planned else 'waiting', why)
-        if math.dist(self._pose[:2], self.settings.goal) <= self.settings.goal_tolerance:
+        if self._is_at_goal(now):
             return self._end('reached', 'the goal')
         if self.commands >= self.settings.horizon:
             return self._end('failed', f'not at the goal after {self.commands} commands')
@@ -320,16 +277,51 @@ class Core:
         self._asked = True
         return self._take(self._policy.answer(wait), '', now)
 
+    def _is_at_goal(self, now: float) -> bool:
+        """Return whether the last pose that counted is at the goal, even if it is old by now."""
+        ahead = self._pose_stamp - now
+        if self._unsure or self._has_jumped() or ahead > self.settings.oldest:
+            return False
+        return math.dist(self._pose[:2], self.settings.goal) <= self.settings.goal_tolerance
+
+    def _latch(self, why: str, now: float) -> None:
+        """Stop for good, until `start` is called, where a person may be near by now."""
+        missing = now - self._fit
+        if not why or not self._is_underway():
+            self._fit = now
+        if self.settings.recover or self.latched or not self._is_underway():
+            return
+        if self.publishers > 1 or self._has_jumped():
+            self.latched = why
+        elif missing > LOST:
+            reason = why or 'the data are back'
+            self.latched = f'without fitting data for more than {LOST:g} s: {reason}'
+
+    def _is_underway(self) -> bool:
+        """Return whether the drive was begun, by a call or by a first motion."""
+        by_call = self.settings.start_on == 'service' and self._asked and not self._held
+        return self._begun or by_call
+
+    def _was_late(self, *, late: bool) -> None:
+        self._late.append(late)
+        if self.settings.recover or self.latched or 2 * sum(self._late) <= RECENT:
+            return
+        self.latched = f'the controller was late in most of the last {RECENT} control periods'
+
     def _take(self, answer: tuple[str, Any] | None, why: str, now: float) -> Command:
         """Return the command of an answer; None if there is none yet."""
         if answer is None:
             if self._planned:
-                return self._stand('stopped', 'the controller is late')
+                self._was_late(late=True)
+                return self._stand('stopped', why or 'the controller is late')
             return self._stand('planning', 'the first plan is not ready')
         self._asked, self._planned = False, True
         if answer[0] == 'error':
             return self._end('failed', str(answer[1]))
-        return self._stand('stopped', why) if why else self._drive(answer[1], now)
+        if why:
+            return self._stand('stopped', why)
+        self._was_late(late=False)
+        return self._drive(answer[1], now)
 
     def observation(self) -> dict[str, Any]:
         """Return what the controller observes, as it did when it was verified."""
@@ -344,7 +336,9 @@ class Core:
         before = self._wheels.last
         v, omega = self._wheels.twist(*self._wheels.limited(left, right))
         moved = self._moved(self._scan_stamp, now)
-        if self._guard.blocked(v, omega, self.settings.full_speed, moved):
+        older = self._moved(self._scan_stamp - self._scan_age, self._scan_stamp)
+        extra = math.hypot(older[0], older[1])
+        if self._guard.blocked(v, omega, self.settings.full_speed, moved, extra):
             self._wheels.last = before
             return self._stand('stopped', 'something is ahead within the stopping distance')
         self._begun = True
@@ -352,21 +346,33 @@ class Core:
 
     def _unfit(self, now: float) -> str:
         """Return why no command may move the robot now; an empty text if one may."""
-        if self.publishers > 1:
-            return f'{self.publishers} publishers of the commands: end the others'
+        if self.publishers != 1:
+            who = 'end the others' if self.publishers else 'this node does not see its own'
+            return f'{self.publishers} publishers of the commands: {who}'
         oldest = self.settings.oldest
         for name, stamp in (('scan', self._scan_stamp), ('pose', self._pose_stamp)):
-            if why := _unfit_stamp(name, now - stamp, oldest):
+            if why := unfit_stamp(name, now - stamp, oldest):
                 return why + (self._refused if name == 'scan' else '')
         if abs(self._scan_stamp - self._pose_stamp) > oldest:
             return f'scan and pose are more than {oldest:g} s apart'
-        if self._unsure:
-            return self._unsure
-        steady = STEADY * self.settings.dt
-        if self._pose_stamp - self._jump_stamp < steady:
-            return f'{self._jump}: it must be steady for {steady:g} s'
+        if why := self._unlocalised(now):
+            return why
         may_begin = self._begun or self.settings.any_start
         return '' if may_begin else self._wrong_start()
+
+    def _unlocalised(self, now: float) -> str:
+        silent = self.settings.max_localiser_age
+        if self._localiser is not None and not now - self._renewed <= silent + 1e-9:
+            return f'the localiser sent nothing new for {silent:g} s (max_localiser_age)'
+        if self._unsure:
+            return self._unsure
+        if self._has_jumped():
+            return f'{self._jump}: it must be steady for {STEADY * self.settings.dt:g} s'
+        return ''
+
+    def _has_jumped(self) -> bool:
+        """Return whether the pose jumped and has not been steady since."""
+        return self._pose_stamp - self._jump_stamp < STEADY * self.settings.dt
 
     def _wrong_start(self) -> str:
         x, y, yaw = self.settings.start
@@ -420,13 +426,3 @@ class Core:
     def _end(self, state: str, reason: str) -> Command:
         self.final = Command(0.0, 0.0, state, reason)
         return self.final
-
-
-def _unfit_stamp(name: str, age: float, oldest: float) -> str:
-    if age == math.inf:
-        return f'no {name} yet'
-    if age > oldest:
-        return f'the last {name} is older than {oldest:g} s'
-    if -age > oldest:
-        return f'the {name} is more than {oldest:g} s ahead of the clock (use_sim_time?)'
-    return ''

@@ -1,4 +1,4 @@
-"""Frames and wheels: poses of a map, and commands within the limits of a robot."""
+"""Frames, stamps and wheels: poses of a map, commands within the limits of a robot."""
 
 from __future__ import annotations
 
@@ -26,26 +26,23 @@ def compose(
         wrapped(yaw + second[2]))
 
 
-def stamp_of(whole: float, localised: float, tolerance: float) -> float:
-    """
-    Stamp of a pose whose localiser stamps ahead of its data, as AMCL does.
-
-    Args:
-        whole: Stamp of the pose in the map, as tf gives it.
-        localised: Stamp of the odometry's frame in the map.
-        tolerance: How far the localiser stamps ahead.
-    """
-    return min(whole, localised - tolerance)
-
-
-def check_pose_parameters(source: str, origin: Sequence[float], tolerance: float) -> None:
+def check_pose_parameters(source: str, origin: Sequence[float]) -> None:
     """Raise ValueError if the parameters of the pose are impossible; see `drive.yaml`."""
     if source not in ('tf', 'odom'):
         raise ValueError(f'pose_source: expected tf or odom, got {source!r}')
     if len(origin) != 3 or not all(map(math.isfinite, origin)):
         raise ValueError(f'origin: expected x, y, yaw, got {list(origin)}')
-    if not 0.0 <= tolerance < math.inf:
-        raise ValueError(f'transform_tolerance: expected 0 or more, got {tolerance:g}')
+
+
+def unfit_stamp(name: str, age: float, oldest: float) -> str:
+    """Return why data of an age are too old or too new, or an empty text."""
+    if age == math.inf:
+        return f'no {name} yet'
+    if age > oldest:
+        return f'the last {name} is older than {oldest:g} s'
+    if -age > oldest:
+        return f'the {name} is more than {oldest:g} s ahead of the clock (use_sim_time?)'
+    return ''
 
 
 def other_map(

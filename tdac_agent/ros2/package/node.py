@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
-from geometry_msgs.msg import PoseWithCovarianceStamped, Twist, TwistStamped
-from nav_msgs.msg import OccupancyGrid, Odometry
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, TwistStamped
+from nav_msgs.msg import OccupancyGrid, Odometry, Path as PathMessage
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 from rcl_interfaces.srv import GetParameters
 import rclpy
 from rclpy.exceptions import ParameterException
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import LaserScan
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 from tf2_ros import Buffer, TransformException, TransformListener
 
 from . import core, ending, motion, scans, worker
 
 PACKAGE = __package__ or ''
+PATH_STEP, MOST_POSES = 0.05, 5000
+"""Distance of two poses of the published path, m; the most of them."""
+WAKES = 0.1
+"""Longest time in which a signal waits for its handler, s of the wall clock."""
 DEFAULTS: dict[str, Any] = {
     'scan_topic': 'scan',
     'odom_topic': 'odom',
@@ -36,14 +42,15 @@ DEFAULTS: dict[str, Any] = {
     'map_frame': 'map',
     'base_frame': 'base_link',
     'odom_frame': 'odom',
-    'transform_tolerance': 0.0,
+    'max_localiser_age': 1.0,
     'origin': [0.0, 0.0, 0.0],
     'dead_man': 0.0,
     'dead_man_node': '',
     'dead_man_parameter': 'cmd_vel_timeout',
     'max_age': 0.0,
     'max_jump': 0.0,
-    'max_deviation': 0.25,
+    'max_deviation': 0.0,
+    'max_speed': 0.0,
     'resample_scan': False,
     'start_on': 'service',
     'any_start': False,
@@ -60,9 +67,9 @@ class DriveNode(Node):  # type: ignore[misc]
             name: self.declare_parameter(name, value, ParameterDescriptor(read_only=True)).value
             for name, value in DEFAULTS.items()}
         self.own = own
-        motion.check_pose_parameters(
-            own['pose_source'], own['origin'], own['transform_tolerance'])
+        motion.check_pose_parameters(own['pose_source'], own['origin'])
         folder = Path(get_package_share_directory(PACKAGE)) / 'controller'
+        worker.check_files(folder)
         text = (folder / 'settings.json').read_text(encoding='utf-8')  # raw read: installed
         written = json.loads(text)
         settings = core.Settings(
@@ -70,6 +77,7 @@ class DriveNode(Node):  # type: ignore[misc]
             goal=tuple(written['goal']), goal_tolerance=written['goal_tolerance'],
             robot=written['robot'], dead_man=own['dead_man'], max_age=own['max_age'],
             max_jump=own['max_jump'], max_deviation=own['max_deviation'],
+            max_localiser_age=own['max_localiser_age'], max_speed=own['max_speed'],
             resample_scan=own['resample_scan'], any_start=own['any_start'],
             start_on=own['start_on'], any_map=own['any_map'], own_map=written['map'])
         self.core = core.Core(settings, worker.Worker(folder, written['controller_sha256']))
@@ -82,6 +90,8 @@ class DriveNode(Node):  # type: ignore[misc]
         self._out = self.create_publisher(kind, own['command_topic'], 1)
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._state = self.create_publisher(String, '~/state', kept)
+        self._way, self._driven = PathMessage(), self.create_publisher(PathMessage, '~/path', kept)
+        self._show_goal(self.create_publisher(PoseStamped, '~/goal', kept), settings.goal)
         self.create_subscription(
             LaserScan, own['scan_topic'], self._on_scan, qos_profile_sensor_data)
         if own['pose_source'] == 'odom':
@@ -96,6 +106,7 @@ class DriveNode(Node):  # type: ignore[misc]
         self.publish(core.Command(0.0, 0.0, 'waiting'))
         self._dead_man = self._ask_dead_man()
         self.create_service(Trigger, '~/start', self._on_start)
+        self.create_service(Trigger, '~/stop', self._on_stop)
         self.create_timer(settings.dt, self._tick)
 
     def _ask_dead_man(self) -> Any:
@@ -128,13 +139,24 @@ class DriveNode(Node):  # type: ignore[misc]
         response.success, response.message = self.core.start(now)
         return response
 
+    def _on_stop(self, _request: Any, response: Any) -> Any:
+        response.success, response.message = True, self.core.stop()
+        self._tick()  # the zero does not wait for the next period
+        return response
+
     def _on_scan(self, message: LaserScan) -> None:
         mount = self._mount(message.header.frame_id)
         if mount is not None:
+            try:
+                age = scans.oldest_ray(
+                    len(message.ranges), message.scan_time, message.time_increment)
+            except scans.LayoutError as error:
+                self.core.refuse_scan(str(error))
+                return
             layout = scans.Layout(
                 len(message.ranges), message.angle_min, message.angle_increment,
                 message.range_min, message.range_max, mount)
-            self.core.scan(_seconds(message.header.stamp), layout, message.ranges)
+            self.core.scan(_seconds(message.header.stamp), layout, message.ranges, age)
 
     def _mount(self, frame: str) -> float | None:
         """Return the yaw of the scanner on the robot; None while tf does not know it."""
@@ -161,6 +183,7 @@ class DriveNode(Node):  # type: ignore[misc]
         pose = motion.compose(tuple(self.own['origin']), own)
         self._on_localised(message)
         self.core.pose(_seconds(message.header.stamp), *pose)
+        self._show(message.header.stamp, pose)
 
     def _on_map(self, message: OccupancyGrid) -> None:
         own = message.info
@@ -180,15 +203,38 @@ class DriveNode(Node):  # type: ignore[misc]
             return
         place, turn = found.transform.translation, found.transform.rotation
         yaw = motion.yaw_of(turn.x, turn.y, turn.z, turn.w)
-        stamp, ahead = _seconds(found.header.stamp), self.own['transform_tolerance']
-        if ahead > 0.0:
-            try:
-                found = self._buffer.lookup_transform(
-                    self.own['map_frame'], self.own['odom_frame'], Time())
-            except TransformException:
-                return
-            stamp = motion.stamp_of(stamp, _seconds(found.header.stamp), ahead)
-        self.core.pose(stamp, place.x, place.y, yaw)
+        self.core.pose(_seconds(found.header.stamp), place.x, place.y, yaw)
+        self._show(found.header.stamp, (place.x, place.y, yaw))
+        try:
+            found = self._buffer.lookup_transform(
+                self.own['map_frame'], self.own['odom_frame'], Time())
+        except TransformException:
+            return
+        if (stamp := _seconds(found.header.stamp)) > 0.0:  # 0: a static one
+            self.core.localiser(stamp)
+
+    def _show_goal(self, out: Any, goal: tuple[float, float]) -> None:
+        """Publish the goal once, for RViz."""
+        self._way.header.frame_id = self.own['map_frame']
+        message = PoseStamped(header=self._way.header)
+        message.pose.position.x, message.pose.position.y = goal
+        out.publish(message)
+        self._goal = out
+
+    def _show(self, stamp: Any, pose: tuple[float, float, float]) -> None:
+        """Publish the driven path, for RViz, if the robot went on by a little."""
+        last = self._way.poses[-1].pose.position if self._way.poses else None
+        if last is not None and math.dist((last.x, last.y), pose[:2]) < PATH_STEP:
+            return
+        if not all(map(math.isfinite, pose)) or len(self._way.poses) >= MOST_POSES:
+            return
+        message = PoseStamped(header=Header(stamp=stamp, frame_id=self.own['map_frame']))
+        message.pose.position.x, message.pose.position.y = pose[:2]
+        message.pose.orientation.z = math.sin(0.5 * pose[2])
+        message.pose.orientation.w = math.cos(0.5 * pose[2])
+        self._way.poses.append(message)
+        self._way.header.stamp = stamp
+        self._driven.publish(self._way)
 
     def _tick(self) -> None:
         if not self._check_dead_man():
@@ -196,7 +242,8 @@ class DriveNode(Node):  # type: ignore[misc]
             return
         if self.own['pose_source'] == 'tf':
             self._look_up()
-        self.core.publishers = self.count_publishers(self.own['command_topic'])
+        # With its remapped name: count_publishers does not remap.
+        self.core.publishers = self.count_publishers(self._out.topic_name)
         now = self.get_clock().now().nanoseconds * 1e-9
         self.publish(self.core.tick(now, self._wait))
 
@@ -227,7 +274,10 @@ def main(args: Any = None) -> None:
     node = None
     try:
         node = DriveNode()
-        rclpy.spin(node)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        while rclpy.ok():  # a paused clock must not keep a signal waiting
+            executor.spin_once(timeout_sec=WAKES)
     except KeyboardInterrupt:
         pass
     except (OSError, ParameterException, ValueError) as error:

@@ -21,6 +21,14 @@ A flat wall is in less than half of all directions.
 MOST_RAYS = 20_000
 MOST_OFF = 0.02
 """Largest distance of the scanner from where the robot file has it."""
+NOISY_FROM = 0.5
+"""
+Range below which the error of a range does not shrink, m.
+
+The data sheet of the LDS-01 has +-15 mm up to 0.499 m, and an error in percent beyond.
+"""
+LONGEST_SCAN = 1.0
+"""Longest time from the first ray of a scan to its last, s."""
 _NEAR, _NONE = -1.0, 1e9
 
 
@@ -76,6 +84,22 @@ def mounted(
     if math.isnan(yaw) or max(abs(turn[0]), abs(turn[1])) > 0.02:
         raise LayoutError('the scanner is tilted or upside down: not supported')
     return yaw
+
+
+def oldest_ray(count: int, scan_time: float, time_increment: float) -> float:
+    """
+    Return how much older than its stamp a ray of a scan may be: s.
+
+    The stamp should be that of the first ray, but some drivers stamp the end of the scan.
+
+    Raises LayoutError if the header has no possible times.
+    """
+    age = max(scan_time, abs(time_increment) * (count - 1))
+    if not 0.0 <= age <= LONGEST_SCAN:
+        raise LayoutError(
+            f'the header of the scan has no valid times: scan_time {scan_time:g} s, '
+            f'time_increment {time_increment:g} s')
+    return float(age)
 
 
 class Scanner:
@@ -241,6 +265,8 @@ class Guard:
         self.latency = latency
         self.offset = np.asarray(robot.get('scanner_offset') or (0.0, 0.0), np.float64)
         self.keep = float(robot.get('range_min') or 0.0) + 2.0 * (self.radius + self.stop)
+        least = self.radius + self.stop + float(np.hypot(*self.offset))
+        self.error = 2.0 * float(robot.get('range_noise') or 0.0) * max(least, NOISY_FROM)
         self.points = np.zeros((0, 2))
         self._kept = np.zeros(0)
 
@@ -256,18 +282,21 @@ class Guard:
         self.points = self.offset + np.stack([own * np.cos(turn), own * np.sin(turn)], axis=1)
 
     def blocked(
-        self, v: float, omega: float, full: float, moved: tuple[float, float, float]
+        self, v: float, omega: float, full: float, moved: tuple[float, float, float],
+        extra: float = 0.0,
     ) -> bool:
         """
         Whether a command leads the body to something within its stopping distance.
 
-        To this distance comes the way of the latency.
+        To this distance come the way of the latency, two standard deviations of a range, and
+        what was driven between the oldest ray and the stamp of the scan.
 
         Args:
             v: Speed.
             omega: Turn rate.
             full: Full speed, from which the stopping distance is measured.
             moved: Motion since the scan, as the pose now in the body's frame then.
+            extra: Way from the oldest ray of the scan to its stamp.
         """
         if abs(v) < 1e-6 or not len(self.points):
             return False
@@ -276,6 +305,7 @@ class Guard:
         rest = self.points - (x, y)
         points = rest @ np.array([[cosine, -sine], [sine, cosine]])
         far = self.stop * min(abs(v) / full, 1.0) + abs(v) * self.latency
+        far += self.error + extra
         away = np.hypot(*points.T)
         nearest = _from_arc(points, math.copysign(far, v), far * omega / abs(v))
         return bool(((nearest < self.radius) & (nearest < away - 1e-4)).any())

@@ -12,6 +12,35 @@ import threading
 from typing import Any
 
 
+SUMS = 'sha256sums.txt'
+"""File of the controller's folder with the hash of each other file, as by sha256sum."""
+
+
+def sums_of(folder: Path) -> str:
+    """Return the hashes of the files of a folder, one per line, without `SUMS`."""
+    found = []
+    for file in sorted(folder.rglob('*')):
+        name = file.relative_to(folder).as_posix()
+        if file.is_file() and name != SUMS and '__pycache__' not in file.parts:
+            data = file.read_bytes()  # raw read: installed
+            found.append(f'{hashlib.sha256(data).hexdigest()}  {name}\n')
+    return ''.join(found)
+
+
+def check_files(folder: Path) -> None:
+    """
+    Check that a controller's folder has the exported files and no others.
+
+    Raises ValueError that names a file if not.
+    """
+    if not (folder / SUMS).is_file():
+        raise ValueError(f'{folder} has no {SUMS}: export it again')
+    written = set((folder / SUMS).read_text(encoding='utf-8').splitlines())  # raw read: installed
+    for line in sorted(written ^ set(sums_of(folder).splitlines())):
+        raise ValueError(
+            f'{folder / line[66:]} is not as exported (missing, changed or added): export again')
+
+
 class Worker:
     """
     The functions `reset` and `policy` of a controller.

@@ -193,6 +193,25 @@ def test_two_scanners_are_not_guessed(bag, source, task, tmp_path):
         compare(tmp_path / "x.mcap", source, task)
 
 
+def test_the_time_from_the_last_command_to_the_stop(bag, source, task, tmp_path):
+    """Of a node that was killed: what `dead_man` must cover; else there is none."""
+    assert compare(bag, source, task).rolled is None
+    commands = [each.time for each in read_bag(bag) if each.topic == "/cmd_vel"]
+    killed, kept = commands[len(commands) // 2], []
+
+    def change(each):
+        if each.topic.startswith("/tf") or each.topic == "/cmd_vel":
+            return each if each.topic == "/cmd_vel" and each.time <= killed else None
+        if each.topic == "/pose":
+            if each.time <= killed + 0.25:
+                kept.append(each.message.pose)
+            each.message.pose = kept[-1]
+        return each
+
+    path = rewritten(bag, tmp_path / "killed.mcap", change)
+    assert compare(path, source, task).rolled == pytest.approx(0.2, abs=0.051)
+
+
 def test_what_is_no_bag(tmp_path, bag):
     """A missing, a torn and an unknown file, and a folder without metadata."""
     (tmp_path / "torn.mcap").write_bytes(bag.read_bytes()[:5000])

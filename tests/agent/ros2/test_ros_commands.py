@@ -7,6 +7,7 @@ import pytest
 from floor_task import write_task
 
 from tdac_agent.cli.main import main
+from tdac_agent.ros2.answers import Answers, timed
 
 
 @pytest.fixture
@@ -38,12 +39,27 @@ def test_export_says_what_it_wrote(tdac, run, tmp_path):
     text = " ".join(printed.out.split())
     assert "(ROS 2 package tdac_floor)" in text
     assert "not verified: the package says so" in text
-    assert "stops within 0.195 m" in text
+    assert "stops within 0.405 m" in text
     assert "the rclpy wrapper was not run" in text
+    assert "The map's unknown cells are walls." in text
     words = "export", "ros2", run, "--out", tmp_path / "b", "--unverified", "--json"
     record = json.loads(tdac(*words)[1].out)
     assert record["run_in_ros"] is False
     assert record["verified"] is False
+    assert record["answers"]["count"] > 10
+    assert record["answers"]["budget"] == 0.05
+
+
+def test_a_controller_that_is_slower_than_the_node_is_named(task):
+    """The judge allows 10 s for an answer, the node half a period."""
+    slow = (
+        b"import time\n\ndef policy(obs):\n    time.sleep(0.08)\n    return 0.1, 0.1\n"
+    )
+    answers = timed(slow, task)
+    assert answers.late == answers.count > 10
+    assert answers.longest >= 0.08
+    assert "answers took longer than 0.05 s" in answers.warning()
+    assert Answers(10, 0, 0.01, 0.05).warning() == ""
 
 
 def test_what_cannot_be_exported(tdac, run, tmp_path):
@@ -92,7 +108,7 @@ def test_flags_that_are_wrong(tdac, run):
         (["--max-jump", "-1"], "max_jump: expected 0 or more, got -1"),
         (["--max-deviation", "-1"], "max_deviation: expected 0 or more, got -1"),
         (["--dead-man", "0.5"], "dead_man: expected"),
-        (["--transform-tolerance", "-1"], "transform_tolerance: expected 0 or more"),
+        (["--max-localiser-age", "9"], "max_localiser_age: expected 0.1 to 2 s"),
     ],
 )
 def test_settings_of_a_drive_that_are_impossible(tdac, package, flags, why):

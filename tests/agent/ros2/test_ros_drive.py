@@ -25,6 +25,7 @@ from tdac_agent.ros2.dds import Bus, time_of
 from tdac_agent.ros2.drive import Node, open_package
 from tdac_agent.ros2.export import core_settings
 from tdac_agent.ros2.faults import STOPPING, Fault, drawn_faults, read_fault
+from tdac_agent.ros2.package import worker
 from tdac_agent.ros2.robot import Robot
 from tdac_agent.ros2.simulator import Simulator
 from tdac_envs.core.errors import TaskError
@@ -103,7 +104,7 @@ def test_the_pose_from_odometry(task, settings, package, steps, domain):
 @pytest.mark.slow
 def test_in_real_time(task, settings, package, domain):
     """It reaches the goal without a contact; stops are allowed."""
-    with NodeProcess(package, domain, "--real-time"):
+    with NodeProcess(package, domain, "--real-time", "--recover"):
         report = Simulator(robot_of(task, settings), Bus(domain), real_time=True).run(
             120.0
         )
@@ -115,7 +116,7 @@ def test_in_real_time(task, settings, package, domain):
 def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, kind):
     """The robot stands after the stated distance, and goes on after the fault."""
     fault = Fault(kind, 2.0, 2.0)
-    with NodeProcess(package, domain):
+    with NodeProcess(package, domain, "--recover"):
         simulator = Simulator(
             robot_of(task, settings), Bus(domain), faults=(fault,), patience=30.0
         )
@@ -129,7 +130,7 @@ def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, ki
 @pytest.mark.parametrize("kind", ["some-nan", "second-publisher"])
 def test_no_fault_leads_to_a_contact(task, settings, package, domain, kind):
     """Missing ranges, a second publisher: the goal without a contact."""
-    with NodeProcess(package, domain):
+    with NodeProcess(package, domain, "--recover"):
         simulator = Simulator(
             robot_of(task, settings),
             Bus(domain),
@@ -179,7 +180,7 @@ def test_a_node_that_ends_or_freezes(task, settings, package, stated, domain, nu
 def test_a_slow_node(task, settings, package, stated, domain, here):
     """A controller that needs more than its period stops the robot, and no more."""
     opened = open_package(package)
-    worker = opened.worker.Worker(package / "controller", settings["controller_sha256"])
+    policy = opened.worker.Worker(package / "controller", settings["controller_sha256"])
 
     class Slow:
         """The controller, which is slow for a second."""
@@ -189,7 +190,7 @@ def test_a_slow_node(task, settings, package, stated, domain, here):
         def ask(self, observation):
             self.count += 1
             self.after = time.monotonic() + (0.2 if 20 < self.count < 24 else 0.0)
-            worker.ask(observation)
+            policy.ask(observation)
 
         def answer(self, wait):
             rest = self.after - time.monotonic()
@@ -197,9 +198,11 @@ def test_a_slow_node(task, settings, package, stated, domain, here):
                 time.sleep(wait)
                 return None
             time.sleep(max(rest, 0.0))
-            return worker.answer(max(wait, 0.01))
+            return policy.answer(max(wait, 0.01))
 
-    node = Node(opened, Bus(domain), dead_man=0.3, sim_time=False, policy=Slow())
+    node = Node(
+        opened, Bus(domain), dead_man=0.3, sim_time=False, policy=Slow(), recover=True
+    )
     thread = threading.Thread(target=node.run, args=(100.0,), daemon=True)
     thread.start()
     report = Simulator(robot_of(task, settings), Bus(domain), real_time=True).run(100.0)
@@ -238,7 +241,7 @@ def test_a_simulation_that_begins_again(task, settings, package, domain):
 def test_random_faults(task, settings, package, stated, steps, domain, seed):
     """Four faults in a drive: no contact, each stop within its stated distance."""
     faults = drawn_faults(seed, 4, 0.1 * steps)
-    with NodeProcess(package, domain):
+    with NodeProcess(package, domain, "--recover"):
         simulator = Simulator(
             robot_of(task, settings), Bus(domain), faults=faults, patience=30.0
         )
@@ -406,19 +409,81 @@ def test_a_pose_through_the_frames_of_a_turtlebot(package, settings, domain, her
     assert node.moves(1.0)
 
 
-@pytest.mark.parametrize(("tolerance", "moves"), [(1.0, False), (0.0, True)])
-def test_a_localiser_that_is_silent(package, settings, domain, here, tolerance, moves):
-    """With the tolerance of AMCL it is noticed, however new the odometry is."""
-    node = Listening(package, domain, transform_tolerance=tolerance, any_start=True)
-    node.hear(SCANNER, placed(2.0, "map", "odom", settings["start"]))
-    for now in (1.0, 1.1, 1.2, 1.35):
+@pytest.mark.parametrize(
+    ("ahead", "last_tick", "why"),
+    [
+        (1.0, 14, "the localiser sent nothing new for 1 s"),
+        (9.0, 14, "the localiser sent nothing new for 1 s"),
+        (0.25, 9, "the last pose is older than 0.3 s"),
+    ],
+)
+def test_a_localiser_that_is_silent(
+    package, settings, domain, here, ahead, last_tick, why
+):
+    """It is noticed within a second, however new the odometry is."""
+    node = Listening(package, domain, any_start=True)
+    node.core._policy.policy = lambda _: ("action", (0.2, -0.2))
+    for tick in range(20):
+        now = 1.0 + 0.1 * tick
         still = placed(now, "odom", "base_link", (0.0, 0.0, 0.0))
+        if tick in (0, 2, 4):  # with the scans of a scanner of 5 Hz
+            localised = placed(now + ahead, "map", "odom", settings["start"])
+            node.hear(SCANNER, localised)
         node.hear(still, scanned(now, FREE))
         last = node.core.tick(now, 0.0)
         node.core.drove(0.0, 0.0)
-        assert last.v > 0.0 or now == 1.35
-    assert (last.v > 0.0) == moves
-    assert moves or last.reason == "the last pose is older than 0.3 s"
+        assert (last.state == "driving") == (tick <= last_tick), (tick, last)
+        assert tick != last_tick + 1 or last.reason.startswith(why)
+
+
+def test_a_latched_stop_ends_the_drive(task, settings, package, domain):
+    """Over DDS no service starts it again: one line, exit code 1."""
+    fault = Fault("second-publisher", 2.0, 2.0)
+    with NodeProcess(package, domain) as node:
+        robot = robot_of(task, settings)
+        Simulator(robot, Bus(domain), faults=(fault,), patience=30.0).run(5.0)
+        printed = node.output()
+    last = "ended: 2 publishers of the commands: end the others (--recover drives on)"
+    assert last in printed.replace("\n", " ")
+    assert node.process.returncode == 1
+    assert robot.stands
+
+
+@pytest.mark.slow_after(1)
+@pytest.mark.parametrize("recovers", [False, True])
+def test_a_robot_that_has_gone(task, settings, package, domain, recovers):
+    """In real time, a node whose robot has gone ends by itself."""
+    flags = ["--recover"] if recovers else []
+    with NodeProcess(package, domain, "--real-time", *flags) as node:
+        robot = robot_of(task, settings)
+        Simulator(robot, Bus(domain), real_time=True).run(1.0)
+        printed = " ".join(node.output().split())
+    gone = "ended: no scan for 10 s: the robot has gone"
+    assert gone in printed if recovers else "ended: " in printed, printed
+    assert node.process.returncode == 1
+
+
+def test_a_changed_file_of_the_controller_is_refused(package, tmp_path, here):
+    """Each file of its folder counts, and none may be added."""
+    for place, text in {
+        "occupancy.npy": "",
+        "settings.json": "{}",
+        "sensors.py": "x",
+        "heapq.py": "x",
+        "params.json": None,
+    }.items():
+        copy = tmp_path / place
+        shutil.copytree(package, copy)
+        worker.check_files(copy / "controller")
+        file = copy / "controller" / place
+        file.unlink() if text is None else file.write_text(text)
+        with pytest.raises(ValueError, match=rf"{place} is not as exported"):
+            worker.check_files(copy / "controller")
+    shutil.copytree(package, tmp_path / "copy")
+    (tmp_path / "copy" / "controller" / "occupancy.npy").write_bytes(b"")
+    opened = open_package(tmp_path / "copy", trust=True)
+    with pytest.raises(RunError, match=r"occupancy.npy is not as exported"):
+        Node(opened, Bus(domain=0), dead_man=0.3, sim_time=True)
 
 
 def test_a_scanner_that_looks_back_is_turned(package, settings, domain, here):

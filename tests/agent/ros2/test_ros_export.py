@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import yaml
 from floor_task import robot_file, write_task
+from PIL import Image
 
 from tdac_agent import load_task, synthesize
 from tdac_agent.errors import RunError
@@ -170,7 +171,37 @@ def test_the_readme_says_what_was_not_run(package):
     assert "ros2 service call /drive/start" in text
     assert "| a scan or a pose is late, lost or old | 0.195 |" in text
     assert "AMCL needs the map as SLAM wrote it" in text
+    assert "The map's unknown cells are walls." in text
+    assert "/drive/stop" in text
     assert "the task floor over ROS 2" in text
+
+
+def test_unknown_cells_that_count_as_free_are_named(tmp_path):
+    """By the thresholds of the map, grey 205 may be free: the package says so."""
+    task = load_task(write_task(tmp_path))
+    file = tmp_path / "map.yaml"
+    own = yaml.safe_load(file.read_text())
+    image = next(each for each in tmp_path.iterdir() if each.name == own["image"])
+    with Image.open(image) as picture:
+        cells = np.array(picture.convert("L"))
+    assert settings_of(task)["unknown"] == "The map's unknown cells are walls."
+    cells[5:10, 50:55] = 205
+    Image.fromarray(cells).save(image)
+    file.write_text(yaml.safe_dump({**own, "free_thresh": 0.25}))
+    said = settings_of(load_task(tmp_path / "task.yaml"))["unknown"]
+    assert said.startswith("The map's unknown cells count as FREE by its free_thresh")
+
+
+def test_the_smoother_has_the_limits_of_the_robot(package, settings):
+    """Its launch file is Python, and names the speeds of the robot file."""
+    text = (package / "launch" / "smoother.launch.py").read_text()
+    compile(text, "smoother", "exec")
+    assert "'max_velocity': [0.3, 0.0, 3.0]" in text
+    assert "'velocity_timeout': 0.15" in text
+    rviz = yaml.safe_load((package / "rviz" / "drive.rviz").read_text())
+    shown = rviz["Visualization Manager"]["Displays"]
+    topics = {each.get("Topic", {}).get("Value") for each in shown}
+    assert {"/drive/path", "/drive/goal"} <= topics
 
 
 def test_no_file_names_a_place_of_the_machine(run, package):
@@ -197,7 +228,7 @@ def test_a_hostile_name_of_a_task_stays_text(run, tmp_path):
     for file in made.folder.rglob("*"):
         if file.is_file() and file.name != "settings.json":
             data = file.read_bytes()
-            for part in (b"$(touch", b"<b>", b"import os #", b"7*7", b"](http"):
+            for part in (b"$(touch", b"<b>", b"import os #", b"7*7", b"](http:y"):
                 assert part not in data or file.suffix in {".npy", ".png", ".py"}, file
     for file in (*made.folder.glob("*.py"), *(made.folder / "launch").iterdir()):
         compile(file.read_text(), str(file), "exec")
