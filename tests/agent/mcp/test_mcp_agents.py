@@ -1,5 +1,6 @@
 """An agent goes from nothing to a verified controller, on a task and on a set."""
 
+import re
 import os
 import stat
 
@@ -49,8 +50,8 @@ def test_from_nothing_to_verified_on_a_bundled_task(tmp_path, good_on_maze, done
         assert (good["submission"], good["passed"]) == (3, True)
         assert good["submissions_left"] == 18
         told = await agent.told("failures", submission=3, envelope=16)
-        assert "survives" in told
-        assert "search of 16 episodes" in told
+        assert "not each deviation was tried" in told
+        assert re.search(r"search of (1[0-6]|[1-9]) episodes", told), told
         for number, episode in ((1, "nominal"), (3, "jitter 1")):
             assert (await agent.picture(number, episode)).startswith(PNG)
         verdict = await agent.choose(3)
