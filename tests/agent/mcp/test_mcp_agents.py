@@ -1,7 +1,7 @@
 """An agent goes from nothing to a verified controller, on a task and on a set."""
 
-import re
 import os
+import re
 import stat
 
 import pytest
