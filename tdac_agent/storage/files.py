@@ -69,6 +69,22 @@ def read_inside(folder: Path, name: str | Path, most: int) -> bytes:
     return read_file(path, most)
 
 
+def resolved(path: Path) -> Path:
+    """The path without links; what it leads to may be missing.
+
+    Raises:
+        OSError: The links lead in a circle, which Python 3.13 alone lets pass.
+        RuntimeError: The same, in earlier Pythons.
+    """
+    found = path.resolve()
+    try:
+        found.stat()
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise
+    return found
+
+
 def check_inside(folder: Path, path: Path) -> None:
     """Refuses a path through which a link leads out of a folder.
 
@@ -76,7 +92,7 @@ def check_inside(folder: Path, path: Path) -> None:
         OSError: There is such a link; `strerror` says so.
     """
     try:
-        inside = path.resolve().is_relative_to(folder.resolve())
+        inside = resolved(path).is_relative_to(folder.resolve())
     except (OSError, RuntimeError, ValueError):
         inside = False  # links in a circle, or no valid name
     if not inside:

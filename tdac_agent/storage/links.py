@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 
 from tdac_agent.errors import RunError
+from tdac_agent.storage.files import resolved
 
 
 def refuse_links(folder: Path, *names: str) -> None:
@@ -47,6 +48,6 @@ def _written(folder: Path, names: tuple[str, ...]) -> Iterator[Path]:
 def _target(link: Path) -> Path:
     """Where a link leads; the root if it leads in a circle."""
     try:
-        return link.resolve()
+        return resolved(link)
     except (OSError, RuntimeError):
         return Path("/")

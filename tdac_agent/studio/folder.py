@@ -7,7 +7,7 @@ import io
 import zipfile
 from pathlib import Path
 
-from tdac_agent.storage.files import write_atomic
+from tdac_agent.storage.files import resolved, write_atomic
 from tdac_envs.core.intake import IMAGE_BYTES, RECORD_BYTES, read_file
 
 STATE = ".studio"
@@ -35,7 +35,7 @@ def within(place: Path, at: str) -> Path | None:
         at: The path, relative to it.
     """
     try:
-        path = (place / at).resolve()
+        path = resolved(place / at)
         inside = path.is_relative_to(place.resolve())
     except (OSError, ValueError, RuntimeError):  # a null byte, or links in a circle
         return None

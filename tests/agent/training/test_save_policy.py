@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from few_worlds import write_short_set
 
+pytest.importorskip("stable_baselines3")
+
 from tdac_agent.bench.bench import bench
 from tdac_agent.episodes.sb3_file import read_policy
 from tdac_agent.errors import ControllerFileError, RunError
