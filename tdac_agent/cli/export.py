@@ -21,7 +21,8 @@ from tdac_agent.cli.webots_flags import (
 from tdac_agent.environments.epuck.export import SPARE, Project, export_webots
 from tdac_agent.harbor.folder import WORLDS, export_set, export_task
 from tdac_agent.ros2.answers import time_answers
-from tdac_agent.ros2.export import NOT_RUN, export_ros2
+from tdac_agent.ros2.export import export_ros2
+from tdac_agent.ros2.package_text import NOT_RUN
 from tdac_agent.webots.report import WebotsReport
 from tdac_agent.webots.run import run_controller
 from tdac_envs.core.errors import TaskError
@@ -64,6 +65,12 @@ def run_ros2(options: ExportRos2Options) -> int:
     longest = max(made.stops.values())
     console.print(f"stops within {longest:.3f} m (README.md lists the causes)")
     print_plain(console, made.unknown)
+    if made.reach is not None:
+        print_plain(
+            console,
+            f"a body that reaches at most {made.reach:.3f} m from the middle of its "
+            "axle touched nothing of the map in the verified drives",
+        )
     if warning := answers.warning():
         console.print(f"[yellow]{warning}[/]", soft_wrap=True)
     console.print(f"[yellow]{NOT_RUN}[/]", soft_wrap=True)

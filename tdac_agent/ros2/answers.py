@@ -8,6 +8,7 @@ from pathlib import Path
 
 from tdac_agent.environments.map2d.setting import map_setting
 from tdac_agent.evaluation.policy import Policy
+from tdac_agent.ros2.package.settings import SHARE
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.sandbox import ControllerFault
 from tdac_agent.storage.files import read_inside
@@ -15,8 +16,6 @@ from tdac_agent.tasks.task import Task
 from tdac_envs.core.intake import RECORD_BYTES
 from tdac_envs.map2d.env import Map2DEnv
 
-SHARE = 0.5
-"""Share of a control period in which the node waits for an answer."""
 MOST = 300
 """Answers that are timed."""
 SPARED = 60.0

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
+from cyclonedds.builtin import (
+    BuiltinDataReader,
+    BuiltinTopicDcpsPublication,
+    BuiltinTopicDcpsSubscription,
+)
 from cyclonedds.core import InstanceState, Policy, Qos
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
@@ -71,8 +75,9 @@ class Bus:
         self.stamped = stamped
         self._domain = None if network else _loopback(domain)
         self._participant = DomainParticipant(domain)
-        self._publications = BuiltinDataReader(
-            self._participant, BuiltinTopicDcpsPublication
+        self._publications, self._subscriptions = (
+            BuiltinDataReader(self._participant, kind)
+            for kind in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription)
         )
 
     def _topic(self, name: str) -> tuple[Any, Qos]:
@@ -93,13 +98,21 @@ class Bus:
 
     def publishers(self, name: str) -> int:
         """How many writers a topic has now, in all processes."""
-        found = self._publications.read(1000)
-        return sum(
-            each.topic_name == f"rt/{name}"
-            for each in found
-            if hasattr(each, "topic_name")
-            and each.sample_info.instance_state == InstanceState.Alive
-        )
+        return _alive(self._publications, name)
+
+    def listeners(self, name: str) -> int:
+        """How many readers a topic has now, in all processes."""
+        return _alive(self._subscriptions, name)
+
+
+def _alive(endpoints: Any, name: str) -> int:
+    """How many of the known endpoints are of a topic, and there."""
+    return sum(
+        each.topic_name == f"rt/{name}"
+        for each in endpoints.read(1000)
+        if hasattr(each, "topic_name")
+        and each.sample_info.instance_state == InstanceState.Alive
+    )
 
 
 class Reader:

@@ -26,7 +26,7 @@ from tdac_agent.ros2.export import (
     core_settings,
     mark_of,
 )
-from tdac_agent.ros2.package.core import PERIODS
+from tdac_agent.ros2.package.core import PERIODS, SHARE
 from tdac_agent.ros2.package.ending import send_last
 from tdac_agent.storage.files import read_inside
 from tdac_envs.core.intake import RECORD_BYTES, TEXT_BYTES, parse_json
@@ -40,8 +40,6 @@ MOST_FRAMES = 100
 TOGETHER, MISSING = 1.0, 0.05
 """Longest wait for scan and pose of a tick of the clock, s of the wall clock; the same
 after a tick that had none."""
-SHARE = 0.6
-"""Share of a period in which the controller may answer in real time."""
 ANSWER = 2.0
 """Longest wait for an answer in simulated time, s of the wall clock."""
 GONE = 10.0
@@ -268,6 +266,7 @@ class Node:
 
     def _decide(self, now: float, wait: float) -> None:
         self.core.publishers = self._bus.publishers("cmd_vel")
+        self.core.listeners = self._bus.listeners("cmd_vel")
         if self._scan_came or math.isinf(self._scan_at):
             self._scan_at = now if self._scan_came else math.inf
             self._scan_came = False

@@ -5,27 +5,22 @@ from __future__ import annotations
 import json
 import keyword
 import math
-import platform
 import re
 import shutil
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import jinja2
-import numpy as np
 
 from tdac_agent.environments.map2d.setting import Map2DSetting
 from tdac_agent.errors import RunError
-from tdac_agent.ros2.package.scans import Guard
 from tdac_agent.ros2.package.settings import (
-    LOST,
     PERIODS,
     Settings,
-    usual_deviation,
 )
 from tdac_agent.ros2.package.worker import SUMS, sums_of
+from tdac_agent.ros2.package_text import RosPackage, values_of
 from tdac_agent.runs.ownership import load_task, remark_on
 from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.storage.files import read_inside, write_atomic
@@ -50,34 +45,9 @@ CONTROLLER = "controller"
 """Folder of the package with what the controller reads."""
 SETTINGS = "settings.json"
 MARK = "tdac.mark"
-NOT_RUN = "The core was driven over DDS; the rclpy wrapper was not run."
 UNVERIFIED = "The controller is not verified."
-SMOOTHER = 2.5, 3.2
-"""Default accelerations of Nav2's velocity smoother, m/s² and rad/s²."""
 FOLDERS = "controller", "config", "launch", "maps", "resource", "rviz", "test"
 """Folders of a package beside that of its modules."""
-MAINTAINER = {"maintainer": "maintainer", "email": "maintainer@example.com"}
-
-
-@dataclass(frozen=True, slots=True)
-class RosPackage:
-    """An exported package.
-
-    Attributes:
-        folder: Folder of the package.
-        name: Name of the package.
-        verified: Whether its controller is verified.
-        verdict: The verdict in a sentence.
-        stops: Distances to standstill by cause, m.
-        unknown: What the map's unknown cells are, in a sentence.
-    """
-
-    folder: Path
-    name: str
-    verified: bool
-    verdict: str
-    stops: dict[str, float]
-    unknown: str
 
 
 def export_ros2(
@@ -100,7 +70,7 @@ def export_ros2(
     settings = settings_of(task)
     if run.tau is None or not run.controller.is_file():
         raise RunError(f"{run_folder} has no controller that passed ({run.status})")
-    verdict, why = _verdict(run)
+    verdict, why, gap = _verdict(run)
     is_verified = bool(verdict)
     if not is_verified and not unverified:
         raise RunError(f"{why}; give --unverified to export it all the same")
@@ -124,6 +94,7 @@ def export_ros2(
         verdict or UNVERIFIED,
         own.stops_within(),
         settings["unknown"],
+        None if gap is None else settings["robot"]["radius"] * (1.0 + gap),
     )
     existed = out.exists()
     try:
@@ -282,14 +253,16 @@ def _checked(name: str) -> str:
     return name
 
 
-def _verdict(run: Run) -> tuple[str, str]:
-    """The verdict of a run, or else an empty text and why there is none."""
+def _verdict(run: Run) -> tuple[str, str, float | None]:
+    """The verdict of a run, or an empty text and why it has none; its gap in radii."""
     if remark := remark_on(run):
-        return "", f"{remark}: its verdict is only what its files claim"
+        return "", f"{remark}: its verdict is only what its files claim", None
     report = read_confirmation(run) if run.verified else None
     if report is None:
-        return "", f"the controller of {run.folder} is not verified ({run.status})"
-    return f"Verified: {verified_text(report)}.", ""
+        why = f"the controller of {run.folder} is not verified ({run.status})"
+        return "", why, None
+    gap = report.smallest_gap
+    return f"Verified: {verified_text(report)}.", "", None if gap is None else gap.radii
 
 
 def _write(
@@ -314,7 +287,7 @@ def _write(
     grid = setting.nominal.terrain.grid
     assert grid.resolution is not None
     write_ros_map(out / "maps", grid, grid.resolution, grid.origin)
-    values = _values(made, settings)
+    values = values_of(made, settings)
     templates = jinja2.Environment(
         loader=jinja2.FileSystemLoader(PACKAGE),
         undefined=jinja2.StrictUndefined,
@@ -337,71 +310,3 @@ def _write(
         text = templates.get_template(f"{template}.j2").render(values)
         write_atomic(out / file, text)
     write_atomic(out / MARK, mark_of(out))
-
-
-def _values(made: RosPackage, settings: dict[str, Any]) -> dict[str, Any]:
-    """What the templates say; nothing of it names a place of this machine."""
-    robot, dt = settings["robot"], settings["dt"]
-    word, warning, verdict = "verified", "", made.verdict
-    if not made.verified:
-        word, warning = "exported", "NOT VERIFIED. "
-        verdict = f"**Not verified.** {made.verdict}"
-    speed = min(robot["max_wheel_speed"], robot.get("max_speed") or math.inf)
-    way = "with" if robot["is_scanner"] else "of any scanner, resampled to"
-    return {
-        **MAINTAINER,
-        "name": made.name,
-        # A name may have any printable characters, such as those of Markdown.
-        "task": re.sub(r"[^\w .,+-]", "_", settings["task"]),
-        "verdict": verdict,
-        "word": word,
-        "short": f"{warning}Drives {made.name} with a {word} controller",
-        "description": f"{warning}Drives a robot to a goal on a known map with a "
-        f"controller written and judged by tdac (SHA-256 "
-        f"{settings['controller_sha256']}). {made.verdict} {made.unknown} {NOT_RUN}",
-        "sha256": settings["controller_sha256"],
-        "robot": robot,
-        "full": f"{speed:g}",
-        "rate": f"{1 / dt:g}",
-        "limit": f"{PERIODS * dt:g}",
-        "period": f"{dt:g}",
-        "deviation": f"{usual_deviation(robot):.3g}",
-        "lost": f"{LOST:g}",
-        "unknown": made.unknown,
-        "error": f"{_range_error(robot):.3f}",
-        "full_float": round(float(speed), 4),
-        "omega_float": round(_turn_rate(robot), 4),
-        "brakes": float(robot.get("max_acceleration") or SMOOTHER[0]),
-        "turn_brakes": float(robot.get("max_turn_acceleration") or SMOOTHER[1]),
-        "timer": f"{1.5 * dt:g}",
-        "start": [f"{value:g}" for value in settings["start"]],
-        "goal": [f"{value:g}" for value in settings["goal"]],
-        "scanner": f"{way} {_fan_text(robot['ray_angles'])}, up to "
-        f"{robot['range_max']:g} m",
-        "stops": made.stops,
-        "numpy": np.__version__,
-        "python": platform.python_version(),
-    }
-
-
-def _range_error(robot: dict[str, Any]) -> float:
-    """What the stop ahead adds for the error of a range, m."""
-    return Guard(robot, 0.0).error
-
-
-def _turn_rate(robot: dict[str, Any]) -> float:
-    """The largest turn rate of a robot, rad/s."""
-    full = 2.0 * robot["max_wheel_speed"] / robot["axle_length"]
-    return float(min(full, robot.get("max_turn_rate") or math.inf))
-
-
-def _fan_text(angles: list[float]) -> str:
-    """The rays in words: how many, and from where to where."""
-    first, last = (math.degrees(angles[i]) for i in (0, -1))
-    if len(angles) == 1:
-        return f"1 ray at {first:.4g}°"
-    turn = math.remainder(angles[1] - angles[0], math.tau)
-    way = "counter-clockwise" if turn > 0 else "clockwise"
-    return (
-        f"{len(angles)} rays from {first:.4g}° {way} to {last:.4g}° (left is positive)"
-    )

@@ -10,23 +10,24 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from itertools import pairwise
 import math
 from typing import Any, Protocol
 
 import numpy as np
 
-from .motion import compose, other_map, unfit_stamp, Wheels, wrapped
+from .motion import compose, Driven, other_map, unfit_stamp, unheard, Wheels, wrapped
 from .scans import Guard, Layout, LayoutError, Scanner
-from .settings import FARTHEST, LOST, PERIODS, Settings, SettingsError
+from .settings import FARTHEST, LOST, PERIODS, Settings, SettingsError, SHARE
 
-__all__ = ['PERIODS', 'Command', 'Core', 'Policy', 'Settings', 'SettingsError']
+__all__ = ['PERIODS', 'SHARE', 'Command', 'Core', 'Policy', 'Settings', 'SettingsError']
 STEADY = 10
 """Control periods without a jump after which the pose counts again."""
 TURNED = 0.25
 """Largest jump and standard deviation of the yaw, rad."""
 RECENT = 20
 """Number of the last control periods in which most answers must not be late."""
+SETTLED = 1.0
+"""Time after the last motion in which the robot has come to a stand, s."""
 AGAIN = 'call the service start to drive on'
 
 
@@ -64,6 +65,7 @@ class Core:
 
     Attributes:
         publishers: How many publishers the topic of commands has, this one included.
+        listeners: How many take the commands.
         commands: Answers of the controller so far.
         latched: Why the robot stands until `start` is called; empty if it does not.
         final: The last command, when the drive is over.
@@ -75,14 +77,15 @@ class Core:
         own = settings.robot | slow if settings.max_speed else settings.robot
         self._wheels = Wheels(own, settings.dt)
         self._scanner = Scanner(settings.robot, settings.resample_scan)
-        self._guard = Guard(settings.robot, settings.latency)
+        self._guard = Guard(settings.robot, settings.reaction)
         self._scan_age = 0.0
         self._ranges: np.ndarray[Any, Any] | None = None
         self._scan_stamp = self._pose_stamp = -math.inf
-        self._pose = (0.0, 0.0, 0.0)
+        self._pose = self._place = (0.0, 0.0, 0.0)
+        self._drove_at = -math.inf
         self._jump, self._jump_stamp, self._unsure = '', -math.inf, ''
         self._refused = ''
-        self._motion: deque[tuple[float, float, float]] = deque(maxlen=100)
+        self._driven = Driven(settings.dead_man)
         self._now = -math.inf
         self._asked = self._planned = self._begun = False
         self._held = settings.start_on == 'service'
@@ -91,7 +94,7 @@ class Core:
         self._localiser: float | None = None
         self._is_renewed, self._renewed = False, math.inf
         self.latched = ''
-        self.publishers = 1
+        self.publishers = self.listeners = 1
         self.commands = 0
         self.final: Command | None = None
 
@@ -104,6 +107,7 @@ class Core:
             layout: Its header.
             ranges: Its ranges.
             age: How much older than the stamp its oldest ray may be; see `scans.oldest_ray`.
+                0, as where a header says no times, counts as a control period.
         """
         if self.final is not None or not self._is_new(stamp, self._scan_stamp):
             return
@@ -117,7 +121,7 @@ class Core:
         task, guard = self._scanner.read(ranges)
         if task is not None:
             self._ranges, self._scan_stamp, self._refused = task, stamp, ''
-            self._scan_age = age
+            self._scan_age = age or self.settings.dt
             self._guard.see(guard, self._scanner.guard_angles())
 
     def refuse_scan(self, why: str) -> None:
@@ -137,6 +141,8 @@ class Core:
                 self._jump = f'the pose jumped by {off:.2f} m and {turn:.2f} rad'
                 self._jump_stamp = stamp
         self._pose, self._pose_stamp = pose, stamp
+        if stamp <= self._drove_at + SETTLED:
+            self._place = pose
 
     def localiser(self, stamp: float) -> None:
         """
@@ -183,8 +189,7 @@ class Core:
             return False, f'{self.final.state}: {self.final.reason}'
         if not self._held and not self.latched:
             return True, 'the drive has begun'
-        why = self._unfit(now)
-        if why:
+        if why := self._unfit(now) or self._was_moved():
             return False, why
         said = 'the drive goes on' if self._begun else 'the drive begins'
         self._held, self.latched, self._fit = False, '', now
@@ -210,8 +215,7 @@ class Core:
     def drove(self, v: float, omega: float) -> None:
         """Take another command than the last one as driven, as in a recorded drive."""
         self._wheels.last = self._wheels.fractions(v, omega)
-        if self._motion:
-            self._motion[-1] = (self._motion[-1][0], v, omega)
+        self._driven.change(v, omega)
 
     def tick(self, now: float, wait: float) -> Command:
         """
@@ -224,7 +228,7 @@ class Core:
         """
         now = self._time(now)
         command = self._next(now, wait)
-        self._motion.append((now, command.v, command.omega))
+        self._driven.take(now, command.v, command.omega)
         return command
 
     def _time(self, now: float) -> float:
@@ -291,7 +295,7 @@ class Core:
             self._fit = now
         if self.settings.recover or self.latched or not self._is_underway():
             return
-        if self.publishers > 1 or self._has_jumped():
+        if self.publishers > 1 or not self.listeners or self._has_jumped():
             self.latched = why
         elif missing > LOST:
             reason = why or 'the data are back'
@@ -335,20 +339,22 @@ class Core:
         self.commands += 1
         before = self._wheels.last
         v, omega = self._wheels.twist(*self._wheels.limited(left, right))
-        moved = self._moved(self._scan_stamp, now)
-        older = self._moved(self._scan_stamp - self._scan_age, self._scan_stamp)
-        extra = math.hypot(older[0], older[1])
-        if self._guard.blocked(v, omega, self.settings.full_speed, moved, extra):
+        moved = self._driven.between(self._scan_stamp, now)
+        stamp, age = self._scan_stamp, self._scan_age
+        x, y, yaw = self._driven.between(stamp - age, stamp)
+        turned = max(abs(yaw), abs(self._driven.between(stamp, min(stamp + age, now))[2]))
+        full, extra = self.settings.full_speed, math.hypot(x, y)
+        if self._guard.blocked(v, omega, full, moved, extra, turned):
             self._wheels.last = before
             return self._stand('stopped', 'something is ahead within the stopping distance')
-        self._begun = True
+        self._begun, self._drove_at = True, now
+        self._place = compose(self._pose, self._driven.between(self._pose_stamp, now))
         return Command(v, omega, 'driving')
 
     def _unfit(self, now: float) -> str:
         """Return why no command may move the robot now; an empty text if one may."""
-        if self.publishers != 1:
-            who = 'end the others' if self.publishers else 'this node does not see its own'
-            return f'{self.publishers} publishers of the commands: {who}'
+        if why := unheard(self.publishers, self.listeners):
+            return why
         oldest = self.settings.oldest
         for name, stamp in (('scan', self._scan_stamp), ('pose', self._pose_stamp)):
             if why := unfit_stamp(name, now - stamp, oldest):
@@ -375,15 +381,30 @@ class Core:
         return self._pose_stamp - self._jump_stamp < STEADY * self.settings.dt
 
     def _wrong_start(self) -> str:
-        x, y, yaw = self.settings.start
-        off, turn = math.dist(self._pose[:2], (x, y)), abs(wrapped(self._pose[2] - yaw))
-        radius = float(self.settings.robot['radius'])
-        if off <= radius and turn <= 0.5:
+        if not (apart := self._apart_from(self.settings.start)):
             return ''
+        x, y, yaw = self.settings.start
+        radius = float(self.settings.robot['radius'])
         return (
-            f'the robot stands {off:.2f} m and {turn:.2f} rad from the verified start '
-            f'({x:g}, {y:g}, {yaw:g}); at most {radius:g} m and 0.5 rad are covered '
-            f'(any_start)')
+            f'the robot stands {apart} from the verified start ({x:g}, {y:g}, {yaw:g}); at most '
+            f'{radius:g} m and 0.5 rad are covered (any_start)')
+
+    def _was_moved(self) -> str:
+        """Return why a drive cannot go on from where the robot stands, or an empty text."""
+        if not self._begun or self.settings.any_start:
+            return ''
+        if not (apart := self._apart_from(self._place)):
+            return ''
+        x, y, yaw = self._place
+        return (
+            f'the robot stands {apart} from where it came to a stand ({x:.2f}, {y:.2f}, '
+            f'{yaw:.2f}): put it back there, or start the node again at the start (any_start)')
+
+    def _apart_from(self, place: tuple[float, float, float]) -> str:
+        """Return how far the robot is from a place, or nothing if it counts as there."""
+        off, turn = math.dist(self._pose[:2], place[:2]), abs(wrapped(self._pose[2] - place[2]))
+        is_there = off <= float(self.settings.robot['radius']) and turn <= 0.5
+        return '' if is_there else f'{off:.2f} m and {turn:.2f} rad'
 
     def _off(self, stamp: float, pose: tuple[float, float, float]) -> tuple[float, float]:
         """
@@ -394,30 +415,12 @@ class Core:
         found = []
         for late in range(PERIODS + 1):
             shift = late * self.settings.dt
-            moved = self._moved(self._pose_stamp - shift, stamp - shift)
+            moved = self._driven.between(self._pose_stamp - shift, stamp - shift)
             there = compose(self._pose, moved)
             turn = abs(wrapped(pose[2] - there[2]))
             found.append((math.dist(pose[:2], there[:2]), turn))
         limit = self.settings.largest_jump
         return min(found, key=lambda each: max(each[0] / limit, each[1] / TURNED))
-
-    def _moved(self, since: float, until: float) -> tuple[float, float, float]:
-        """
-        Return the motion by the commands in a time, as a pose in the body's first frame.
-
-        A command lasts until the next one, and no longer than the robot's timer.
-        """
-        moved = (0.0, 0.0, 0.0)
-        steps = list(self._motion)
-        steps.append((max(until, steps[-1][0] if steps else until), 0.0, 0.0))
-        for (begin, v, omega), (end, _, _) in pairwise(steps):
-            lasted = min(end, until, begin + self.settings.dead_man) - max(begin, since)
-            if lasted > 0.0:
-                half = 0.5 * omega * lasted
-                chord = v * lasted * float(np.sinc(half / math.pi))
-                step = (chord * math.cos(half), chord * math.sin(half), 2.0 * half)
-                moved = compose(moved, step)
-        return moved
 
     def _stand(self, state: str, reason: str) -> Command:
         self._wheels.limited(0.0, 0.0)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
+from itertools import pairwise
 import math
 from typing import Any
+
+import numpy as np
 
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float:
@@ -43,6 +47,20 @@ def unfit_stamp(name: str, age: float, oldest: float) -> str:
     if -age > oldest:
         return f'the {name} is more than {oldest:g} s ahead of the clock (use_sim_time?)'
     return ''
+
+
+def unheard(publishers: int, listeners: int) -> str:
+    """
+    Return why commands may not reach the robot alone, or an empty text.
+
+    Args:
+        publishers: How many publish them, this node included.
+        listeners: How many take them.
+    """
+    if publishers != 1:
+        who = 'end the others' if publishers else 'this node does not see its own'
+        return f'{publishers} publishers of the commands: {who}'
+    return '' if listeners else 'nobody takes the commands: is the driver, or the smoother, dead?'
 
 
 def other_map(
@@ -90,6 +108,44 @@ def inverse(pose: tuple[float, float, float]) -> tuple[float, float, float]:
 def wrapped(angle: float) -> float:
     """Angle in (-pi, pi]."""
     return math.pi - (math.pi - angle) % math.tau
+
+
+class Driven:
+    """
+    The motion by the last commands.
+
+    A command lasts until the next one, and no longer than the robot's timer.
+
+    Args:
+        dead_man: Time of this timer.
+    """
+
+    def __init__(self, dead_man: float) -> None:
+        self._dead_man = dead_man
+        self._commands: deque[tuple[float, float, float]] = deque(maxlen=100)
+
+    def take(self, now: float, v: float, omega: float) -> None:
+        """Take a command."""
+        self._commands.append((now, v, omega))
+
+    def change(self, v: float, omega: float) -> None:
+        """Take another command than the last one."""
+        if self._commands:
+            self._commands[-1] = (self._commands[-1][0], v, omega)
+
+    def between(self, since: float, until: float) -> tuple[float, float, float]:
+        """Return the motion in a time, as a pose in the body's first frame."""
+        moved = (0.0, 0.0, 0.0)
+        steps = list(self._commands)
+        steps.append((max(until, steps[-1][0] if steps else until), 0.0, 0.0))
+        for (begin, v, omega), (end, _, _) in pairwise(steps):
+            lasted = min(end, until, begin + self._dead_man) - max(begin, since)
+            if lasted > 0.0:
+                half = 0.5 * omega * lasted
+                chord = v * lasted * float(np.sinc(half / math.pi))
+                step = (chord * math.cos(half), chord * math.sin(half), 2.0 * half)
+                moved = compose(moved, step)
+        return moved
 
 
 class Wheels:

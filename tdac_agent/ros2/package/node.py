@@ -31,6 +31,8 @@ PATH_STEP, MOST_POSES = 0.05, 5000
 """Distance of two poses of the published path, m; the most of them."""
 WAKES = 0.1
 """Longest time in which a signal waits for its handler, s of the wall clock."""
+ONLOOKERS = ('rosbag2', '_ros2cli')
+"""How names of nodes begin that only record or show commands."""
 DEFAULTS: dict[str, Any] = {
     'scan_topic': 'scan',
     'odom_topic': 'odom',
@@ -81,7 +83,7 @@ class DriveNode(Node):  # type: ignore[misc]
             resample_scan=own['resample_scan'], any_start=own['any_start'],
             start_on=own['start_on'], any_map=own['any_map'], own_map=written['map'])
         self.core = core.Core(settings, worker.Worker(folder, written['controller_sha256']))
-        self._wait = 0.5 * settings.dt
+        self._wait = core.SHARE * settings.dt
         self._mounts: dict[str, float] = {}
         self._said = ''
         self._buffer = Buffer()
@@ -242,8 +244,11 @@ class DriveNode(Node):  # type: ignore[misc]
             return
         if self.own['pose_source'] == 'tf':
             self._look_up()
-        # With its remapped name: count_publishers does not remap.
-        self.core.publishers = self.count_publishers(self._out.topic_name)
+        topic = self._out.topic_name  # remapped: these functions do not remap
+        self.core.publishers = self.count_publishers(topic)
+        self.core.listeners = sum(
+            not each.node_name.startswith(ONLOOKERS)
+            for each in self.get_subscriptions_info_by_topic(topic))
         now = self.get_clock().now().nanoseconds * 1e-9
         self.publish(self.core.tick(now, self._wait))
 

@@ -29,6 +29,8 @@ The data sheet of the LDS-01 has +-15 mm up to 0.499 m, and an error in percent 
 """
 LONGEST_SCAN = 1.0
 """Longest time from the first ray of a scan to its last, s."""
+BEARING = 0.1
+"""Step of the bearings on which a point may lie, rad."""
 _NEAR, _NONE = -1.0, 1e9
 
 
@@ -257,12 +259,13 @@ class Guard:
 
     Args:
         robot: See `settings.json`.
-        latency: Time for which the body drives on before it obeys a command.
+        reaction: Time for which the body drives on by a command, once a later one stops it: a
+            control period, and the latency.
     """
 
-    def __init__(self, robot: dict[str, Any], latency: float) -> None:
+    def __init__(self, robot: dict[str, Any], reaction: float) -> None:
         self.radius, self.stop = float(robot['radius']), float(robot['stopping_distance'])
-        self.latency = latency
+        self.reaction = reaction
         self.offset = np.asarray(robot.get('scanner_offset') or (0.0, 0.0), np.float64)
         self.keep = float(robot.get('range_min') or 0.0) + 2.0 * (self.radius + self.stop)
         least = self.radius + self.stop + float(np.hypot(*self.offset))
@@ -283,13 +286,15 @@ class Guard:
 
     def blocked(
         self, v: float, omega: float, full: float, moved: tuple[float, float, float],
-        extra: float = 0.0,
+        extra: float = 0.0, turned: float = 0.0,
     ) -> bool:
         """
         Whether a command leads the body to something within its stopping distance.
 
-        To this distance come the way of the latency, two standard deviations of a range, and
-        what was driven between the oldest ray and the stamp of the scan.
+        To this distance come the way of a control period and of the latency, two standard
+        deviations of a range, and what was driven between the oldest ray and the stamp of the
+        scan. What was turned while the scanner turned shifts the bearings of the points to both
+        sides.
 
         Args:
             v: Speed.
@@ -297,18 +302,29 @@ class Guard:
             full: Full speed, from which the stopping distance is measured.
             moved: Motion since the scan, as the pose now in the body's frame then.
             extra: Way from the oldest ray of the scan to its stamp.
+            turned: Angle by which the robot turned in the time of the scan.
         """
         if abs(v) < 1e-6 or not len(self.points):
             return False
         x, y, yaw = moved
         cosine, sine = math.cos(yaw), math.sin(yaw)
-        rest = self.points - (x, y)
-        points = rest @ np.array([[cosine, -sine], [sine, cosine]])
-        far = self.stop * min(abs(v) / full, 1.0) + abs(v) * self.latency
+        seen = self._shifted(turned) - (x, y)
+        points = seen @ np.array([[cosine, -sine], [sine, cosine]])
+        far = self.stop * min(abs(v) / full, 1.0) + abs(v) * self.reaction
         far += self.error + extra
         away = np.hypot(*points.T)
         nearest = _from_arc(points, math.copysign(far, v), far * omega / abs(v))
         return bool(((nearest < self.radius) & (nearest < away - 1e-4)).any())
+
+    def _shifted(self, turned: float) -> np.ndarray[Any, Any]:
+        """Return the points on all bearings that they may have had, in steps of `BEARING`."""
+        if abs(turned) < 1e-3:
+            return self.points
+        steps = math.ceil(abs(turned) / BEARING)
+        each = np.linspace(-turned, turned, 2 * steps + 1)[:, None]
+        x, y = self.points.T
+        cosine, sine = np.cos(each), np.sin(each)
+        return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1).reshape(-1, 2)
 
 
 def _from_arc(points: np.ndarray[Any, Any], way: float, turn: float) -> np.ndarray[Any, Any]:

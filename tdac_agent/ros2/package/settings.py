@@ -10,6 +10,8 @@ PERIODS = 3
 """Control periods after which a scan or a pose is too old."""
 LATENCY = 1
 """Control periods from a command to the wheels that are reckoned with; more is not covered."""
+SHARE = 0.5
+"""Share of a control period in which the node waits for an answer."""
 LOST = 2.0
 """Time without fitting data after which the robot stands until it is started again, s."""
 FARTHEST = 1e6
@@ -125,17 +127,22 @@ class Settings:
         """Longest time from a command to the wheels that is reckoned with."""
         return LATENCY * self.dt
 
+    @property
+    def reaction(self) -> float:
+        """Longest time for which the robot obeys a command, once a later one stops it."""
+        return self.dt + self.latency
+
     def stops_within(self) -> dict[str, float]:
         """Distance to standstill, from full speed, by what happens."""
         v = self.full_speed
-        own = float(self.robot['stopping_distance']) + v * self.latency
+        own = float(self.robot['stopping_distance']) + v * self.reaction
         return {
-            'a scan or a pose is late, lost or old': v * (self.oldest + self.dt) + own,
-            'the localiser is silent': v * (self.max_localiser_age + self.dt) + own,
-            'the pose jumps or is unsure': v * self.dt + own,
-            'the controller is late, raises or is not finite': v * self.dt + own,
-            'something is ahead, the goal, ~/stop, SIGTERM, a second publisher': v * self.dt + own,
-            'the node is killed, frozen or unreachable': v * (self.dead_man + self.dt) + own,
+            'a scan or a pose is late, lost or old': v * self.oldest + own,
+            'the localiser is silent': v * self.max_localiser_age + own,
+            'the pose jumps or is unsure': own,
+            'the controller is late, raises or is not finite': own,
+            'something is ahead, the goal, ~/stop, SIGTERM, a second publisher': own,
+            'the node is killed, frozen or unreachable': v * self.dead_man + own,
         }
 
 

@@ -87,3 +87,24 @@ class Ready:
 def forward(observation):
     """Full speed ahead."""
     return "action", (1.0, 1.0)
+
+
+def see(core, robot, now, scan=True, pose=True):
+    """Gives the core what the robot's sensors say."""
+    reading = robot.read()
+    if pose:
+        core.pose(now, *reading.pose)
+    if scan:
+        core.scan(now, robot.layout, reading.ranges)
+
+
+def drive(core, robot, seconds, see=see, wait=0.0):
+    """Drives in control periods; returns the commands."""
+    commands = []
+    for _ in range(round(seconds / robot.dt)):
+        now = robot.time
+        see(core, robot, now)
+        commands.append(core.tick(now, wait))
+        robot.obey(commands[-1].v, commands[-1].omega)
+        robot.step()
+    return commands

@@ -8,7 +8,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from floor_task import Ready, forward
+from floor_task import Ready, drive, forward, see
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,27 +28,6 @@ from tdac_agent.ros2.robot import Robot
 
 ANGLES = st.floats(-10, 10)
 PLACES = st.floats(-100, 100)
-
-
-def see(core, robot, now, scan=True, pose=True):
-    """Gives the core what the robot's sensors say."""
-    reading = robot.read()
-    if pose:
-        core.pose(now, *reading.pose)
-    if scan:
-        core.scan(now, robot.layout, reading.ranges)
-
-
-def drive(core, robot, seconds, see=see, wait=0.0):
-    """Drives in control periods; returns the commands."""
-    commands = []
-    for _ in range(round(seconds / robot.dt)):
-        now = robot.time
-        see(core, robot, now)
-        commands.append(core.tick(now, wait))
-        robot.obey(commands[-1].v, commands[-1].omega)
-        robot.step()
-    return commands
 
 
 def test_drives_as_verified(package, settings, robot, steps, here):

@@ -3,6 +3,7 @@
 import configparser
 import hashlib
 import json
+import math
 import re
 import runpy
 import shutil
@@ -14,19 +15,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from floor_task import robot_file, write_task
+from floor_task import ROBOT, robot_file, write_task
 from PIL import Image
 
 from tdac_agent import load_task, synthesize
 from tdac_agent.errors import RunError
 from tdac_agent.ros2.export import (
     COPIED,
-    NOT_RUN,
     PACKAGE,
     export_ros2,
     package_name,
     settings_of,
 )
+from tdac_agent.ros2.package_text import NOT_RUN
 from tdac_envs import preprocess
 from tdac_envs.core.errors import TaskError
 
@@ -58,7 +59,12 @@ def test_a_verified_controller(tmp_path):
     assert made.verified
     text = ET.parse(tmp_path / "out" / "package.xml").getroot().findtext("description")
     assert "Verified: arrives ≥ 95 %" in text
-    assert "not covered: other worlds" in (tmp_path / "out" / "README.md").read_text()
+    readme = (tmp_path / "out" / "README.md").read_text()
+    assert "not covered: other worlds" in readme
+    record = json.loads((tmp_path / "run" / "confirmation.json").read_text())
+    gap = record["smallest_gap"]["radii"] * ROBOT["radius"]
+    assert math.isclose(made.reach, ROBOT["radius"] + gap, abs_tol=1e-6)
+    assert f"reaches at most {made.reach:.3f} m from the middle of its axle" in readme
 
 
 def test_the_modules_are_those_that_are_tested(package):
