@@ -55,15 +55,15 @@ SUFFIXES = (".mp4", ".gif")
 def run(flags: TaskFlags, options: PlayOptions, noise: NoiseFlags) -> int:
     """Plays one episode; returns 0 if the goal was reached, else 1."""
     check_tier(options.tier)
-    if options.seed is None:
+    flags = with_own_set(options.controller, flags)
+    if options.seed is None and flags.set_name is None:
         require_flag("--seed N", typed_fields(noise))
-    elif options.episode is not None:
+    elif options.seed is not None and options.episode is not None:
         raise TaskError("give --episode or --seed, not both")
     name = _checked(options.episode)
-    flags = with_own_set(options.controller, flags)
     check_scope(flags.set_name is not None, flags, options, noise)
     if flags.set_name is not None:
-        return _play_world(flags.set_name, options)
+        return _play_world(flags.set_name, options, noise)
     controller_file(options.controller)  # fails early on a wrong name
     if options.mcap is None or options.video is not None:
         check_video(options.video)
@@ -107,11 +107,11 @@ def _play_deviated(task: Task, source: bytes, options: PlayOptions) -> int:
     return show(rollout, frames_of, task.name, options)
 
 
-def _play_world(name: str, options: PlayOptions) -> int:
+def _play_world(name: str, options: PlayOptions, noise: NoiseFlags) -> int:
     """Plays an episode on a world of a task set; returns as `run` does."""
     check_shown(options.split)
     check_video(options.video)
-    tasks, split, index = load_set(name), options.split, options.index
+    tasks, split, index = noise.on_set(load_set(name)), options.split, options.index
     episodes_of(tasks).compile()
     entrant = fitted(entrant_of(options.controller, ours=()), tasks)
     task = tasks.task(split, index)

@@ -68,16 +68,19 @@ def show_set_report(report: EpisodeReport, console: Console) -> None:
 
 
 def show_next_steps(
-    report: EpisodeReport,
-    name: str,
-    controller: str,
-    out: Path | None,
-    console: Console,
+    report: EpisodeReport, how: list[str], out: Path | None, console: Console
 ) -> None:
-    """Prints how to see the first failure, and where the files are."""
+    """Prints how to see the first failure, and where the files are.
+
+    Args:
+        report: The report.
+        how: Words of the command line that name controller and set.
+        out: Folder of the files.
+        console: Where it is printed.
+    """
     failed = [episode.index for episode in report.episodes if not episode.success]
     if failed:
-        play = ["play", controller, "--set", name]
+        play = ["play", *how]
         play += ["--split", str(report.provenance.split), "--index", str(failed[0])]
         print_command(console, "watch the first failure:", play)
     if out is not None and not report.refused:

@@ -15,6 +15,7 @@ from tdac_agent.synthesis.options import SUITE
 if TYPE_CHECKING:
     from tdac_agent.tasks.disturbance import Disturbance
     from tdac_agent.tasks.task import Task
+    from tdac_envs.ladder.task_sets import TaskSet
 
 VARIATION = (
     "Start poses: the task's own (nominal), within a body radius of it (jitter), "
@@ -137,6 +138,19 @@ class NoiseFlags:
     def sizes(self) -> dict[str, Any]:
         """The typed values, by name."""
         return {each.name: getattr(self, each.name) for each in typed_fields(self)}
+
+    def on_set(self, tasks: TaskSet) -> TaskSet:
+        """A task set with the typed values; the set itself without any.
+
+        Raises:
+            TaskError: A value is out of range, or the set's robot lacks it.
+        """
+        if not self.sizes:
+            return tasks
+        # Task sets need much that a task does not.
+        from tdac_agent.problems.disturbed_set import disturbed_set
+
+        return disturbed_set(tasks, self.sizes)
 
     def disturbance(self, task: Task) -> Disturbance:
         """The disturbance: the typed values, those of the task for the others.

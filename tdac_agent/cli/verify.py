@@ -56,8 +56,7 @@ def run(
     flags = with_own_set(options.controller, flags)
     check_scope(flags.set_name is not None, flags, options)
     if flags.set_name is not None:
-        _refuse_noise(noise)
-        return _verify_on_set(flags.set_name, options, child_pool)
+        return _verify_on_set(flags.set_name, options, noise, child_pool)
     return _verify_on_task(flags, options, noise, child_pool)
 
 
@@ -73,15 +72,19 @@ def _check_robust(options: VerifyOptions, noise: NoiseFlags) -> None:
         SequentialTest(options.accept_at, options.episodes, options.margin)
 
 
-def _refuse_noise(noise: NoiseFlags) -> None:
-    """Refuses disturbances of a task.
+def _disturbed(tasks: TaskSet, options: VerifyOptions, noise: NoiseFlags) -> TaskSet:
+    """The set with the typed disturbances.
 
     Raises:
-        TaskError: There are some.
+        TaskError: They are not possible there, or hidden worlds were chosen.
     """
-    if typed := typed_fields(noise):
-        names = ", ".join(map(flag_name, typed))
-        raise TaskError(f"a task set has its own disturbances: leave out {names}")
+    typed = typed_fields(noise)
+    if typed and options.split == "hidden":
+        raise TaskError(
+            f"{flag_name(typed[0])}: hidden worlds are driven with the set's own "
+            "disturbances; give --split test, or leave it out"
+        )
+    return noise.on_set(tasks)
 
 
 def _verify_on_task(
@@ -300,7 +303,9 @@ def _replay(flags: TaskFlags, options: VerifyOptions, noise: NoiseFlags) -> list
     return words if options.tier == "auto" else [*words, "--tier", options.tier]
 
 
-def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> int:
+def _verify_on_set(
+    name: str, options: VerifyOptions, noise: NoiseFlags, child_pool: ChildPool
+) -> int:
     """Drives a controller on a set and prints the report; returns the exit code."""
     from tdac_agent.cli.console import Console, print_json
     from tdac_agent.cli.driving_bar import DrivingBar
@@ -313,7 +318,7 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
     check_set_profile(options.profile)
     problem = load_set_problem(name, options.hidden_folder)
     problem = problem.allowed(options.suite, trust=options.trust)
-    tasks, suite = problem.tasks, problem.suite
+    tasks, suite = _disturbed(problem.tasks, options, noise), problem.suite
     if options.seed is not None and suite is None:
         raise TaskError(SEED_ON_SETS)
     file = _controller_on(tasks, options)
@@ -344,7 +349,8 @@ def _verify_on_set(name: str, options: VerifyOptions, child_pool: ChildPool) -> 
         print_json(report)
     else:
         show_set_report(report, console)
-        show_next_steps(report, name, options.controller, options.out, console)
+        how = [options.controller, "--set", name, *words_of(noise)]
+        show_next_steps(report, how, options.out, console)
     if report.passed:
         _envelope(tasks, options, console)
     return 0 if report.passed else 1
