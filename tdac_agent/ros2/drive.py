@@ -294,11 +294,11 @@ class Node:
                 pose = self._package.motion.compose(
                     self._origin, self._pose_of(message.pose.pose, "position")
                 )
-                self.core.localised(_variances(message))
+                self.core.where.take_variances(_variances(message))
                 self.core.pose(seconds_of(message.header.stamp), *pose)
         for message in self._in["amcl_pose"].take():
             if self._origin is None:
-                self.core.localised(_variances(message))
+                self.core.where.take_variances(_variances(message))
         for message in self._in["scan"].take():
             mount = self._mount(message.header.frame_id)
             self._scan_came = True
@@ -345,7 +345,7 @@ class Node:
             stamp = min(frame.stamp for frame in found)
             if math.isinf(stamp):
                 return
-            self.core.localiser(found[-1].stamp)  # infinite if it is static
+            self.core.where.take_transform(found[-1].stamp)  # infinite if it is static
             self.core.pose(stamp, *self._composed(found))
 
     def _way(self, top: str, frame: str) -> list[_Frame] | None:

@@ -38,7 +38,7 @@ from tdac_envs.mapping.ros_writer import write_ros_map
 PACKAGE = Path(__file__).parent / "package"
 COPIED = (
     *("core.py", "settings.py", "motion.py", "scans.py"),
-    *("worker.py", "ending.py", "node.py"),
+    *("localisation.py", "worker.py", "ending.py", "node.py", "watchdog.py"),
 )
 """Modules of the package, byte for byte those of this one."""
 CONTROLLER = "controller"
@@ -94,7 +94,7 @@ def export_ros2(
         verdict or UNVERIFIED,
         own.stops_within(),
         settings["unknown"],
-        None if gap is None else settings["robot"]["radius"] * (1.0 + gap),
+        None if gap is None else _down(settings["robot"]["radius"] * (1.0 + gap)),
     )
     existed = out.exists()
     try:
@@ -152,6 +152,11 @@ def settings_of(task: Task) -> dict[str, Any]:
         },
         "robot": written,
     }
+
+
+def _down(length: float) -> float:
+    """A length in m, rounded down to mm."""
+    return math.floor(1000.0 * length) / 1000.0
 
 
 def _unknown_text(notes: tuple[str, ...]) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tdac_agent.ros2.package.scans import Guard
-from tdac_agent.ros2.package.settings import LOST, PERIODS, usual_deviation
+from tdac_agent.ros2.package.settings import LATENCY, LOST, PERIODS, usual_deviation
 
 NOT_RUN = "The core was driven over DDS; the rclpy wrapper was not run."
 SMOOTHER = 2.5, 3.2
@@ -79,8 +79,11 @@ def values_of(made: RosPackage, settings: dict[str, Any]) -> dict[str, Any]:
         "full_float": round(float(speed), 4),
         "omega_float": round(_turn_rate(robot), 4),
         "brakes": float(robot.get("max_acceleration") or SMOOTHER[0]),
+        "omega": f"{_turn_rate(robot):.3g}",
+        "turns_on": f"{_turns_on(robot, dt):.2g}",
+        "watched": f"{speed * (PERIODS + 1) * dt + robot['stopping_distance']:.3f}",
         "turn_brakes": float(robot.get("max_turn_acceleration") or SMOOTHER[1]),
-        "timer": f"{1.5 * dt:g}",
+        "timer": f"{1.8 * dt:g}",
         "start": [f"{value:g}" for value in settings["start"]],
         "goal": [f"{value:g}" for value in settings["goal"]],
         "scanner": f"{way} {_fan_text(robot['ray_angles'])}, up to "
@@ -100,6 +103,14 @@ def _turn_rate(robot: dict[str, Any]) -> float:
     """The largest turn rate of a robot, rad/s."""
     full = 2.0 * robot["max_wheel_speed"] / robot["axle_length"]
     return float(min(full, robot.get("max_turn_rate") or math.inf))
+
+
+def _turns_on(robot: dict[str, Any], dt: float) -> float:
+    """How far a turn at full rate goes on after a stop, with the latency, rad."""
+    omega = _turn_rate(robot)
+    brakes = robot.get("max_turn_acceleration")
+    while_braking = 0.0 if not brakes else 0.5 * omega**2 / brakes
+    return omega * (1 + LATENCY) * dt + while_braking
 
 
 def _fan_text(angles: list[float]) -> str:

@@ -20,6 +20,8 @@ from tdac_envs.core.extras import install_command
 from tdac_envs.core.intake import RECORD_BYTES, parse_yaml
 
 SCAN, TF = "sensor_msgs/msg/LaserScan", "tf2_msgs/msg/TFMessage"
+OWN = "cmd_vel_tdac"
+"""Topic of the commands of an exported node, by default."""
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 POSE = "geometry_msgs/msg/PoseStamped"
 POSE_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
@@ -78,15 +80,16 @@ def topics_of(bag: Path, messages: list[Recorded]) -> Topics:
         return next(iter(best or names), None)
 
     scan = one("scans", "scan", SCAN)
-    command = one(
-        "topics of commands", "cmd_vel", "geometry_msgs/msg/Twist", TWIST_STAMPED
-    )
+    twists = TWIST, TWIST_STAMPED
+    # With a smoother, /cmd_vel has its commands, and not those of the node.
+    is_own = any(kind in twists and topic.endswith(OWN) for kind, topic in kinds)
+    command = one("topics of commands", OWN if is_own else "cmd_vel", *twists)
     for what, name in (
         ("sensor_msgs/LaserScan", scan),
         ("geometry_msgs/Twist", command),
     ):
         if name is None:
-            raise RunError(f"{bag} has no {what}: record /scan, /tf and /cmd_vel")
+            raise RunError(f"{bag} has no {what}: record /scan, /tf, /cmd_vel_tdac")
     assert scan is not None
     assert command is not None
     pose = None

@@ -15,19 +15,18 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from .localisation import Localisation
 from .motion import compose, Driven, other_map, unfit_stamp, unheard, Wheels, wrapped
 from .scans import Guard, Layout, LayoutError, Scanner
 from .settings import FARTHEST, LOST, PERIODS, Settings, SettingsError, SHARE
 
 __all__ = ['PERIODS', 'SHARE', 'Command', 'Core', 'Policy', 'Settings', 'SettingsError']
-STEADY = 10
-"""Control periods without a jump after which the pose counts again."""
-TURNED = 0.25
-"""Largest jump and standard deviation of the yaw, rad."""
 RECENT = 20
 """Number of the last control periods in which most answers must not be late."""
 SETTLED = 1.0
 """Time after the last motion in which the robot has come to a stand, s."""
+FORGOTTEN = 5.0
+"""Time from the call of `start` after which the first plan needs another call, s."""
 AGAIN = 'call the service start to drive on'
 
 
@@ -66,6 +65,7 @@ class Core:
     Attributes:
         publishers: How many publishers the topic of commands has, this one included.
         listeners: How many take the commands.
+        timer_unfit: Why the robot's own timer is not known to work; empty if it is.
         commands: Answers of the controller so far.
         latched: Why the robot stands until `start` is called; empty if it does not.
         final: The last command, when the drive is over.
@@ -80,21 +80,20 @@ class Core:
         self._guard = Guard(settings.robot, settings.reaction)
         self._scan_age = 0.0
         self._ranges: np.ndarray[Any, Any] | None = None
-        self._scan_stamp = self._pose_stamp = -math.inf
-        self._pose = self._place = (0.0, 0.0, 0.0)
-        self._drove_at = -math.inf
-        self._jump, self._jump_stamp, self._unsure = '', -math.inf, ''
-        self._refused = ''
+        self._scan_stamp = -math.inf
         self._driven = Driven(settings.dead_man)
+        self.where = Localisation(settings, self._driven)
+        self._place = self.where.pose
+        self._drove_at = self._called_at = -math.inf
+        self._refused = ''
         self._now = -math.inf
         self._asked = self._planned = self._begun = False
         self._held = settings.start_on == 'service'
         self._fit = math.inf
         self._late: deque[bool] = deque(maxlen=RECENT)
-        self._localiser: float | None = None
-        self._is_renewed, self._renewed = False, math.inf
         self.latched = ''
         self.publishers = self.listeners = 1
+        self.timer_unfit = ''
         self.commands = 0
         self.final: Command | None = None
 
@@ -120,9 +119,10 @@ class Core:
             return
         task, guard = self._scanner.read(ranges)
         if task is not None:
+            moved = self._driven.between(self._scan_stamp, stamp)
             self._ranges, self._scan_stamp, self._refused = task, stamp, ''
             self._scan_age = age or self.settings.dt
-            self._guard.see(guard, self._scanner.guard_angles())
+            self._guard.see(guard, self._scanner.guard_angles(), moved)
 
     def refuse_scan(self, why: str) -> None:
         """Say why scans do not count."""
@@ -132,37 +132,12 @@ class Core:
         """Take a pose in the map's frame; older ones than the last do not count."""
         if not abs(x) + abs(y) + abs(yaw) < FARTHEST:
             return
-        if not self._is_new(stamp, self._pose_stamp):
+        if not self._is_new(stamp, self.where.stamp):
             return
         pose = (x, y, wrapped(yaw))
-        if self._pose_stamp > -math.inf:
-            off, turn = self._off(stamp, pose)
-            if off > self.settings.largest_jump or turn > TURNED:
-                self._jump = f'the pose jumped by {off:.2f} m and {turn:.2f} rad'
-                self._jump_stamp = stamp
-        self._pose, self._pose_stamp = pose, stamp
+        self.where.take(stamp, pose)
         if stamp <= self._drove_at + SETTLED:
             self._place = pose
-
-    def localiser(self, stamp: float) -> None:
-        """
-        Take the stamp of the localiser's transform, which shows that it is alive if it is new.
-
-        A localiser may stamp ahead of its data, as AMCL does by its `transform_tolerance`, so only
-        the time counts in which the stamp does not change.
-        """
-        if stamp != self._localiser and math.isfinite(stamp):
-            self._localiser, self._is_renewed = stamp, True
-
-    def localised(self, variances: tuple[float, float, float]) -> None:
-        """Take the variances of x, y and yaw that a localiser states; 0 or less says nothing."""
-        x, y, yaw = (math.inf if math.isnan(each) else each for each in variances)
-        off, turn = math.sqrt(max(x, y, 0.0)), math.sqrt(max(yaw, 0.0))
-        self._unsure = ''
-        if off > self.settings.largest_deviation or turn > TURNED:
-            self._unsure = (
-                f'the pose is unsure: standard deviation {off:.2f} m and {turn:.2f} rad, at '
-                f'most {self.settings.largest_deviation:g} m and {TURNED:g} rad (max_deviation)')
 
     def localiser_map(
         self, size: tuple[int, int], resolution: float, origin: tuple[float, float, float]
@@ -176,7 +151,7 @@ class Core:
 
     def has(self, stamp: float) -> bool:
         """Whether scan and pose of this moment have arrived."""
-        return min(self._scan_stamp, self._pose_stamp) >= stamp - 1e-6
+        return min(self._scan_stamp, self.where.stamp) >= stamp - 1e-6
 
     def end(self, reason: str) -> Command:
         """End the drive, as on SIGTERM."""
@@ -193,6 +168,8 @@ class Core:
             return False, why
         said = 'the drive goes on' if self._begun else 'the drive begins'
         self._held, self.latched, self._fit = False, '', now
+        self._called_at = now
+        self.where.begin()
         self._late.clear()
         return True, said
 
@@ -246,8 +223,7 @@ class Core:
     def _next(self, now: float, wait: float) -> Command:
         if self.final is not None:
             return self.final
-        if self._is_renewed:
-            self._is_renewed, self._renewed = False, now
+        self.where.tick(now)
         why = self._unfit(now)
         if self._begun and self._is_at_goal(now):
             return self._end('reached', 'the goal')
@@ -272,7 +248,7 @@ class Core:
             if not self._planned and self.settings.start_on == 'service':
                 self._held = True  # the call was for then, not for whenever it fits
             why = why or 'ready: call the service start'
-            return self._stand('stopped' if self._planned else 'waiting', why)
+            return self._stand('stopped' if self._begun else 'waiting', why)
         if self._is_at_goal(now):
             return self._end('reached', 'the goal')
         if self.commands >= self.settings.horizon:
@@ -283,10 +259,10 @@ class Core:
 
     def _is_at_goal(self, now: float) -> bool:
         """Return whether the last pose that counted is at the goal, even if it is old by now."""
-        ahead = self._pose_stamp - now
-        if self._unsure or self._has_jumped() or ahead > self.settings.oldest:
+        ahead = self.where.stamp - now
+        if not self.where.is_sure() or ahead > self.settings.oldest:
             return False
-        return math.dist(self._pose[:2], self.settings.goal) <= self.settings.goal_tolerance
+        return math.dist(self.where.pose[:2], self.settings.goal) <= self.settings.goal_tolerance
 
     def _latch(self, why: str, now: float) -> None:
         """Stop for good, until `start` is called, where a person may be near by now."""
@@ -295,8 +271,11 @@ class Core:
             self._fit = now
         if self.settings.recover or self.latched or not self._is_underway():
             return
-        if self.publishers > 1 or not self.listeners or self._has_jumped():
+        is_alone = self.publishers <= 1 and self.listeners and not self.timer_unfit
+        if not is_alone or self.where.has_jumped():
             self.latched = why
+        elif self.where.strays and self._begun:
+            self.latched = self.where.strays
         elif missing > LOST:
             reason = why or 'the data are back'
             self.latched = f'without fitting data for more than {LOST:g} s: {reason}'
@@ -319,9 +298,13 @@ class Core:
                 self._was_late(late=True)
                 return self._stand('stopped', why or 'the controller is late')
             return self._stand('planning', 'the first plan is not ready')
+        is_first = not self._planned
         self._asked, self._planned = False, True
         if answer[0] == 'error':
             return self._end('failed', str(answer[1]))
+        if is_first and self.settings.start_on == 'service' and now > self._called_at + FORGOTTEN:
+            self._held = True
+            return self._stand('waiting', 'the plan is ready: call the service start again')
         if why:
             return self._stand('stopped', why)
         self._was_late(late=False)
@@ -330,7 +313,7 @@ class Core:
     def observation(self) -> dict[str, Any]:
         """Return what the controller observes, as it did when it was verified."""
         own = {
-            'pose': self._pose, 'goal': self.settings.goal, 'wheel_speeds': self._wheels.last,
+            'pose': self.where.pose, 'goal': self.settings.goal, 'wheel_speeds': self._wheels.last,
             'ranges': self._ranges}
         return {name: np.array(value, np.float32) for name, value in own.items()}
 
@@ -348,37 +331,23 @@ class Core:
             self._wheels.last = before
             return self._stand('stopped', 'something is ahead within the stopping distance')
         self._begun, self._drove_at = True, now
-        self._place = compose(self._pose, self._driven.between(self._pose_stamp, now))
+        self._place = compose(self.where.pose, self._driven.between(self.where.stamp, now))
         return Command(v, omega, 'driving')
 
     def _unfit(self, now: float) -> str:
         """Return why no command may move the robot now; an empty text if one may."""
-        if why := unheard(self.publishers, self.listeners):
+        if why := unheard(self.publishers, self.listeners) or self.timer_unfit:
             return why
         oldest = self.settings.oldest
-        for name, stamp in (('scan', self._scan_stamp), ('pose', self._pose_stamp)):
+        for name, stamp in (('scan', self._scan_stamp), ('pose', self.where.stamp)):
             if why := unfit_stamp(name, now - stamp, oldest):
                 return why + (self._refused if name == 'scan' else '')
-        if abs(self._scan_stamp - self._pose_stamp) > oldest:
+        if abs(self._scan_stamp - self.where.stamp) > oldest:
             return f'scan and pose are more than {oldest:g} s apart'
-        if why := self._unlocalised(now):
+        if why := self.where.unfit(now):
             return why
         may_begin = self._begun or self.settings.any_start
         return '' if may_begin else self._wrong_start()
-
-    def _unlocalised(self, now: float) -> str:
-        silent = self.settings.max_localiser_age
-        if self._localiser is not None and not now - self._renewed <= silent + 1e-9:
-            return f'the localiser sent nothing new for {silent:g} s (max_localiser_age)'
-        if self._unsure:
-            return self._unsure
-        if self._has_jumped():
-            return f'{self._jump}: it must be steady for {STEADY * self.settings.dt:g} s'
-        return ''
-
-    def _has_jumped(self) -> bool:
-        """Return whether the pose jumped and has not been steady since."""
-        return self._pose_stamp - self._jump_stamp < STEADY * self.settings.dt
 
     def _wrong_start(self) -> str:
         if not (apart := self._apart_from(self.settings.start)):
@@ -402,25 +371,10 @@ class Core:
 
     def _apart_from(self, place: tuple[float, float, float]) -> str:
         """Return how far the robot is from a place, or nothing if it counts as there."""
-        off, turn = math.dist(self._pose[:2], place[:2]), abs(wrapped(self._pose[2] - place[2]))
+        own = self.where.pose
+        off, turn = math.dist(own[:2], place[:2]), abs(wrapped(own[2] - place[2]))
         is_there = off <= float(self.settings.robot['radius']) and turn <= 0.5
         return '' if is_there else f'{off:.2f} m and {turn:.2f} rad'
-
-    def _off(self, stamp: float, pose: tuple[float, float, float]) -> tuple[float, float]:
-        """
-        Return how far a pose is from where the commands lead since the last one: m, rad.
-
-        The wheels may have obeyed up to three periods late; the best fit counts.
-        """
-        found = []
-        for late in range(PERIODS + 1):
-            shift = late * self.settings.dt
-            moved = self._driven.between(self._pose_stamp - shift, stamp - shift)
-            there = compose(self._pose, moved)
-            turn = abs(wrapped(pose[2] - there[2]))
-            found.append((math.dist(pose[:2], there[:2]), turn))
-        limit = self.settings.largest_jump
-        return min(found, key=lambda each: max(each[0] / limit, each[1] / TURNED))
 
     def _stand(self, state: str, reason: str) -> Command:
         self._wheels.limited(0.0, 0.0)

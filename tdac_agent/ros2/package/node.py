@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+import time
 from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
@@ -29,16 +30,19 @@ from . import core, ending, motion, scans, worker
 PACKAGE = __package__ or ''
 PATH_STEP, MOST_POSES = 0.05, 5000
 """Distance of two poses of the published path, m; the most of them."""
+ASKED, ANSWERED = 2.0, 1.0
+"""Time between two questions to `dead_man_node`, and the longest for an answer, s."""
 WAKES = 0.1
 """Longest time in which a signal waits for its handler, s of the wall clock."""
-ONLOOKERS = ('rosbag2', '_ros2cli')
-"""How names of nodes begin that only record or show commands."""
+ONLOOKERS = ('rosbag2', '_ros2cli', 'watchdog')
+"""How names of nodes begin that record or show commands, or stop a robot without any."""
 DEFAULTS: dict[str, Any] = {
     'scan_topic': 'scan',
     'odom_topic': 'odom',
     'covariance_topic': 'amcl_pose',
     'map_topic': 'map',
-    'command_topic': 'cmd_vel',
+    'command_topic': 'cmd_vel_tdac',
+    'driver_topic': 'cmd_vel',
     'stamped': False,
     'pose_source': 'tf',
     'map_frame': 'map',
@@ -47,8 +51,8 @@ DEFAULTS: dict[str, Any] = {
     'max_localiser_age': 1.0,
     'origin': [0.0, 0.0, 0.0],
     'dead_man': 0.0,
-    'dead_man_node': '',
-    'dead_man_parameter': 'cmd_vel_timeout',
+    'dead_man_node': 'velocity_smoother',
+    'dead_man_parameter': 'velocity_timeout',
     'max_age': 0.0,
     'max_jump': 0.0,
     'max_deviation': 0.0,
@@ -90,6 +94,7 @@ class DriveNode(Node):  # type: ignore[misc]
         self._listener = TransformListener(self._buffer, self)
         kind = TwistStamped if own['stamped'] else Twist
         self._out = self.create_publisher(kind, own['command_topic'], 1)
+        self._driver = self.resolve_topic_name(own['driver_topic'])
         kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._state = self.create_publisher(String, '~/state', kept)
         self._way, self._driven = PathMessage(), self.create_publisher(PathMessage, '~/path', kept)
@@ -106,35 +111,47 @@ class DriveNode(Node):  # type: ignore[misc]
             self.create_subscription(OccupancyGrid, own['map_topic'], self._on_map, kept)
         self.get_logger().info(f'stops within (m): {settings.stops_within()}')
         self.publish(core.Command(0.0, 0.0, 'waiting'))
-        self._dead_man = self._ask_dead_man()
+        self._future, self._asked = None, -math.inf
+        self._timer_unfit = 'no answer of dead_man_node yet'
+        self._client = self._ask_dead_man()
         self.create_service(Trigger, '~/start', self._on_start)
         self.create_service(Trigger, '~/stop', self._on_stop)
         self.create_timer(settings.dt, self._tick)
 
     def _ask_dead_man(self) -> Any:
-        """Ask the robot's driver for its timer, where it has a parameter for it."""
+        """
+        Return a client for the timer's parameter, where a node has one.
+
+        It is asked again and again: a node that does not answer is dead, or frozen.
+        """
         if not self.own['dead_man_node']:
             return None
         client = self.create_client(
             GetParameters, f'{self.own["dead_man_node"]}/get_parameters')
         if not client.wait_for_service(timeout_sec=5.0):
             raise core.SettingsError(f'dead_man_node: no node {self.own["dead_man_node"]}')
-        request = GetParameters.Request(names=[self.own['dead_man_parameter']])
-        return client.call_async(request)
+        return client
 
-    def _check_dead_man(self) -> bool:
-        """Return whether the timer is as declared, or cannot be read."""
-        if self._dead_man is None:
-            return True
-        if not self._dead_man.done():
-            return False
-        response, self._dead_man = self._dead_man.result(), None
-        values = [
-            each.double_value if each.type == ParameterType.PARAMETER_DOUBLE else None
-            for each in (response.values if response is not None else ())]
-        name = f'{self.own["dead_man_parameter"]} of {self.own["dead_man_node"]}'
-        self.core.check_timer(name, values)
-        return True
+    def _check_dead_man(self) -> str:
+        """Return why the timer is not known to be as declared, or an empty text."""
+        if self._client is None:
+            return ''
+        name, now, future = self.own['dead_man_node'], time.monotonic(), self._future
+        if future is None and now >= self._asked + ASKED:
+            request = GetParameters.Request(names=[self.own['dead_man_parameter']])
+            self._future, self._asked = self._client.call_async(request), now
+        elif future is not None and future.done():
+            self._future, self._timer_unfit = None, ''
+            response = future.result()
+            values = [
+                each.double_value if each.type == ParameterType.PARAMETER_DOUBLE else None
+                for each in (response.values if response is not None else ())]
+            self.core.check_timer(f'{self.own["dead_man_parameter"]} of {name}', values)
+        elif future is not None and now > self._asked + ANSWERED:
+            self._client.remove_pending_request(future)
+            self._future = None
+            self._timer_unfit = f'no answer of {name} (dead_man_node): is it dead?'
+        return self._timer_unfit
 
     def _on_start(self, _request: Any, response: Any) -> Any:
         now = self.get_clock().now().nanoseconds * 1e-9
@@ -195,7 +212,7 @@ class DriveNode(Node):  # type: ignore[misc]
 
     def _on_localised(self, message: Any) -> None:
         own = message.pose.covariance
-        self.core.localised((float(own[0]), float(own[7]), float(own[35])))
+        self.core.where.take_variances((float(own[0]), float(own[7]), float(own[35])))
 
     def _look_up(self) -> None:
         try:
@@ -213,7 +230,7 @@ class DriveNode(Node):  # type: ignore[misc]
         except TransformException:
             return
         if (stamp := _seconds(found.header.stamp)) > 0.0:  # 0: a static one
-            self.core.localiser(stamp)
+            self.core.where.take_transform(stamp)
 
     def _show_goal(self, out: Any, goal: tuple[float, float]) -> None:
         """Publish the goal once, for RViz."""
@@ -239,18 +256,28 @@ class DriveNode(Node):  # type: ignore[misc]
         self._driven.publish(self._way)
 
     def _tick(self) -> None:
-        if not self._check_dead_man():
-            self.publish(core.Command(0.0, 0.0, 'waiting', 'no answer of dead_man_node yet'))
-            return
+        self.core.timer_unfit = self._check_dead_man()
         if self.own['pose_source'] == 'tf':
             self._look_up()
-        topic = self._out.topic_name  # remapped: these functions do not remap
-        self.core.publishers = self.count_publishers(topic)
-        self.core.listeners = sum(
-            not each.node_name.startswith(ONLOOKERS)
-            for each in self.get_subscriptions_info_by_topic(topic))
+        self._count()
         now = self.get_clock().now().nanoseconds * 1e-9
         self.publish(self.core.tick(now, self._wait))
+
+    def _count(self) -> None:
+        """Count who publishes the commands and who takes them, up to the robot's driver."""
+        topic = self._out.topic_name  # remapped: these functions do not remap
+        publishers = self._others(self.get_publishers_info_by_topic(topic))
+        listeners = self._others(self.get_subscriptions_info_by_topic(topic))
+        if self._driver != topic:  # a smoother is between them
+            smoothers = self._others(self.get_publishers_info_by_topic(self._driver))
+            drivers = self._others(self.get_subscriptions_info_by_topic(self._driver))
+            publishers += max(smoothers - 1, 0)
+            listeners = min(listeners, smoothers, drivers)
+        self.core.publishers, self.core.listeners = publishers, listeners
+
+    @staticmethod
+    def _others(endpoints: Any) -> int:
+        return sum(not each.node_name.startswith(ONLOOKERS) for each in endpoints)
 
     def publish(self, command: core.Command) -> None:
         """Publish a command, and say what changed."""

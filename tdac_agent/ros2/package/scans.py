@@ -254,8 +254,8 @@ class Guard:
     """
     What lies in the robot's way, from scans alone.
 
-    A ray that was near and has no value now keeps what it read, until it reads again: what
-    is too near to be measured is not gone.
+    Something near on which the ray has no value now stays where it was, until this direction
+    reads again: what is too near to be measured is not gone.
 
     Args:
         robot: See `settings.json`.
@@ -271,18 +271,37 @@ class Guard:
         least = self.radius + self.stop + float(np.hypot(*self.offset))
         self.error = 2.0 * float(robot.get('range_noise') or 0.0) * max(least, NOISY_FROM)
         self.points = np.zeros((0, 2))
-        self._kept = np.zeros(0)
 
-    def see(self, ranges: np.ndarray[Any, Any], angles: np.ndarray[Any, Any]) -> None:
-        """Take the ranges of a scan (NaN: unknown, inf: free) at angles from the heading."""
-        if len(self._kept) != len(ranges):
-            self._kept = np.full(len(ranges), np.inf)
-        unknown = np.isnan(ranges)
-        near = np.where(self._kept < self.keep, self._kept, np.inf)
-        self._kept = np.where(unknown, near, ranges)
-        hit = np.isfinite(self._kept)
-        own, turn = self._kept[hit], angles[hit]
-        self.points = self.offset + np.stack([own * np.cos(turn), own * np.sin(turn)], axis=1)
+    def see(
+        self, ranges: np.ndarray[Any, Any], angles: np.ndarray[Any, Any],
+        moved: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        """
+        Take the ranges of a scan.
+
+        Args:
+            ranges: Ranges; NaN is unknown, inf is free.
+            angles: Their angles from the heading.
+            moved: Motion since the last scan, as the pose now in the body's frame then.
+        """
+        hit = np.isfinite(ranges)
+        own, turn = ranges[hit], angles[hit]
+        seen = self.offset + np.stack([own * np.cos(turn), own * np.sin(turn)], axis=1)
+        kept = self._kept(_seen_from(self.points, moved), np.isnan(ranges), angles)
+        self.points = np.concatenate([seen, kept])
+
+    def _kept(
+        self, points: np.ndarray[Any, Any], unknown: np.ndarray[Any, Any],
+        angles: np.ndarray[Any, Any],
+    ) -> np.ndarray[Any, Any]:
+        """Return the near ones of earlier points, in directions that are unknown now."""
+        x, y = (points - self.offset).T
+        is_near = np.hypot(x, y) < self.keep
+        if not unknown.any() or not is_near.any():
+            return points[:0]
+        points, turn = points[is_near], np.arctan2(y, x)[is_near]
+        ray = np.abs(_turns(turn[:, None] - angles)).argmin(axis=1)
+        return np.asarray(points[unknown[ray]][-MOST_RAYS:])
 
     def blocked(
         self, v: float, omega: float, full: float, moved: tuple[float, float, float],
@@ -306,10 +325,7 @@ class Guard:
         """
         if abs(v) < 1e-6 or not len(self.points):
             return False
-        x, y, yaw = moved
-        cosine, sine = math.cos(yaw), math.sin(yaw)
-        seen = self._shifted(turned) - (x, y)
-        points = seen @ np.array([[cosine, -sine], [sine, cosine]])
+        points = _seen_from(self._shifted(turned), moved)
         far = self.stop * min(abs(v) / full, 1.0) + abs(v) * self.reaction
         far += self.error + extra
         away = np.hypot(*points.T)
@@ -325,6 +341,15 @@ class Guard:
         x, y = self.points.T
         cosine, sine = np.cos(each), np.sin(each)
         return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1).reshape(-1, 2)
+
+
+def _seen_from(
+    points: np.ndarray[Any, Any], pose: tuple[float, float, float]
+) -> np.ndarray[Any, Any]:
+    """Return points, shape (n, 2), in the frame of a pose."""
+    x, y, yaw = pose
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return np.asarray((points - (x, y)) @ np.array([[cosine, -sine], [sine, cosine]]))
 
 
 def _from_arc(points: np.ndarray[Any, Any], way: float, turn: float) -> np.ndarray[Any, Any]:

@@ -138,7 +138,7 @@ class Settings:
         own = float(self.robot['stopping_distance']) + v * self.reaction
         return {
             'a scan or a pose is late, lost or old': v * self.oldest + own,
-            'the localiser is silent': v * self.max_localiser_age + own,
+            'the localiser is silent': v * (self.max_localiser_age + self.dt) + own,
             'the pose jumps or is unsure': own,
             'the controller is late, raises or is not finite': own,
             'something is ahead, the goal, ~/stop, SIGTERM, a second publisher': own,

@@ -984,11 +984,11 @@ def test_an_unsure_pose_stops_it(make_core, robot, variances, drives):
     """It drives on as soon as the localiser is sure again; 0 or less says nothing."""
     core = make_core()
     drive(core, robot, 0.5)
-    core.localised(variances)
+    core.where.take_variances(variances)
     command = drive(core, robot, 0.1)[-1]
     assert (command.state == "driving") == drives
     assert drives or "the pose is unsure: standard deviation" in command.reason
-    core.localised((0.01, 0.01, 0.001))
+    core.where.take_variances((0.01, 0.01, 0.001))
     assert drive(core, robot, 0.1)[-1].state == "driving"
 
 
@@ -1060,7 +1060,7 @@ def localised_by_amcl(core, robot, random, lost=0.0, silent=math.inf):
         while held and held[0][0] <= now:
             stamp = held.pop(0)[1]
             if now < silent:
-                core.localiser(stamp)
+                core.where.take_transform(stamp)
         core.pose(now, *robot.read().pose)
 
     return see

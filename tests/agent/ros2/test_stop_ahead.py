@@ -130,3 +130,116 @@ def test_a_drive_goes_on_only_where_it_stopped(make_core, robot, shift, turn, go
         assert (last.v, last.state) == (0.0, "stopped")
         drive(core, robot, 2.0)  # put back
         assert core.start(robot.time - robot.dt)[0]
+
+
+def box_ahead(robot, away, is_lost):
+    """Ranges of 360 rays to a box 0.12 m wide; near it, they say nothing."""
+    angles = np.arange(360) * math.tau / 360
+    ranges = np.full(360, 3.0)
+    for i, angle in enumerate(angles):
+        if abs(math.tan(angle)) * away < 0.06 and math.cos(angle) > 0.0:
+            ranges[i] = away / math.cos(angle)
+    return np.where(ranges < 0.3, math.nan, ranges) if is_lost else ranges
+
+
+@pytest.mark.parametrize("is_lost", [False, True])
+def test_what_is_not_seen_any_more_stays_where_it_was(settings, is_lost):
+    """A dark box of which no ray returns once it is near stops the robot, too."""
+    angles = np.arange(360) * math.tau / 360
+    guard = Guard({**settings["robot"], "scanner_offset": None}, 0.2)
+    x, step, box = 0.0, 0.06, 1.0
+    for i in range(40):
+        moved = (step, 0.0, 0.0) if i else (0.0, 0.0, 0.0)
+        guard.see(box_ahead(None, box - x, is_lost), angles, moved)
+        if guard.blocked(0.3, 0.0, 0.3, (0.0, 0.0, 0.0)):
+            break
+        x += step
+    gap = box - x - guard.radius
+    assert 0.0 < gap < 0.2
+    # Turned away, it is beside the robot; once its direction reads again, it is gone.
+    guard.see(box_ahead(None, 9.0, False) * math.nan, angles, (0.0, 0.0, -math.pi / 2))
+    assert not guard.blocked(0.3, 0.0, 0.3, (0.0, 0.0, 0.0))
+    assert len(guard.points)
+    guard.see(np.full(360, math.inf), angles, (0.0, 0.0, math.pi / 2))
+    assert not len(guard.points)
+
+
+def test_a_stuck_robot_stops_until_it_is_started(make_core, robot):
+    """Its wheels turn, or do not; the pose stays, and no scan shows why."""
+    core = make_core()
+    reading = robot.read()
+    for i in range(40):
+        core.pose(0.1 * i, *reading.pose)
+        core.scan(0.1 * i, robot.layout, reading.ranges)
+        command = core.tick(0.1 * i, 0.0)
+    assert command.v == 0.0
+    assert command.reason.startswith("the robot is stuck: it moved 0.00 m in 2 s")
+    assert core.start(4.0)[0]
+    core.pose(4.0, *reading.pose)
+    core.scan(4.0, robot.layout, reading.ranges)
+    assert core.tick(4.0, 0.0).state == "driving"
+
+
+def test_a_robot_that_moves_by_itself_stops_the_drive(make_core, robot):
+    """As where the driver keeps its last command, or somebody pushes it."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    core.stop()
+    drive(core, robot, 3.0)
+    core.start(robot.time)
+    core.stop()
+    begin, (x, y, yaw) = robot.time, map(float, robot.read().pose)
+    for i in range(40):
+        now = begin + 0.1 * i
+        core.pose(now, x + 0.008 * i, y, yaw)
+        core.scan(now, robot.layout, robot.read().ranges)
+        core.tick(now, 0.0)
+    assert core.where.strays.startswith("the robot moves by itself: it moved 0.1")
+
+
+def test_a_usual_drive_strays_never(make_core, robot):
+    """Turns, stops and noise of the pose are no reason."""
+    random = np.random.default_rng(3)
+    way = iter(range(10_000))
+
+    def policy(_):
+        i = next(way)
+        return "action", ((0.0, 0.0) if i % 60 > 40 else (0.5, -0.5 + (i % 60) / 40))
+
+    core = make_core(policy, any_start=True)
+    for _ in range(600):
+        x, y, yaw = map(float, robot.read().pose)
+        noise = random.normal(0.0, 0.005, 2)
+        core.pose(robot.time, x + noise[0], y + noise[1], yaw)
+        core.scan(robot.time, robot.layout, robot.read().ranges)
+        command = core.tick(robot.time, 0.0)
+        robot.obey(command.v, command.omega)
+        robot.step()
+        if robot.over:
+            break
+    assert core.where.strays == ""
+
+
+def test_a_plan_that_took_long_needs_another_call(make_core, robot):
+    """Who called may have gone to the robot meanwhile."""
+    core = make_core(start_on="service")
+    drive(core, robot, 0.3)
+    core._policy.waits = True
+    assert core.start(robot.time - robot.dt)[0]
+    drive(core, robot, 6.0)
+    core._policy.waits = False
+    last = drive(core, robot, 1.0)[-1]
+    assert (last.v, last.state) == (0.0, "waiting")
+    assert core.start(robot.time - robot.dt)[0]
+    assert drive(core, robot, 0.1)[-1].state == "driving"
+
+
+def test_a_timer_that_is_not_known_to_work_stops_the_drive(make_core, robot):
+    """Such as a smoother that does not answer any more."""
+    core = make_core()
+    drive(core, robot, 0.5)
+    core.timer_unfit = "no answer of velocity_smoother (dead_man_node): is it dead?"
+    assert drive(core, robot, 0.2)[-1].v == 0.0
+    core.timer_unfit = ""
+    assert drive(core, robot, 0.5)[-1].state == "stopped"
+    assert core.start(robot.time)[0]
