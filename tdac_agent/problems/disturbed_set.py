@@ -41,6 +41,7 @@ def disturbed_set(tasks: TaskSet, sizes: Mapping[str, float]) -> TaskSet:
     values = {
         **own,
         "name": file.name[:LONGEST_NAME] + NAME_END,
+        "worlds_of": file.worlds_of or tasks.sha256,
         "disturbances": {**own["disturbances"], **changed},
     }
     try:

@@ -81,7 +81,7 @@ def values_of(made: RosPackage, settings: dict[str, Any]) -> dict[str, Any]:
         "brakes": float(robot.get("max_acceleration") or SMOOTHER[0]),
         "omega": f"{_turn_rate(robot):.3g}",
         "turns_on": f"{_turns_on(robot, dt):.2g}",
-        "watched": f"{speed * (PERIODS + 1) * dt + robot['stopping_distance']:.3f}",
+        "watched": f"{speed * (PERIODS + 2) * dt + robot['stopping_distance']:.3f}",
         "turn_brakes": float(robot.get("max_turn_acceleration") or SMOOTHER[1]),
         "timer": f"{1.8 * dt:g}",
         "start": [f"{value:g}" for value in settings["start"]],

@@ -115,6 +115,11 @@ class SetFile(StrictModel):
     bar: float = Field(
         0.95, gt=0.05, lt=1, description="Success rate of a verified controller."
     )
+    worlds_of: str = Field(
+        "",
+        pattern=r"^([0-9a-f]{64})?$",
+        description="Hash of the set whose public worlds it has; empty for its own.",
+    )
     most_contacts: float = Field(
         MOST_CONTACTS,
         gt=0.01,
@@ -293,7 +298,8 @@ class SetFile(StrictModel):
         """
         out = {"description", "files"}
         # Sets without them keep the hash that they had before.
-        out |= {name for name in ("movers", "resolution") if not getattr(self, name)}
+        unused = "movers", "resolution", "worlds_of"
+        out |= {name for name in unused if not getattr(self, name)}
         if self.most_contacts == MOST_CONTACTS:
             out.add("most_contacts")
         values = self.model_dump(mode="json", by_alias=True, exclude=out)

@@ -278,6 +278,8 @@ class TaskSet:
             self._check_file_split(split)
         if split != "hidden" and salt is not None:
             raise TaskError(f"split {split!r} has a public salt; leave out the salt")
+        if split == "hidden" and self.file.worlds_of:
+            raise TaskError(f"set {self.name!r} has the public worlds of another set")
         if self.files is not None and salt is not None:
             raise TaskError(
                 f"set {self.name!r} has worlds from files; leave out the salt"
@@ -293,7 +295,8 @@ class TaskSet:
             )
         if self.files is not None and split == "hidden":
             salt = bytes.fromhex(self.files.hidden_sha256 or "")
-        return world_key(salt or _PUBLIC_SALT, self.sha256, split, index, purpose)
+        own = self.file.worlds_of or self.sha256
+        return world_key(salt or _PUBLIC_SALT, own, split, index, purpose)
 
     def _check_file_split(self, split: str) -> None:
         assert self.files is not None
