@@ -46,7 +46,7 @@ SAME: dict[str, str] = {
         "bafe5cc4e1227b0fe28e68475a0256d2f75bf8119d7486d5d3bb1cba1f990dab"
     ),
     # Another physics can measure rays, too; the exact step is what it was.
-    "703dd0ed0d6a38d584d9b9c5a96862974927e93ba7a0f5f94d72497f9a9ddb0c": (
+    "008bca59b5b753cffaf24c4f524bf1c2f8809ad7bff3e69f13ebdec008f78512": (
         "46a5299112cd13c1188f8899f0e1d9ef6aa22ac926b7f3b91c12e6dbe9ef96e7"
     ),
     "6c2eae5236512cf55daa1387f52cd1fe50116e30f4bb0863e8616f325b6ecf8a": (

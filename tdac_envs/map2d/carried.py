@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +90,17 @@ class Carried:
         state[FORWARD], state[TURN] = arc_between((x, y, heading), end)
         robot.outcome[TOUCHED] = robot.outcome[CONTACT] = moved.touched
         finish(words)
+
+    def measuring(
+        self, calls: list[Callable[[], None]], robot: Map2DArrays, task: Map2DTask
+    ) -> list[Callable[[], None]]:
+        """Calls of kernels, with MuJoCo's ranges in place of theirs."""
+
+        def measured(call: Callable[[], None]) -> None:
+            call()
+            self.measure(robot, task)
+
+        return [partial(measured, call) for call in calls]
 
     def measure(self, robot: Map2DArrays, task: Map2DTask) -> None:
         """Replaces the ranges by those that MuJoCo measures, at the robot's top."""

@@ -506,8 +506,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         calls: list[Callable[[], None]] = [partial(call, words) for call in kernels]
         if self._carried is not None:
             calls[1] = partial(self._carried.step, words, self.robot, self.task)
-        if self.setup.physics.measures:
-            calls = [partial(self._then_measure, call) for call in calls]
+            if self.setup.physics.measures:
+                calls = self._carried.measuring(calls, self.robot, self.task)
         if self.setup.sonar is not None:
             calls = [partial(self._then_listen, call) for call in calls]
         self._call_begin, self._call_drive = calls
@@ -515,12 +515,6 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         robot = self.robot
         seen = robot.pose, self._goal, robot.wheel_speeds, robot.ranges
         self._copies = [array.copy for array in seen]
-
-    def _then_measure(self, call: Callable[[], None]) -> None:
-        """Calls a kernel, and replaces its ranges by those of MuJoCo."""
-        call()
-        assert self._carried is not None
-        self._carried.measure(self.robot, self.task)
 
     def _then_listen(self, call: Callable[[], None]) -> None:
         """Calls a kernel, and replaces its ranges by those of the sonars."""
