@@ -11,7 +11,6 @@ import argparse
 import hashlib
 import json
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -20,8 +19,8 @@ from pathlib import Path
 
 from tdac_agent.storage.files import write_atomic
 from tools import for_a_point
+from tools.run import ROOT, python, tdac
 
-ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 RECORD = DOCS / "pictures.json"
 DRAWING = "tdac_envs/drawing/*.py"
@@ -42,24 +41,24 @@ class Picture:
     inputs: tuple[str, ...]
 
 
-def tool(name: str, *words: str) -> Callable[[Path], None]:
+def tool(name: str) -> Callable[[Path], None]:
     """A tool of this folder that writes a picture."""
 
     def draw(file: Path) -> None:
-        _run("-m", f"tools.{name}", *words, str(file))
+        python("-m", f"tools.{name}", str(file))
 
     return draw
 
 
 def moving(file: Path) -> None:
     """One of the moving pictures."""
-    _run("-m", "tools.moving_pictures", str(file.parent), "--only", file.name)
+    python("-m", "tools.moving_pictures", str(file.parent), "--only", file.name)
 
 
 def preview(file: Path) -> None:
     """How the map of the first steps is read."""
     with tempfile.TemporaryDirectory() as name:
-        _run("-m", "tdac_agent", "map", "maze", "--out", name)
+        tdac("map", "maze", "--out", name)
         shutil.copy(Path(name) / "preview.png", file)
 
 
@@ -67,7 +66,7 @@ def maze(file: Path) -> None:
     """The drives of a verified controller."""
     with tempfile.TemporaryDirectory() as name:
         run = Path(name) / "run"
-        _run("-m", "tdac_agent", "synth", "--no-confirm", "--out", str(run))
+        tdac("synth", "--no-confirm", "--out", str(run))
         shutil.copy(run / "trajectory.png", file)
 
 
@@ -77,14 +76,8 @@ def failure(file: Path) -> None:
         out = Path(name) / "out"
         near = for_a_point.write(Path(name))
         words = "verify", str(near), "--task", for_a_point.TASK, "--out", str(out)
-        for_a_point.tdac(*words, may_fail=True)
+        tdac(*words, may_fail=True)
         shutil.copy(out / "trajectories" / "nominal.png", file)
-
-
-def _run(*words: str) -> None:
-    done = subprocess.run([sys.executable, *words], cwd=ROOT, check=False)
-    if done.returncode:
-        raise SystemExit(f"this did not succeed: python {' '.join(words)}")
 
 
 BUILTIN = "tdac_agent/builtin/*"
