@@ -19,6 +19,7 @@ from pathlib import Path
 
 from tdac_agent.storage.files import write_atomic
 from tools import for_a_point
+from tools.gallery import NAMES
 from tools.run import ROOT, python, tdac
 
 DOCS = ROOT / "docs"
@@ -80,7 +81,11 @@ def failure(file: Path) -> None:
         shutil.copy(out / "trajectories" / "nominal.png", file)
 
 
-BUILTIN = "tdac_agent/builtin/*"
+def gallery(file: Path) -> None:
+    """A drive of the gallery."""
+    python("-m", "tools.gallery", str(file.parent), file.stem)
+
+
 PICTURES = {
     "camera.png": Picture(tool("camera_picture"), ("tools/camera_picture.py",)),
     "contact.png": Picture(tool("draw_contact"), ("tools/draw_contact.py", DRAWING)),
@@ -101,6 +106,10 @@ PICTURES = {
     **{
         name: Picture(moving, ("tools/moving_pictures.py", DRAWING))
         for name in ("map2d.gif", "epuck.gif", "ladder.gif")
+    },
+    **{
+        f"gallery/{name}.png": Picture(gallery, ("tools/gallery.py", DRAWING))
+        for name in NAMES
     },
 }
 
@@ -145,6 +154,8 @@ def main() -> int:
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / name
+            for parent in (file.parent, (DOCS / name).parent):
+                parent.mkdir(exist_ok=True)
             PICTURES[name].draw(file)
             shutil.copy(file, DOCS / name)
         kept = json.loads(RECORD.read_text("utf-8")) if RECORD.is_file() else {}
