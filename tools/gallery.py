@@ -45,6 +45,8 @@ KINDS = {
 }
 """By the end of a picture's name: in words, folder and entrant of the record."""
 NAMES = *(f"{level}-{kind}" for level in LEVELS for kind in KINDS), "floor-program"
+TIMED = "model"
+"""Programs that read the CPU clock: a drive can end otherwise than the recorded one."""
 SPLIT, WORLD = "test", 0
 WIDTH = 480
 """Width of a picture, px."""
@@ -70,9 +72,11 @@ def draw(name: str, file: Path) -> None:
         rollout = drive_episode(entrant, tasks, part, "auto", None).rollout
     found = rollout.outcome, rollout.trajectory.steps
     kept = recorded(level, kind) if level in LEVELS else None
-    if kept not in (None, found):
-        raise SystemExit(f"{name}: recorded are {kept}, driven were {found}")
     text = said(*found)
+    if kept not in (None, found):
+        if kind != TIMED:
+            raise SystemExit(f"{name}: recorded are {kept}, driven were {found}")
+        text += f" (recorded: {said(*kept)})"
     picture = _drive(tasks.task(SPLIT, WORLD), rollout)
     height = round(picture.shape[0] * WIDTH / picture.shape[1])
     small = cv2.resize(picture, (WIDTH, height), interpolation=cv2.INTER_AREA)
