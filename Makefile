@@ -36,11 +36,14 @@ PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 
 # Tests start hundreds of interpreters; without its cache, each compiles all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: synth test test-all slow slow-sample lint bench portability clients results-rl \
+.PHONY: synth demo test test-all slow slow-sample lint bench portability clients results-rl \
 	notebooks pictures docs linkcheck clean
 
 synth: $(VENV)/.installed
 	$(BIN)/tdac synth
+
+demo: $(VENV)/.installed
+	$(BIN)/tdac demo
 
 test: $(VENV)/.test-installed
 	$(BIN)/pytest $(PARALLEL) -m "not slow"
