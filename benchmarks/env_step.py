@@ -5,8 +5,8 @@
 Cases: a single environment through `gym.make` in several situations; a batch on one
 thread, on two, and in two independent processes, the upper bound for two cores at that
 moment; and the growth with the area of the map and with the number of rays, with the
-memory of the map's arrays per pixel. The cases run in turns, in short bursts. The floor
-is an environment that does nothing: the cost of Gymnasium's wrappers.
+memory of the map's arrays per pixel; and MuJoCo. The cases run in turns, in short
+bursts. The floor is an environment that does nothing: the cost of Gymnasium's wrappers.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import math
 import multiprocessing
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from importlib.util import find_spec
 from itertools import cycle, islice
 from multiprocessing.connection import Connection
 from typing import Any
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 
 import tdac_envs  # noqa: F401 - registers the env
 from benchmarks.timing import Bench, Effort, compared, in_turn, quartiles
+from tdac_envs.physics.moved import ENGINES, EXACT, MUJOCO
 
 Actions = list[Any]
 Env = gym.Env[Any, Any]
@@ -265,6 +267,16 @@ def larger_maps(rounds: int, areas: Sequence[float] = AREAS) -> Bench:
     return raced(title, bursts, rounds, notes)
 
 
+def physics(rounds: int) -> Bench:
+    """A single environment on the maze, with each physics that is installed."""
+    there = ENGINES if find_spec(MUJOCO) is not None else (EXACT,)
+    bursts = {
+        f"physics {name}": single_burst(gym.make(NAME, physics=name), random_driving)
+        for name in there
+    }
+    return raced("A single TDAC-Map2D-v0 on the maze", bursts, min(rounds, 5))
+
+
 def scatter(envs: Any, side: int) -> None:
     """Starts each robot at a random place between the pillars."""
     random = np.random.default_rng(0)
@@ -287,4 +299,4 @@ def benches(effort: Effort) -> list[Bench]:
     """One bench per table."""
     rounds = effort.rounds_of(ROUNDS)
     maps = partial(larger_maps, areas=AREAS[: 2 if effort.quick else None])
-    return [table(rounds) for table in (single, batches, more_rays, maps)]
+    return [table(rounds) for table in (single, batches, more_rays, maps, physics)]

@@ -17,6 +17,7 @@ from tdac_agent.cli.shared_options import (
 from tdac_agent.cli.typed_options import typed_options
 from tdac_agent.option_fields import option
 from tdac_agent.planners.names import planner_list
+from tdac_agent.synthesis.options import Engine
 
 bench_app = typer.Typer(
     help="Drive programs and learned policies on the same unseen worlds.",
@@ -70,7 +71,7 @@ class BenchOptions:
         "reveal`.  [default: drawn, and revealed at the end]",
         metavar="FILE",
     )
-    physics: Literal["exact", "mujoco", "mujoco-varied"] = physics_option()
+    physics: Engine = physics_option()
     tier: str = tier_option()
     executor: Literal["local", "ray"] | None = option(
         None,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import typer
 
@@ -22,6 +21,7 @@ from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, SETS, TASK, TASKS, TaskFla
 from tdac_agent.cli.typed_options import typed_options
 from tdac_agent.option_fields import option
 from tdac_agent.planners.names import planner_list
+from tdac_agent.synthesis.options import Engine
 
 app = typer.Typer()
 
@@ -60,7 +60,7 @@ class EvaluateOptions:
         0, "Seed of the episodes, the same for all policies.", least=0, scope="task"
     )
     variation: Variation = option("jitter", VARIATION, scope="task")
-    physics: Literal["exact", "mujoco", "mujoco-varied"] = physics_option()
+    physics: Engine = physics_option()
     wrappers: tuple[str, ...] | None = wrappers_option(
         f"{WRAPPER}  [default: as the .zip file records]", "--wrapper"
     )

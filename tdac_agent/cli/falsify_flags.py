@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import typer
 
@@ -17,6 +16,7 @@ from tdac_agent.cli.shared_options import (
 from tdac_agent.cli.task_flags import ONLY_FOR_SYNTH, SETS, TaskFlags
 from tdac_agent.cli.typed_options import typed_options
 from tdac_agent.option_fields import option
+from tdac_agent.synthesis.options import Engine
 
 app = typer.Typer()
 
@@ -56,7 +56,7 @@ class FalsifyOptions:
     out: Path | None = out_option(
         "Folder for falsify.json, counterexample.png, and curves.png."
     )
-    physics: Literal["exact", "mujoco", "mujoco-varied"] = physics_option()
+    physics: Engine = physics_option()
     tier: str = tier_option()
     as_json: bool = json_option()
     worlds: int = option(

@@ -10,7 +10,7 @@ import typer
 
 from tdac_agent.cli.typed_options import typed_fields
 from tdac_agent.option_fields import option
-from tdac_agent.synthesis.options import SUITE
+from tdac_agent.synthesis.options import ENGINES, SUITE
 
 if TYPE_CHECKING:
     from tdac_agent.tasks.disturbance import Disturbance
@@ -77,8 +77,9 @@ physics_option = partial(
     option,
     "exact",
     "What moves the robot: the exact step, or MuJoCo, a 3D contact solver (extra "
-    "`physics`); mujoco-varied varies mass, friction, axle and wheels a little.",
-    metavar="exact|mujoco|mujoco-varied",
+    "`physics`); mujoco-varied varies mass, friction, axle and wheels a little; "
+    "mujoco-rays also measures the rays.",
+    metavar=ENGINES,
 )
 profile_option = partial(
     option,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from tdac_agent.cli.shared_options import (
     CONTROLLER,
@@ -19,6 +18,7 @@ from tdac_agent.cli.shared_options import (
 )
 from tdac_agent.cli.task_flags import SETS
 from tdac_agent.option_fields import option
+from tdac_agent.synthesis.options import ENGINES, Engine
 
 ROBUST, PHYSICS = "Robustness", "Second opinion"
 
@@ -65,12 +65,12 @@ class VerifyOptions:
         "each failed episode."
     )
     as_json: bool = json_option()
-    physics: Literal["exact", "mujoco", "mujoco-varied"] = option(
+    physics: Engine = option(
         "exact",
         "Another physics that drives what arrives again, for a second opinion (extra "
         "`physics`); exact for none. mujoco-varied varies mass, friction, axle and "
-        "wheels a little.",
-        metavar="exact|mujoco|mujoco-varied",
+        "wheels a little; mujoco-rays also measures the rays.",
+        metavar=ENGINES,
         panel=PHYSICS,
         scope="task",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import Field, dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from tdac_agent.models.vendors import forms
 from tdac_agent.option_fields import Flag, flag_of, option
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 MODELS, BUDGET, SETS = "Models", "Budget", "Task set"
 """Headings of the help."""
+Engine = Literal["exact", "mujoco", "mujoco-varied", "mujoco-rays"]
+"""What can move the robot, as `tdac_envs.physics.moved.ENGINES`."""
+ENGINES = "|".join(get_args(Engine))
 SUITE = "Folder with additional test_*.py files to run."
 PAPER, RACE = SEARCHES = "paper", "race"
 USUAL = {
@@ -140,12 +143,12 @@ class SynthOptions:
         "--confirm/--no-confirm",
         scope="task",
     )
-    physics: Literal["exact", "mujoco", "mujoco-varied"] = option(
+    physics: Engine = option(
         "exact",
         "Another physics that drives what arrives again, for a second opinion in the "
         "report (extra `physics`); exact for none. mujoco-varied varies mass, "
-        "friction, axle and wheels a little.",
-        metavar="exact|mujoco|mujoco-varied",
+        "friction, axle and wheels a little; mujoco-rays also measures the rays.",
+        metavar=ENGINES,
         scope="task",
         recorded=False,
     )

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Words
+from tdac_envs.core.errors import TaskError
 from tdac_envs.drive.stepping import FORWARD, HEADING, TOUCHED, TURN
-from tdac_envs.epuck import kernels
+from tdac_envs.epuck import infrared, kernels
 from tdac_envs.epuck.ground import Ground, fence
 from tdac_envs.epuck.kernels import LEFT_TURNED, RIGHT_TURNED, WHEEL_RADIUS
 from tdac_envs.epuck.movables import Movables
@@ -30,6 +31,9 @@ class Carried(Movables):
     Args:
         setup: Configuration of the environment.
         task: A task in the world of the objects.
+
+    Raises:
+        TaskError: MuJoCo is not installed, or would measure rays to a goal's marker.
     """
 
     def __init__(self, setup: EPuckSetup, task: EPuckTask) -> None:
@@ -37,6 +41,9 @@ class Carried(Movables):
 
         super().__init__(setup, task)
         ground = task.ground
+        if setup.physics.measures and setup.goal_visible:
+            raise TaskError("goal_visible: MuJoCo's rays do not see the goal's marker")
+        self._has_reflectances = setup.webots
         self.moves = True
         self.solid, self.seen = ground.solid.copy(), self._visible.copy()
         body = setup.physics.body_like(body_of(ground))
@@ -64,6 +71,18 @@ class Carried(Movables):
         robot.outcome[TOUCHED] = moved.touched
         self._follow()
         kernels.finish(words)
+
+    def measure(self, robot: EPuckArrays) -> None:
+        """Replaces the readings of ps0 to ps7 by those along MuJoCo's rays."""
+        x, y, heading = robot.state[: HEADING + 1].tolist()
+        rays = infrared.rays_at(x, y, heading, self._task.ground.floor)
+        hits = self.body.hits(*rays, infrared.RANGE)
+        if not self._has_reflectances:
+            hits[:, 1] = 1.0
+        at, table = hits[:, 0] / hits[:, 1], infrared.TABLE
+        robot.hits[:, :2] = hits
+        robot.readings[:] = np.interp(at, table[:, 0], table[:, 1])
+        robot.hits[:, 2] = np.interp(at, table[:, 0], table[:, 2])
 
     def _follow(self) -> None:
         """Takes the poses of the objects from the physics."""

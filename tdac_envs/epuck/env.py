@@ -20,7 +20,7 @@ from tdac_envs.drive.env import DrivenEnv, Observation
 from tdac_envs.drive.rewards import weights_of
 from tdac_envs.drive.stepping import info_of, place
 from tdac_envs.epuck import kernels, observed
-from tdac_envs.epuck.carried import movables_of
+from tdac_envs.epuck.carried import Carried, movables_of
 from tdac_envs.epuck.ground import Ground
 from tdac_envs.epuck.robot import EPuckArrays
 from tdac_envs.epuck.robot_options import (
@@ -178,7 +178,8 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
             moves the robot and the objects that have a mass. A dict such as
             `{"engine": "mujoco", "torque": 0.001, "grip": 0.6}` also tells figures of
-            the body (`docs/physics.md`).
+            the body (`docs/physics.md`). With `"mujoco-rays"`, MuJoCo measures the rays
+            of `ps`, too.
         view: Of frames: `"2d"`, or `"3d"`, rendered by MuJoCo (extra `tdac[physics]`).
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
@@ -380,6 +381,14 @@ class EPuckEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         self._call_drive = partial(drive, words)
         if things.moves:
             self._call_drive = partial(things.step, words, self.robot, self._call_drive)
+        if isinstance(things, Carried) and self.setup.physics.measures:
+            self._call_begin = partial(self._then_measure, things, self._call_begin)
+            self._call_drive = partial(self._then_measure, things, self._call_drive)
+
+    def _then_measure(self, things: Carried, call: Callable[[], None]) -> None:
+        """Calls a kernel, and replaces its readings by those of MuJoCo."""
+        call()
+        things.measure(self.robot)
 
     def _observation(self) -> Observation:
         robot = self.robot

@@ -70,6 +70,15 @@ GROUND_HEIGHT, GROUND_RANGE = 0.003, 0.016
 GROUND_TABLE = np.array([(0.0, 1000.0, 0.002), (0.016, 300.0, 0.004)])
 
 
+def rays_at(x: float, y: float, heading: float, floor: float) -> tuple[Array, Array]:
+    """Origins (m) and directions (unit vectors) of ps0 to ps7, each of shape (8, 3)."""
+    cos, sin = math.cos(heading), math.sin(heading)
+    turn = np.array([(cos, sin), (-sin, cos)])
+    tall = np.full(N_SENSORS, floor + HEIGHT), np.full(N_SENSORS, _SIN)
+    origins, along = PLACES[:, :2] @ turn + (x, y), _COS * _DIRECTIONS @ turn
+    return np.column_stack([origins, tall[0]]), np.column_stack([along, tall[1]])
+
+
 @subkernel
 def _interpolated(table: Array, distance: float, column: int) -> float:
     """Interpolates a table linearly in its first column; constant beyond its ends."""

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tdac_envs.core.addresses import Words
 from tdac_envs.core.compiled import kernel
@@ -44,8 +49,8 @@ class Carried:
         task: A task on the map.
 
     Raises:
-        TaskError: MuJoCo is not installed, there are movers, or the map needs too many
-            boxes.
+        TaskError: MuJoCo is not installed, there are movers, the map needs too many
+            boxes, or MuJoCo cannot measure the rays.
     """
 
     def __init__(self, setup: Map2DSetup, task: Map2DTask) -> None:
@@ -53,10 +58,14 @@ class Carried:
 
         if setup.has_movers:
             raise TaskError("physics 'mujoco' has no movers; leave them out")
+        if setup.physics.measures:
+            _check_rays(setup)
         self._metres = metres_of(setup, task)
         body = setup.physics.body_like(body_of(task, self._metres))
         cells = task.terrain.grid.cells
         self.body = MujocoBody(scene_on(cells, self._metres, _WALLS * body.top), body)
+        self._level = body.top
+        self._directions = setup.directions
 
     def reset(self, start: Pose) -> None:
         """Begins an episode at a pose: px, px, rad."""
@@ -82,14 +91,55 @@ class Carried:
         robot.outcome[TOUCHED] = robot.outcome[CONTACT] = moved.touched
         finish(words)
 
-    def _out(self, pose: Pose) -> Pose:
-        x, y, heading = pose
+    def measuring(
+        self, calls: list[Callable[[], None]], robot: Map2DArrays, task: Map2DTask
+    ) -> list[Callable[[], None]]:
+        """Calls of kernels, with MuJoCo's ranges in place of theirs."""
+
+        def measured(call: Callable[[], None]) -> None:
+            call()
+            self.measure(robot, task)
+
+        return [partial(measured, call) for call in calls]
+
+    def measure(self, robot: Map2DArrays, task: Map2DTask) -> None:
+        """Replaces the ranges by those that MuJoCo measures, at the robot's top."""
+        own, (x, y, heading) = task.robot, self._out(robot.state[: HEADING + 1])
+        cos, sin = math.cos(heading), math.sin(heading)
+        ahead, aside = (
+            self._metres * part for part in own.scanner_offset or (0.0, 0.0)
+        )
+        begin = x + cos * ahead + sin * aside, y + sin * ahead - cos * aside
+        origins = np.tile((*begin, self._level), (own.n_rays, 1))
+        near, right = self._directions
+        level = np.zeros(own.n_rays)
+        ways = np.array([cos * near + sin * right, sin * near - cos * right, level])
+        found = self.body.ranges(origins, ways.T.copy(), own.range_max * self._metres)
+        robot.ranges[:] = found / self._metres
+
+    def _out(self, pose: Pose | NDArray[np.float64]) -> Pose:
+        x, y, heading = map(float, pose)
         return x * self._metres, -y * self._metres, -heading
 
     def _back(self, pose: Pose) -> Pose:
         x, y, heading = pose
         wrapped = math.pi if heading == -math.pi else -heading
         return x / self._metres, -y / self._metres, wrapped
+
+
+def _check_rays(setup: Map2DSetup) -> None:
+    """Checks that MuJoCo can measure the rays.
+
+    Raises:
+        TaskError: It cannot.
+    """
+    if setup.sonar is not None:
+        raise TaskError("sensor 'sonar': MuJoCo measures rays alone; take 'rays'")
+    robot = setup.nominal.robot
+    if math.hypot(*(robot.scanner_offset or (0.0, 0.0))) > robot.radius:
+        raise TaskError(
+            "scanner_offset: MuJoCo measures rays that begin within the body alone"
+        )
 
 
 def carried_by(setup: Map2DSetup, task: Map2DTask) -> Carried | None:

@@ -251,7 +251,7 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         physics: `"exact"`, or `"mujoco"` (extra `tdac[physics]`): a 3D contact solver
             moves the robot. A dict such as `{"engine": "mujoco", "resolution": 0.05,
             "torque": 0.1}` also tells metres per px, and figures of the body
-            (`docs/physics.md`).
+            (`docs/physics.md`). With `"mujoco-rays"`, MuJoCo measures `ranges`, too.
         view: Of frames: `"2d"`, or `"3d"`, rendered by MuJoCo (extra `tdac[physics]`).
         render_mode: `"rgb_array"`, `"human"` (extra `tdac[human]`) or None.
 
@@ -506,6 +506,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         calls: list[Callable[[], None]] = [partial(call, words) for call in kernels]
         if self._carried is not None:
             calls[1] = partial(self._carried.step, words, self.robot, self.task)
+            if self.setup.physics.measures:
+                calls = self._carried.measuring(calls, self.robot, self.task)
         if self.setup.sonar is not None:
             calls = [partial(self._then_listen, call) for call in calls]
         self._call_begin, self._call_drive = calls

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ _REST = 0.5
 """Time in which a robot settles on its wheels, and things on the ground, s."""
 _ASIDE = 100.0
 """Height of the robot while things settle, m."""
+_VISIBLE = np.zeros(6, np.uint8)
+_VISIBLE[mjcf.SEEN] = 1
 
 
 def mujoco_module() -> Any:
@@ -82,6 +85,8 @@ class MujocoBody:
         self.variation = AS_DESCRIBED
         self._hull = self.model.geom(mjcf.HULL).id
         self._ground = self.model.geom(mjcf.GROUND).id
+        self._hit = np.full(1, -1, np.int32)
+        self._has_clouds = any(p.visible > p.solid for p in self._scene.prisms)
         self._at, self._going = self._joint(mjcf.ROBOT)
         self._wheels = [self._joint(n)[0] for n in (mjcf.LEFT, mjcf.RIGHT)]
         self._free = [
@@ -145,10 +150,9 @@ class MujocoBody:
         touched, advance, contact = False, self._engine.mj_step, data.contact
         for _ in range(count):
             advance(model, data)
-            if not touched:
-                pairs = contact.geom
-                mine = pairs[(pairs == hull).any(axis=1)]
-                touched = bool((mine != ground).all(axis=1).any())
+            if not touched:  # few pairs: lists are faster than arrays
+                pairs = contact.geom.tolist()
+                touched = any(hull in pair and ground not in pair for pair in pairs)
         turned = data.qpos[self._wheels] - before
         return Moved(self.pose(), touched, (float(turned[0]), float(turned[1])))
 
@@ -186,14 +190,53 @@ class MujocoBody:
             directions: Shape (n, 3): unit vectors.
             most: Returned where a ray hits nothing nearer, m.
         """
-        groups = np.zeros(6, np.uint8)
-        groups[mjcf.SEEN] = 1
-        cast, hit = self._engine.mj_ray, np.full(1, -1, np.int32)
-        found = np.full(len(origins), most)
-        for k, (origin, along) in enumerate(zip(origins, directions, strict=True)):
-            gap = cast(self.model, self.data, origin, along, groups, True, -1, hit)
-            if 0.0 <= gap < most and hit[0] != self._ground:
-                found[k] = gap
+        rays = zip(origins, directions, strict=True)
+        return np.array([min(self._ray(*each)[0], most) for each in rays])
+
+    def hits(self, origins: Array, directions: Array, most: float) -> Array:
+        """Distances along rays, and the reflectances of what they hit.
+
+        Arguments as for `ranges`. A ray that begins in a part has the distance 0.
+
+        Returns:
+            Shape (n, 2): distance, m, and reflectance, 1 where a ray hits nothing.
+        """
+        if self._free:  # `mj_step` leaves the places of things one substep ago
+            self._engine.mj_kinematics(self.model, self.data)
+        found = np.full((len(origins), 2), (most, 1.0))
+        for row, origin, along in zip(found, origins, directions, strict=True):
+            gap, geom = self._around(origin, along) or self._ray(origin, along)
+            if gap < most:
+                row[:] = gap, self._reflectances[geom]
+        return found
+
+    def _around(self, origin: Array, along: Array) -> tuple[float, int] | None:
+        """The distance 0 and the geom in which a ray begins; None if in none.
+
+        A robot is only in what is visible and not solid. Such parts are convex and
+        upright: one that is ahead and behind on the same level is also here.
+        """
+        if not self._has_clouds:
+            return None
+        level = np.array([along[0], along[1], 0.0])
+        _, ahead = self._ray(origin, level)
+        _, behind = self._ray(origin, -level)
+        return (0.0, ahead) if ahead == behind >= 0 else None
+
+    def _ray(self, origin: Array, along: Array) -> tuple[float, int]:
+        """Distance to what a ray hits, and its geom; inf and -1 for nothing."""
+        gap = self._engine.mj_ray(
+            self.model, self.data, origin, along, _VISIBLE, True, -1, self._hit
+        )
+        geom = int(self._hit[0])
+        return (math.inf, -1) if geom in (-1, self._ground) else (gap, geom)
+
+    @cached_property
+    def _reflectances(self) -> Array:
+        """Reflectance of each geom."""
+        found = np.ones(self.model.ngeom)
+        for index, prism in enumerate(self._scene.prisms):
+            found[self.model.geom(mjcf.prism_name(index)).id] = prism.reflectance
         return found
 
     def __getstate__(self) -> dict[str, Any]:

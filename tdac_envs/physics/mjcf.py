@@ -64,6 +64,11 @@ def name_of(thing: int) -> str:
     return f"thing{thing}"
 
 
+def prism_name(index: int) -> str:
+    """Name of the geom of a prism."""
+    return f"prism{index}"
+
+
 def add(parent: ET.Element, tag: str, **attributes: object) -> ET.Element:
     """Adds an element; numbers and rows of numbers become text."""
     texts = {key: _text(value) for key, value in attributes.items()}
@@ -97,7 +102,7 @@ def _add_prisms(
     volume = sum(_volume(prism) for _, prism in own if prism.solid)
     for index, prism in own:
         geom = add(
-            body, "geom",
+            body, "geom", name=prism_name(index),
             group=SEEN if prism.visible else UNSEEN,
             rgba=(*prism.colour, 1.0 if prism.visible else 0.0),
             **_shape(assets, index, prism, origin, scene.floor * (number != FIXED)),
@@ -148,7 +153,7 @@ def _shape(
     middle = corners.mean(axis=0)
     rim = corners - middle
     points = [(*point, level) for level in (-half, half) for point in rim.tolist()]
-    name = f"prism{index}"
+    name = prism_name(index)
     add(assets, "mesh", name=name, vertex=np.array(points), inertia="shell")
     x, y = (middle - origin).tolist()
     return {"type": "mesh", "mesh": name, "pos": (x, y, z)}

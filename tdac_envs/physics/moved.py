@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from tdac_envs.core.errors import TaskError, hint
 
 EXACT, MUJOCO, VARIED = "exact", "mujoco", "mujoco-varied"
-ENGINES = EXACT, MUJOCO, VARIED
+MEASURED = "mujoco-rays"
+"""MuJoCo also measures the rays of the distance sensors."""
+ENGINES = EXACT, MUJOCO, VARIED, MEASURED
 """Values of the argument `physics` of the environments."""
 Pose = tuple[float, float, float]
 

@@ -36,6 +36,7 @@ class Prism:
         visible: Whether rays hit it, and pictures show it.
         thing: Index of the free thing that it belongs to, or `FIXED`.
         colour: Red, green, blue, from 0 to 1.
+        reflectance: What infra-red sensors divide distances by, as in Webots.
     """
 
     shape: Footprint
@@ -45,6 +46,7 @@ class Prism:
     visible: bool = True
     thing: int = FIXED
     colour: tuple[float, float, float] = (0.6, 0.6, 0.62)
+    reflectance: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +158,7 @@ def _prisms_of(body: Obstacle, floor: float, number: int) -> list[Prism]:
             found.append(
                 Prism(
                     part.shape, part.bottom, part.top, solid, visible, number,
-                    looks.get(part, look_of_kind(body.kind)).colour,
+                    looks.get(part, look_of_kind(body.kind)).colour, body.reflectance,
                 )
             )  # fmt: skip
     return found

@@ -135,6 +135,7 @@ class SecondOpinion(StrictRecord):
     varied: bool = Field(
         False, description="Whether the robot was varied in each episode."
     )
+    measured: bool = Field(False, description="Whether it also measured the rays.")
     episodes: tuple[OtherEpisode, ...]
 
     @property

@@ -23,6 +23,7 @@ def opinion_text(opinion: SecondOpinion, units: Units) -> str:
     name, _, version = opinion.engine.partition(" ")
     about = f"{name} {'.'.join(version.split('.')[:2])}"
     about += ", varied" if opinion.varied else ""
+    about += ", with its rays" if opinion.measured else ""
     if opinion.scaled:
         about += ", with a body radius of 0.1 m"
     text = f"second opinion ({about}): {arrivals_text(opinion)}"

@@ -11,7 +11,7 @@ from tdac_agent.verification.diagnosis.report import OtherEpisode, SecondOpinion
 from tdac_agent.verification.judge.findings import driven
 from tdac_agent.verification.judge.judge import Judge
 from tdac_envs.physics.engine import engine_version
-from tdac_envs.physics.moved import VARIED
+from tdac_envs.physics.moved import MEASURED, VARIED
 
 
 def drive_again(judge: Judge, physics: str) -> SecondOpinion | None:
@@ -38,6 +38,7 @@ def drive_again(judge: Judge, physics: str) -> SecondOpinion | None:
         engine=engine_version(),
         scaled=not task.setting.has_metres,
         varied=physics == VARIED,
+        measured=physics == MEASURED,
         episodes=tuple(_row(task, each, before[each.name]) for each in again),
     )
 

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from script import AHEAD, Script, code
@@ -10,10 +11,12 @@ from unconfirmed import synthesize
 from without_marks import reading
 
 from tdac_agent import load_task
+from tdac_agent.synthesis.options import Engine
 from tdac_agent.verification.diagnosis.report import OtherEpisode, SecondOpinion
 from tdac_agent.verification.diagnosis.second_opinion import as_test, opinion_text
 from tdac_agent.verification.verify import verify
 from tdac_envs.core.errors import TaskError
+from tdac_envs.physics.moved import ENGINES
 
 pytest.importorskip("mujoco")
 NAMES = ["nominal", *(f"jitter {n}" for n in range(1, 6))]
@@ -82,6 +85,27 @@ def test_the_line_has_arrivals_and_both_gaps(crates):
         "second opinion (MuJoCo 4.0): 1 of 2 arrive (jitter 1: collision in step 7); "
         "smallest gap 20.1 mm here, 0 mm there"
     )
+
+
+def test_the_line_says_who_measured_the_rays(crates):
+    opinion = SecondOpinion(
+        engine="MuJoCo 4.0.1", episodes=(other("nominal"),), measured=True
+    )
+    begin = "second opinion (MuJoCo 4.0, with its rays): 1 of 1 arrive; "
+    assert opinion_text(opinion, crates.setting.shown).startswith(begin)
+
+
+def test_the_commands_offer_what_the_environments_have():
+    assert get_args(Engine) == ENGINES
+
+
+@pytest.mark.slow
+def test_an_opinion_with_its_own_rays_says_so(good, done):
+    words = "--paper", "--physics", "mujoco-rays", "--require-physics", "--out", "out"
+    said = done("verify", good / "controller.py", "--task", good, *words)
+    assert ", with its rays, with a body radius of 0.1 m): 1 of 1 arrive" in said
+    tests = json.loads(Path("out/report.json").read_text())["tests"]
+    assert tests["second_opinion[mujoco-rays]"] == "passed"
 
 
 def test_a_required_opinion_is_a_test_that_all_arrive():
