@@ -279,7 +279,7 @@ class DriveNode(Node):  # type: ignore[misc]
         self.core.publishers, self.core.listeners = publishers, listeners
 
     def _senders(self, topic: str) -> int:
-        """Return how many may move the robot, such as `ros2 topic pub` and a bag that is played."""
+        """Return how many may move the robot, such as `ros2 topic pub` and a played bag."""
         found = self.get_publishers_info_by_topic(topic)
         return sum(each.node_name != WATCHDOG for each in found)
 
