@@ -32,6 +32,16 @@ def ignore_signals() -> None:
         signal.signal(number, signal.SIG_IGN)
 
 
+def is_told() -> bool:
+    """
+    Return whether a signal of `ENDS` came, so that the node must end.
+
+    Python drops a KeyboardInterrupt that is raised in a destructor, such as that of a future of
+    rclpy.
+    """
+    return signal.getsignal(signal.SIGTERM) == signal.SIG_IGN
+
+
 def send_last(publish: Callable[[Any], None], command: Any, lasts: float) -> None:
     """
     Publish the last command `ZEROS` times, spread over some seconds of the wall clock.

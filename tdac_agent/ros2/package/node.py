@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+import sys
 import time
 from typing import Any
 
@@ -14,7 +15,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry, Path as PathMessage
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 from rcl_interfaces.srv import GetParameters
 import rclpy
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
@@ -34,8 +35,8 @@ ASKED, ANSWERED = 2.0, 1.0
 """Time between two questions to `dead_man_node`, and the longest for an answer, s."""
 WAKES = 0.1
 """Longest time in which a signal waits for its handler, s of the wall clock."""
-ONLOOKERS = ('rosbag2', '_ros2cli', 'watchdog')
-"""How names of nodes begin that record or show commands, or stop a robot without any."""
+ONLOOKERS, WATCHDOG = ('rosbag2', '_ros2cli'), 'watchdog'
+"""How names of nodes begin that only record or show commands; one that sends zeros alone."""
 DEFAULTS: dict[str, Any] = {
     'scan_topic': 'scan',
     'odom_topic': 'odom',
@@ -109,7 +110,8 @@ class DriveNode(Node):  # type: ignore[misc]
                 PoseWithCovarianceStamped, own['covariance_topic'], self._on_localised, kept)
         if not own['any_map']:
             self.create_subscription(OccupancyGrid, own['map_topic'], self._on_map, kept)
-        self.get_logger().info(f'stops within (m): {settings.stops_within()}')
+        ways = [f'{why}: {way:.3f}' for why, way in settings.stops_within().items()]
+        self.get_logger().info(f'stops within (m): {"; ".join(ways)}')
         self.publish(core.Command(0.0, 0.0, 'waiting'))
         self._future, self._asked = None, -math.inf
         self._timer_unfit = 'no answer of dead_man_node yet'
@@ -155,7 +157,10 @@ class DriveNode(Node):  # type: ignore[misc]
 
     def _on_start(self, _request: Any, response: Any) -> Any:
         now = self.get_clock().now().nanoseconds * 1e-9
-        response.success, response.message = self.core.start(now)
+        if now:
+            response.success, response.message = self.core.start(now)
+        else:
+            response.success, response.message = False, 'no time on /clock yet (use_sim_time)'
         return response
 
     def _on_stop(self, _request: Any, response: Any) -> Any:
@@ -266,18 +271,21 @@ class DriveNode(Node):  # type: ignore[misc]
     def _count(self) -> None:
         """Count who publishes the commands and who takes them, up to the robot's driver."""
         topic = self._out.topic_name  # remapped: these functions do not remap
-        publishers = self._others(self.get_publishers_info_by_topic(topic))
-        listeners = self._others(self.get_subscriptions_info_by_topic(topic))
+        publishers, listeners = self._senders(topic), self._takers(topic)
         if self._driver != topic:  # a smoother is between them
-            smoothers = self._others(self.get_publishers_info_by_topic(self._driver))
-            drivers = self._others(self.get_subscriptions_info_by_topic(self._driver))
+            smoothers = self._senders(self._driver)
             publishers += max(smoothers - 1, 0)
-            listeners = min(listeners, smoothers, drivers)
+            listeners = min(listeners, smoothers, self._takers(self._driver))
         self.core.publishers, self.core.listeners = publishers, listeners
 
-    @staticmethod
-    def _others(endpoints: Any) -> int:
-        return sum(not each.node_name.startswith(ONLOOKERS) for each in endpoints)
+    def _senders(self, topic: str) -> int:
+        """Return how many may move the robot, such as `ros2 topic pub` and a played bag."""
+        found = self.get_publishers_info_by_topic(topic)
+        return sum(each.node_name != WATCHDOG for each in found)
+
+    def _takers(self, topic: str) -> int:
+        found = self.get_subscriptions_info_by_topic(topic)
+        return sum(not each.node_name.startswith((*ONLOOKERS, WATCHDOG)) for each in found)
 
     def publish(self, command: core.Command) -> None:
         """Publish a command, and say what changed."""
@@ -301,26 +309,37 @@ def _seconds(stamp: Any) -> float:
 
 def main(args: Any = None) -> None:
     """Drive until the process is told to end; the last command is zero."""
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     ending.take_signals()
-    node = None
+    node, reason = None, 'the node failed'
     try:
+        _begin(args)
         node = DriveNode()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        while rclpy.ok():  # a paused clock must not keep a signal waiting
+        while rclpy.ok() and not ending.is_told():  # a paused clock must not delay this
             executor.spin_once(timeout_sec=WAKES)
+        reason = 'the node was told to end'
     except KeyboardInterrupt:
-        pass
-    except (OSError, ParameterException, ValueError) as error:
-        raise SystemExit(f'drive: {error}') from None
+        reason = 'the node was told to end'
+    except (NameValidationException, OSError, ParameterException, ValueError) as error:
+        said = ' '.join(each.strip() for each in str(error).splitlines()[:2])
+        print(f'drive: {said}', file=sys.stderr)
+        raise SystemExit(2) from None
     finally:
         ending.ignore_signals()
         if node is not None:
-            last = node.core.end('the node was told to end')
+            last = node.core.end(reason)
             ending.send_last(node.publish, last, core.PERIODS * node.core.settings.dt)
             node.destroy_node()
         rclpy.try_shutdown()
+
+
+def _begin(args: Any) -> None:
+    """Initialise rclpy; ValueError says what is wrong with the command line or its files."""
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # its own class is private
+        raise ValueError(str(error).split(', at ')[0]) from None
 
 
 if __name__ == '__main__':

@@ -53,6 +53,32 @@ def test_a_second_signal_skips_no_zero(first):
     assert process.returncode == 0
 
 
+def test_a_signal_that_comes_in_a_destructor_is_not_lost():
+    """Python drops the exception there, and the node ends all the same."""
+    lost = """
+import signal
+import time
+from tdac_agent.ros2.package.ending import is_told, take_signals
+
+class Future:
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+
+take_signals()
+assert not is_told()
+Future()
+end = time.monotonic() + 30.0
+while not is_told() and time.monotonic() < end:
+    time.sleep(0.01)
+print("told" if is_told() else "lost")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", lost], capture_output=True, text=True, check=True
+    )
+    assert "Exception ignored in" in done.stderr
+    assert done.stdout == "told\n"
+
+
 def test_under_nohup_a_closed_terminal_changes_nothing():
     """The node goes on until it is told to end."""
     command = ["nohup", sys.executable, "-c", PROGRAM]

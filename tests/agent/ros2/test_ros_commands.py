@@ -33,14 +33,14 @@ def refused(result, why):
 
 
 def test_export_says_what_it_wrote(tdac, run, tmp_path):
-    """The verdict, the longest stop, and that the wrapper was not run."""
+    """The verdict, the longest stop, and that no robot was driven."""
     code, printed = tdac("export", "ros2", run, "--out", tmp_path / "a", "--unverified")
     assert code == 0
     text = " ".join(printed.out.split())
     assert "(ROS 2 package tdac_floor)" in text
     assert "not verified: the package says so" in text
     assert "stops within 0.405 m" in text
-    assert "the rclpy wrapper was not run" in text
+    assert "but on no robot" in text
     assert "The map's unknown cells are walls." in text
     words = "export", "ros2", run, "--out", tmp_path / "b", "--unverified", "--json"
     record = json.loads(tdac(*words)[1].out)

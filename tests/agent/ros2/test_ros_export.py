@@ -93,7 +93,7 @@ def test_the_layout_is_that_of_ament_python(package):
         for line in node.splitlines()
         if line.startswith(("import ", "from ")) and " . " not in line
     }
-    ours = {"__future__", "json", "math", "pathlib", "time", "typing"}
+    ours = {"__future__", "json", "math", "pathlib", "sys", "time", "typing"}
     assert used - ours <= depends
     assert {"rviz2", "nav2_bringup", "nav2_velocity_smoother"} <= depends
     config = configparser.ConfigParser()
