@@ -22,7 +22,7 @@ from tdac_agent.environments.epuck.export import SPARE, Project, export_webots
 from tdac_agent.harbor.folder import WORLDS, export_set, export_task
 from tdac_agent.ros2.answers import time_answers
 from tdac_agent.ros2.export import export_ros2
-from tdac_agent.ros2.package_text import NOT_RUN
+from tdac_agent.ros2.package_text import TRIED
 from tdac_agent.webots.report import WebotsReport
 from tdac_agent.webots.run import run_controller
 from tdac_envs.core.errors import TaskError
@@ -52,7 +52,7 @@ def run_ros2(options: ExportRos2Options) -> int:
     )
     answers = time_answers(options.run)
     if options.as_json:
-        record = {**asdict(made), "folder": str(made.folder), "run_in_ros": False}
+        record = {**asdict(made), "folder": str(made.folder), "tried": TRIED}
         record["answers"] = asdict(answers)
         print_json({"schema_version": 1, **record})
         return 0
@@ -73,7 +73,7 @@ def run_ros2(options: ExportRos2Options) -> int:
         )
     if warning := answers.warning():
         console.print(f"[yellow]{warning}[/]", soft_wrap=True)
-    console.print(f"[yellow]{NOT_RUN}[/]", soft_wrap=True)
+    console.print(f"[yellow]{TRIED}[/]", soft_wrap=True)
     print_plain(
         console, f"drive it over DDS: tdac ros sim {options.run}, and in another"
     )

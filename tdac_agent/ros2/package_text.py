@@ -14,7 +14,10 @@ import numpy as np
 from tdac_agent.ros2.package.scans import Guard
 from tdac_agent.ros2.package.settings import LATENCY, LOST, PERIODS, usual_deviation
 
-NOT_RUN = "The node was driven with rclpy of ROS 2 Jazzy in a simulation, but on no robot."
+TRIED = (
+    "The node was driven with rclpy of ROS 2 Jazzy in a simulation, but on no robot."
+)
+"""How far the package was tried."""
 SMOOTHER = 2.5, 3.2
 """Default accelerations of Nav2's velocity smoother, m/s² and rad/s²."""
 MAINTAINER = {"maintainer": "maintainer", "email": "maintainer@example.com"}
@@ -64,7 +67,7 @@ def values_of(made: RosPackage, settings: dict[str, Any]) -> dict[str, Any]:
         "short": f"{warning}Drives {made.name} with a {word} controller",
         "description": f"{warning}Drives a robot to a goal on a known map with a "
         f"controller written and judged by tdac (SHA-256 "
-        f"{settings['controller_sha256']}). {made.verdict} {made.unknown} {NOT_RUN}",
+        f"{settings['controller_sha256']}). {made.verdict} {made.unknown} {TRIED}",
         "sha256": settings["controller_sha256"],
         "robot": robot,
         "full": f"{speed:g}",

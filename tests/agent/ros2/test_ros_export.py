@@ -26,7 +26,7 @@ from tdac_agent.ros2.export import (
     package_name,
     settings_of,
 )
-from tdac_agent.ros2.package_text import NOT_RUN
+from tdac_agent.ros2.package_text import TRIED
 from tdac_envs import preprocess
 from tdac_envs.core.errors import TaskError
 
@@ -85,7 +85,7 @@ def test_the_layout_is_that_of_ament_python(package):
     assert root.findtext("name") == name
     assert root.findtext("export/build_type") == "ament_python"
     assert root.find("maintainer").get("email")
-    assert NOT_RUN in root.findtext("description")
+    assert TRIED in root.findtext("description")
     depends = {each.text for each in root.findall("exec_depend")}
     node = (package / name / "node.py").read_text()
     used = {
@@ -172,7 +172,7 @@ def test_the_parameters_are_those_of_the_node(package):
 def test_the_readme_says_what_was_not_run(package):
     """Nobody can take the wrapper for tested."""
     text = (package / "README.md").read_text()
-    assert NOT_RUN in text
+    assert TRIED in text
     assert "ros2 service call /drive/start" in text
     assert "| a scan or a pose is late, lost or old | 0.195 |" in text
     assert "AMCL needs the map as SLAM wrote it" in text
