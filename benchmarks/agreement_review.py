@@ -12,7 +12,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from benchmarks.agreement_tables import auc_text, grouped, load, share, sign_test
+from benchmarks.agreement_tables import (
+    auc_text,
+    grouped,
+    load,
+    read_episodes,
+    share,
+    sign_test,
+)
 
 FAST = "known", "unknown"
 """Levels with most of the failures."""
@@ -21,10 +28,7 @@ FAST = "known", "unknown"
 def review(out: Path) -> str:
     """The tables as Markdown."""
     pairs, rows = load(out)
-    further = pd.read_csv(out / "further.csv")
-    further["success"] = (further["outcome"] == "reached") & (
-        further["collisions"] == 0
-    )
+    further = read_episodes(out / "further.csv")
     passing = pairs[pairs["here"].astype(bool)]
     every = pd.concat([rows, further])
     every = every[every["pair"].isin(passing["pair"])]

@@ -23,10 +23,16 @@ SLIP = 20.0
 def load(out: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     """The pairs with their verdicts, and the rows of the episodes."""
     pairs = pd.read_csv(out / "pairs.csv")
-    rows = pd.read_csv(out / "episodes.csv", keep_default_na=True)
-    rows["success"] = (rows["outcome"] == "reached") & (rows["collisions"] == 0)
+    rows = read_episodes(out / "episodes.csv")
     rows["late"] = rows["cause"] == "time-out"
     return verdicts(pairs, rows), rows
+
+
+def read_episodes(file: Path) -> pd.DataFrame:
+    """The rows of a file, and whether each arrives without contact (`success`)."""
+    rows = pd.read_csv(file)
+    rows["success"] = (rows["outcome"] == "reached") & (rows["collisions"] == 0)
+    return rows
 
 
 def verdicts(pairs: pd.DataFrame, rows: pd.DataFrame) -> pd.DataFrame:
@@ -186,7 +192,7 @@ def tables(out: Path) -> str:
             for arm in ("there", "nudged")
         ]
         lines.append(f"| {words} | {cells[0]} | {cells[1]} |")
-    lines += _of_irsim(out, pairs)
+    lines += _of_irsim(out, pairs, rows)
     return "\n".join(lines) + "\n"
 
 
@@ -218,16 +224,14 @@ def _within(pairs: pd.DataFrame) -> list[str]:
     return lines
 
 
-def _of_irsim(out: Path, pairs: pd.DataFrame) -> list[str]:
+def _of_irsim(out: Path, pairs: pd.DataFrame, episodes: pd.DataFrame) -> list[str]:
     """The 2 × 2 table of ir-sim, whose episodes are the first three."""
     file = out / "irsim.csv"
     if not file.is_file():
         return []
     rows = pd.read_csv(file)
     count = int(rows["number"].max()) + 1
-    own = pd.read_csv(out / "episodes.csv")
-    own = own[(own["arm"] == "here") & (own["number"] < count)]
-    own["success"] = (own["outcome"] == "reached") & (own["collisions"] == 0)
+    own = episodes[(episodes["arm"] == "here") & (episodes["number"] < count)]
     rows["success"] = rows["outcome"] == "reached"
     passed = pd.DataFrame(
         {

@@ -37,7 +37,7 @@ from tdac_agent.bench.shown import merged, reveal
 from tdac_agent.planners.names import planner_names
 from tdac_agent.planners.planner import levels_of
 from tdac_agent.plots.arena import plot_scores
-from tdac_agent.plots.style import save_dark, save_figure
+from tdac_agent.plots.style import save_dark
 from tdac_agent.prompting.extract import extract_source
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -116,13 +116,12 @@ def show(options: argparse.Namespace) -> None:
     found = merged(folders)
     options.out.mkdir(parents=True, exist_ok=True)
     table = pd.concat([pd.read_csv(folder / WORLD_TABLE) for folder in folders])
-    draw_figures(found, table, options.out)
     rows = frame_of(found)
     maps = [
         name for name in set_names() if name != "epuck" and name in set(rows["set"])
     ]
     figure = plot_scores(rows, maps, told=True)
-    save_figure(figure, options.out / "scores.svg")
+    draw_figures(found, table, options.out, scores=figure)
     save_dark(figure, options.out / "scores-dark.svg")
     write_atomic(options.out / "table.md", _table(found))
 

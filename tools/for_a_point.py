@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
+
+from tools.run import tdac
 
 TASK = "office"
 SIZES = "ROBOT_RADIUS_PX = ", "MARGIN_PX = ", "KEPT_GAP_PX = "
@@ -23,10 +23,3 @@ def write(folder: Path) -> Path:
     file = folder / "controller.py"
     file.write_text("".join(lines), encoding="utf-8")
     return file
-
-
-def tdac(*words: str, may_fail: bool = False) -> None:
-    """Runs a command of tdac."""
-    done = subprocess.run([sys.executable, "-m", "tdac_agent", *words], check=False)
-    if done.returncode and not may_fail:
-        raise SystemExit(f"this did not succeed: tdac {' '.join(words)}")

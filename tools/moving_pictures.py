@@ -10,8 +10,6 @@ The texts are those of its report. The others show an episode in each environmen
 from __future__ import annotations
 
 import argparse
-import subprocess
-import sys
 import tempfile
 import textwrap
 from collections.abc import Iterator
@@ -29,6 +27,7 @@ from tdac_envs.drawing.runs import Status
 from tdac_envs.drawing.video import write_video
 from tdac_envs.map2d.picture import MapScene
 from tools import for_a_point
+from tools.run import tdac
 
 WIDTH, FPS, SPEED = 600, 12, 7.0
 """Width of a picture, px; frames a second; simulated seconds a second."""
@@ -42,7 +41,7 @@ def repair(out: Path) -> None:
     with tempfile.TemporaryDirectory() as name:
         run, near = Path(name) / "run", for_a_point.write(Path(name))
         words = "--task", for_a_point.TASK, "--from", str(near), "--out", str(run)
-        for_a_point.tdac("synth", *words)
+        tdac("synth", *words)
         told = gather_run(run)
         write_video(_frames(told), out / "repair.gif", FPS)
 
@@ -111,9 +110,7 @@ def drive(episode: str, speed: float, file: Path, width: int = WIDTH) -> None:
     """Draws an episode with `tdac play`, smaller than it does."""
     with tempfile.TemporaryDirectory() as name:
         film = Path(name) / "film.mp4"
-        command = f"play {episode} --speed {speed:g} --video {film}"
-        words = [sys.executable, "-m", "tdac_agent", *command.split()]
-        subprocess.run(words, check=True)
+        tdac("play", *episode.split(), "--speed", f"{speed:g}", "--video", str(film))
         source = cv2.VideoCapture(str(film))
         fps = source.get(cv2.CAP_PROP_FPS)
         stride = max(1, round(fps / FPS))

@@ -11,7 +11,6 @@ import argparse
 import hashlib
 import json
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
@@ -20,8 +19,9 @@ from pathlib import Path
 
 from tdac_agent.storage.files import write_atomic
 from tools import for_a_point
+from tools.gallery import NAMES
+from tools.run import ROOT, python, tdac
 
-ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 RECORD = DOCS / "pictures.json"
 DRAWING = "tdac_envs/drawing/*.py"
@@ -42,24 +42,24 @@ class Picture:
     inputs: tuple[str, ...]
 
 
-def tool(name: str, *words: str) -> Callable[[Path], None]:
+def tool(name: str) -> Callable[[Path], None]:
     """A tool of this folder that writes a picture."""
 
     def draw(file: Path) -> None:
-        _run("-m", f"tools.{name}", *words, str(file))
+        python("-m", f"tools.{name}", str(file))
 
     return draw
 
 
 def moving(file: Path) -> None:
     """One of the moving pictures."""
-    _run("-m", "tools.moving_pictures", str(file.parent), "--only", file.name)
+    python("-m", "tools.moving_pictures", str(file.parent), "--only", file.name)
 
 
 def preview(file: Path) -> None:
     """How the map of the first steps is read."""
     with tempfile.TemporaryDirectory() as name:
-        _run("-m", "tdac_agent", "map", "maze", "--out", name)
+        tdac("map", "maze", "--out", name)
         shutil.copy(Path(name) / "preview.png", file)
 
 
@@ -67,7 +67,7 @@ def maze(file: Path) -> None:
     """The drives of a verified controller."""
     with tempfile.TemporaryDirectory() as name:
         run = Path(name) / "run"
-        _run("-m", "tdac_agent", "synth", "--no-confirm", "--out", str(run))
+        tdac("synth", "--no-confirm", "--out", str(run))
         shutil.copy(run / "trajectory.png", file)
 
 
@@ -77,17 +77,15 @@ def failure(file: Path) -> None:
         out = Path(name) / "out"
         near = for_a_point.write(Path(name))
         words = "verify", str(near), "--task", for_a_point.TASK, "--out", str(out)
-        for_a_point.tdac(*words, may_fail=True)
+        tdac(*words, may_fail=True)
         shutil.copy(out / "trajectories" / "nominal.png", file)
 
 
-def _run(*words: str) -> None:
-    done = subprocess.run([sys.executable, *words], cwd=ROOT, check=False)
-    if done.returncode:
-        raise SystemExit(f"this did not succeed: python {' '.join(words)}")
+def gallery(file: Path) -> None:
+    """A drive of the gallery."""
+    python("-m", "tools.gallery", str(file.parent), file.stem)
 
 
-BUILTIN = "tdac_agent/builtin/*"
 PICTURES = {
     "camera.png": Picture(tool("camera_picture"), ("tools/camera_picture.py",)),
     "contact.png": Picture(tool("draw_contact"), ("tools/draw_contact.py", DRAWING)),
@@ -108,6 +106,10 @@ PICTURES = {
     **{
         name: Picture(moving, ("tools/moving_pictures.py", DRAWING))
         for name in ("map2d.gif", "epuck.gif", "ladder.gif")
+    },
+    **{
+        f"gallery/{name}.png": Picture(gallery, ("tools/gallery.py", DRAWING))
+        for name in NAMES
     },
 }
 
@@ -152,6 +154,8 @@ def main() -> int:
     for name in names:
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / name
+            for parent in (file.parent, (DOCS / name).parent):
+                parent.mkdir(exist_ok=True)
             PICTURES[name].draw(file)
             shutil.copy(file, DOCS / name)
         kept = json.loads(RECORD.read_text("utf-8")) if RECORD.is_file() else {}

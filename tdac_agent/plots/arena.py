@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,19 +12,20 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from tdac_agent.plots.style import (
-    COLOURS,
+    ENTRANTS,
     GRID,
     MARKERS,
     TEXT,
+    Look,
     apply_style,
     legend_above,
-    line_style,
     new_plot,
     panels,
+    shade,
 )
 
 DIFFICULTY = {
-    "least_steps": "OT, steps",
+    "least_steps": "least time (OT), steps",
     "gap": "gap, body diameters",
     "detour": "detour",
     "in_sight": "path with the goal in sight",
@@ -33,14 +35,6 @@ DIFFICULTY = {
 """Columns with figures of worlds, and their labels."""
 BINS = 4
 """Groups of worlds of about the same number, by a figure of difficulty."""
-_KINDS = {
-    "builtin": "our own program",
-    "planner": "classical planner",
-    "controller": "controller file",
-    "learned": "learned policy",
-    "baseline": "follows waypoints",
-    "privileged": "knows the true world",
-}
 # Inches that the labels below and above the panels need.
 ROOM = {"above": 0.8, "narrowest": 6.2}
 # Characters of a name.
@@ -106,6 +100,10 @@ def plot_scores(
         axes.tick_params(axis="y", length=0)
     finding = best_of_kinds(means)
     figure.set_label(f"Time scores. {finding}" if len(means) else "Time scores")
+    figure.description = (
+        "A column per set of worlds, a row per entrant, the best one at the top. The "
+        "colour and shape of a mark say the kind of entrant; its value is at the right."
+    )
     legend_above(figure, figure.axes, 6, title=finding if told else "")
     least, most = int(rows["worlds"].min()), int(rows["worlds"].max())
     worlds = f"{least}" if least == most else f"{least} to {most}"
@@ -156,16 +154,16 @@ def _in_order(rows: pd.DataFrame, means: pd.DataFrame) -> list[str]:
 
 
 def _dot(axes: Axes, row: pd.Series, place: float, *, heavy: bool = False) -> None:
-    kind = list(_KINDS).index(row["kind"])
+    look = ENTRANTS[row["kind"]]
     axes.errorbar(
         row["time"],
         place,
         xerr=[[row["time"] - row["low"]], [row["high"] - row["time"]]],
-        fmt=MARKERS[kind],
-        color=COLOURS[kind],
+        fmt=look.marker,
+        color=look.colour,
         markersize=5 if heavy else 4,
         linewidth=1.2,
-        label=_KINDS[row["kind"]],
+        label=look.words,
         clip_on=False,
     )
     axes.annotate(
@@ -182,49 +180,92 @@ def _dot(axes: Axes, row: pd.Series, place: float, *, heavy: bool = False) -> No
     )
 
 
-def plot_difficulty(worlds: pd.DataFrame, name: str) -> Figure:
-    """Plots the success of entrants on easy and on hard worlds of a set.
+def plot_difficulty(
+    worlds: pd.DataFrame, name: str, kinds: Mapping[str, str] | None = None
+) -> Figure:
+    """Plots the success of entrants on easy and on hard worlds of a set, in %.
+
+    A panel per figure of difficulty, with a column for each group of worlds.
 
     Args:
-        worlds: A row per episode, with the columns `set`, `entrant`, `success`, and
-            those of `DIFFICULTY`.
+        worlds: A row per episode, with the columns `set`, `entrant`, `index` (of the
+            world), `success`, and those of `DIFFICULTY`.
         name: The set.
+        kinds: The kind of each entrant, which is marked next to its name.
     """
     own = worlds[worlds["set"] == name]
     figures = [key for key in DIFFICULTY if own[key].nunique() > BINS]
-    figure, grid = panels(len(figures), 2.4, 2.1, left=0.4, **ROOM)
     reached = own.groupby("entrant", sort=False)["success"].mean()
     entrants = list(reached.sort_values(ascending=False, kind="stable").index)
+    height = 0.75 + 0.21 * len(entrants)
+    room = {"left": _NAMES, "above": 0.75, "narrowest": ROOM["narrowest"]}
+    figure, grid = panels(len(figures), 1.75, height, **room)
     for axes, key in zip(grid, figures, strict=False):
-        for number, entrant in enumerate(entrants):
-            rows = own[own["entrant"] == entrant]
-            centres, success = _binned(rows[key], rows["success"])
-            axes.plot(
-                centres,
-                success,
-                **line_style(number),
-                markersize=3.5,
-                linewidth=1.2,
-                label=_short(entrant),
-                clip_on=False,
-            )
-        axes.set_xlabel(DIFFICULTY[key], fontsize=9, color=TEXT)
-        axes.set_ylim(-0.02, 1.02)
-        axes.xaxis.set_major_locator(MaxNLocator(4))
-    legend_above(figure, grid, 4)
-    label = f"reached, in {BINS} groups of as many worlds"
-    figure.supylabel(label, fontsize=9, color=TEXT)
+        groups = _groups(own, key)
+        cells = np.array(
+            [[_rate(group, entrant) for group in groups] for entrant in entrants]
+        )
+        axes.imshow(cells, cmap="cividis", vmin=0, vmax=1, aspect="auto")
+        for y, x in np.ndindex(cells.shape):
+            _cell(axes, x, y, float(cells[y, x]))
+        middles = [f"{group[key].mean():.3g}" for group in groups]
+        axes.set_xticks(range(BINS), middles, fontsize=8)
+        axes.set_yticks(range(len(entrants)), [spoken(each) for each in entrants])
+        axes.tick_params(axis="both", length=0, labelsize=8)
+        axes.tick_params(axis="y", pad=13 if kinds else 4)
+        axes.grid(visible=False)
+        axes.spines[:].set_visible(False)
+        axes.set_title(DIFFICULTY[key], loc="left", fontsize=9, color=TEXT)
+    title = f"{name}: goals reached, in %, by difficulty of the world"
+    if kinds:
+        _mark_kinds(grid, [ENTRANTS[kinds[entrant]] for entrant in entrants])
+        legend_above(figure, grid, 6, title=title)
+    else:
+        figure.suptitle(title, x=0.01, ha="left", fontsize=11, weight="bold")
+    figure.set_label(f"{name}: goals reached, by difficulty")
+    figure.description = (
+        f"A panel per figure of difficulty, a row per entrant, and {BINS} columns with "
+        "a quarter of the worlds each, small values first. A cell has the share of "
+        "goals reached, in per cent."
+    )
+    figure.supxlabel(
+        f"mean of the worlds of a column; the {BINS} columns have as many worlds each",
+        fontsize=8.5,
+        color=TEXT,
+    )
     return figure
 
 
-def _binned(values: pd.Series, success: pd.Series) -> tuple[list[float], list[float]]:
-    """Mean value and rate of success in groups of as many rows, by value."""
-    order = values.to_numpy().argsort(kind="stable")
-    groups = np.array_split(order, BINS)
-    return (
-        [float(values.iloc[group].mean()) for group in groups],
-        [float(success.iloc[group].mean()) for group in groups],
-    )
+def _groups(worlds: pd.DataFrame, key: str) -> list[pd.DataFrame]:
+    """The episodes in groups with as many worlds, by a figure of the worlds."""
+    values = worlds.groupby("index")[key].first().sort_values(kind="stable")
+    return [
+        worlds[worlds["index"].isin(part)]
+        for part in np.array_split(values.index.to_numpy(), BINS)
+    ]
+
+
+def _rate(group: pd.DataFrame, entrant: str) -> float:
+    return float(group.loc[group["entrant"] == entrant, "success"].mean())
+
+
+def _cell(axes: Axes, x: int, y: int, rate: float) -> None:
+    """A share in per cent on its ground; nothing without episodes."""
+    if not np.isnan(rate):
+        colour = "white" if rate < 0.55 else "black"
+        axes.text(
+            x, y, f"{100 * rate:.0f}", ha="center", va="center", color=colour,
+            fontsize=7.5,
+        )  # fmt: skip
+
+
+def _mark_kinds(grid: Sequence[Axes], looks: Sequence[Look]) -> None:
+    """Marks the kind of the entrant of each row before its first cell."""
+    for axes in grid:
+        for y, look in enumerate(looks):
+            (mark,) = axes.plot([-0.66], [y], look.marker, label=look.words)
+            mark.set(color=look.colour, markersize=4.5, clip_on=False)
+        axes.set_xlim(-0.5, BINS - 0.5)
 
 
 def plot_training(rows: pd.DataFrame) -> Figure:
@@ -240,23 +281,21 @@ def plot_training(rows: pd.DataFrame) -> Figure:
     most = (learned["steps"] / learned["files"]).max() / 1e6
     figure, grid = panels(len(sets), 2.4, 2.1, left=0.4, **ROOM)
     for axes, name in zip(grid, sets, strict=False):
-        for row in learned[learned["set"] == name].itertuples():
-            style = line_style(entrants.index(row.entrant))
-            axes.errorbar(
-                row.steps / row.files / 1e6,
-                row.time,
-                yerr=[[row.time - row.low], [row.high - row.time]],
-                **{**style, "linestyle": "none"},
-                label=_short(row.entrant),
-            )
-        best = rows[(rows["set"] == name) & (rows["kind"] != "learned")]["time"].max()
-        if not pd.isna(best):
-            axes.axhline(best, color="#666666", linewidth=1, linestyle="--")
+        for row in learned[learned["set"] == name].to_dict("records"):
+            _trained(axes, row, entrants.index(row["entrant"]))
+        others = rows[(rows["set"] == name) & (rows["kind"] != "learned")]
+        _best_other(axes, others)
         axes.set_title(name, loc="left", fontsize=9.5, color=TEXT)
-        axes.set_xlim(0, 1.1 * most)
+        axes.set_xlim(0, 1.15 * most)
         axes.xaxis.set_major_locator(MaxNLocator(4))
         axes.set_ylim(0, 1)
-    legend_above(figure, grid, 4)
+    finding = "Time score of learned policies over their training"
+    legend_above(figure, grid, 4, title=finding)
+    figure.set_label(finding)
+    figure.description = (
+        "A panel per set of worlds, a mark with its value per kind of training; a "
+        "dashed line is the best entrant that did not learn."
+    )
     label = (
         "millions of steps to the kept policy, mean of its trainings; "
         "dashed: the best other entrant"
@@ -264,6 +303,53 @@ def plot_training(rows: pd.DataFrame) -> Figure:
     figure.supxlabel(label, fontsize=9, color=TEXT)
     figure.supylabel("time score, 95 % intervals", fontsize=9, color=TEXT)
     return figure
+
+
+def _trained(axes: Axes, row: dict[Any, Any], number: int) -> None:
+    """A learned entrant: its kind's colour, and a shape and shade of its own."""
+    look, place = ENTRANTS["learned"], row["steps"] / row["files"] / 1e6
+    first = MARKERS.index(look.marker)
+    axes.errorbar(
+        place,
+        row["time"],
+        yerr=[[row["time"] - row["low"]], [row["high"] - row["time"]]],
+        fmt=MARKERS[(first + number) % len(MARKERS)],
+        color=shade(look.colour, number),
+        markersize=5.5,
+        label=spoken(row["entrant"]),
+        clip_on=False,
+        zorder=3,
+    )
+    axes.annotate(
+        f"{row['time']:.2f}",
+        (place, row["high"]),
+        (0, 3),
+        textcoords="offset points",
+        ha="center",
+        fontsize=8,
+        color=TEXT,
+    )
+
+
+def _best_other(axes: Axes, others: pd.DataFrame) -> None:
+    """A dashed line at the best score of entrants that did not learn, with its name."""
+    scores = others.set_index("entrant")["time"].dropna()
+    if scores.empty:
+        return
+    name, best = scores.idxmax(), float(scores.max())
+    axes.axhline(best, color="#666666", linewidth=1, linestyle="--")
+    # On the side of the line with more room.
+    up = best < 0.5
+    axes.annotate(
+        f"{spoken(str(name))} {best:.2f}",
+        (0.02, best),
+        (0, 3 if up else -3),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        va="bottom" if up else "top",
+        fontsize=8,
+        color=TEXT,
+    )
 
 
 def _short(name: str) -> str:

@@ -13,17 +13,20 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 
 from tdac_agent.metrics.exact import exact_interval
 from tdac_agent.plots.style import (
-    COLOURS,
+    ENTRANTS,
+    GRID,
     LINES,
-    MARKERS,
     TEXT,
-    colours_of,
+    Look,
     legend_above,
     new_plot,
     panels,
+    shade,
     title,
 )
 
+OURS, MODEL, REFERENCE = "builtin", "recorded model", "reference"
+"""Beginnings of the names of policies that are no baselines."""
 SMALL = {"size": 9.5, "pad": 14, "rise": 4, "small": 7.5}
 """Of the titles of panels."""
 
@@ -52,7 +55,12 @@ def plot_learning_curves(curves: pd.DataFrame) -> Figure:
         axes.set_ylim(-0.03, 1.05)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:.0f}k"))
-    legend_above(figure, grid, 5)
+    legend_above(figure, grid, 5, title="Success of learned policies in training")
+    figure.description = (
+        "A panel per task: thin lines are single seeds, a bold line is their mean, and "
+        "the shaded area is their range."
+    )
+    figure.set_label("Success of learned policies in training")
     figure.supxlabel(
         "training steps of all robots; thin: each seed, bold: mean, shaded: range",
         fontsize=9,
@@ -65,7 +73,8 @@ def plot_learning_curves(curves: pd.DataFrame) -> Figure:
 def _curve(axes: Axes, rows: pd.DataFrame, label: str, number: int) -> None:
     """Draws each seed, and mean and range over the steps that all seeds cover."""
     seeds = [seed.sort_values("steps") for _, seed in rows.groupby("seed")]
-    colour, line = COLOURS[number], LINES[number]
+    colour = shade(ENTRANTS["learned"].colour, number)
+    line = LINES[number % len(LINES)]
     for seed in seeds:
         axes.plot(seed["steps"], seed["success_rate"], color=colour, lw=0.6, alpha=0.6)
     first = max(seed["steps"].min() for seed in seeds)
@@ -91,36 +100,58 @@ def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
     tasks = list(evaluation["task"].drop_duplicates())
     learned = evaluation.dropna(subset=["training"])
     policies = list(pd.concat([learned, evaluation])["policy"].drop_duplicates())
-    colours = colours_of(sorted(evaluation["knows"].drop_duplicates()))
+    names = [f"{policy} ({_known(evaluation, policy)})" for policy in policies]
     width, height = 1.9, 0.7 + 0.24 * len(policies)
-    figure, grid = panels(len(tasks), width, height, left=1.6, above=0.7)
+    figure, grid = panels(len(tasks), width, height, left=2.2, above=0.75)
     missing = False
     for axes, task in zip(grid, tasks, strict=False):
         rows = evaluation[evaluation["task"] == task]
         for place, policy in enumerate(policies):
             known = rows[rows["policy"] == policy].dropna(subset=["episodes"])
-            _dots(axes, known, len(policies) - place, colours)
+            _dots(axes, known, len(policies) - place, _look(rows, policy))
             missing |= known.empty
         axes.set_title(task, loc="left", fontsize=9.5, color=TEXT, pad=4)
-        axes.set_yticks(range(len(policies), 0, -1), policies)
+        axes.set_yticks(range(len(policies), 0, -1), names)
+        axes.tick_params(axis="y", labelsize=8)
         axes.set_ylim(0.4, len(policies) + 0.6)
         axes.set_xlim(-0.05, 1.05)
         axes.set_xticks([0, 0.5, 1])
         axes.xaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
-    legend_above(figure, grid, 5)
-    label = "episodes with goal reached without contact, exact 95 % intervals"
+        axes.grid(visible=True, axis="x", color=GRID, linewidth=0.8)
+    heading = "Goals reached, by task and policy"
+    legend_above(figure, grid, 5, title=heading)
+    figure.set_label(heading)
+    figure.description = (
+        "A panel per task, a row per policy with what it knows. The colour and shape "
+        "of a dot say the kind of policy."
+    )
+    label = (
+        "episodes with goal reached without contact, exact 95 % intervals; "
+        "at the right: % of all"
+    )
     if evaluation["training"].notna().any():
-        label += "; one dot per training seed"
+        label += "\none dot per training seed"
     if missing:
         label += "; –: no such policy"
     figure.supxlabel(label, fontsize=9, color=TEXT)
     return figure
 
 
-def _dots(
-    axes: Axes, known: pd.DataFrame, place: float, colours: dict[str, str]
-) -> None:
+def _known(evaluation: pd.DataFrame, policy: str) -> str:
+    """What a policy knows, as its row says."""
+    return ", ".join(evaluation[evaluation["policy"] == policy]["knows"].unique())
+
+
+def _look(evaluation: pd.DataFrame, policy: str) -> Look:
+    """How the kind of a policy is drawn."""
+    if evaluation[evaluation["policy"] == policy]["training"].notna().any():
+        return ENTRANTS["learned"]
+    kinds = {OURS: "builtin", MODEL: "controller", REFERENCE: "privileged"}
+    found = [kind for begin, kind in kinds.items() if policy.startswith(begin)]
+    return ENTRANTS[found[0] if found else "baseline"]
+
+
+def _dots(axes: Axes, known: pd.DataFrame, place: float, look: Look) -> None:
     if known.empty:
         axes.text(0.02, place, "–", va="center", fontsize=8, color="#888888")
         return
@@ -129,18 +160,28 @@ def _dots(
         reached, episodes = int(row["reached"]), int(row["episodes"])
         rate = reached / episodes
         low, high = exact_interval(reached, episodes)
-        knows = str(row["knows"])
         axes.errorbar(
             rate,
             place + offset,
             xerr=[[rate - low], [high - rate]],
-            fmt=MARKERS[list(colours).index(knows) % len(MARKERS)],
-            color=colours[knows],
+            fmt=look.marker,
+            color=look.colour,
             markersize=4,
             linewidth=1,
-            label=knows,
+            label=look.words,
             clip_on=False,
         )
+    axes.annotate(
+        f"{100 * known['reached'].sum() / known['episodes'].sum():.0f}",
+        (1.0, place),
+        (5, 0),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        va="center",
+        fontsize=7.5,
+        color=TEXT,
+        annotation_clip=False,
+    )
 
 
 def plot_generalisation(results: pd.DataFrame) -> Figure:
@@ -171,6 +212,11 @@ def plot_generalisation(results: pd.DataFrame) -> Figure:
     axes.set_yticks(range(len(rows)), rows, fontsize=8)
     axes.tick_params(length=0, colors=TEXT)
     axes.spines[:].set_visible(False)
+    title(axes, "Goals reached on the training task and on others, in %", pad=10)
+    figure.description = (
+        "A row per task of training, a column per task of evaluation; a frame marks "
+        "the task of training. A cell is the mean of all seeds."
+    )
     axes.set_xlabel("evaluated on (framed: training task)", fontsize=9, color=TEXT)
     axes.set_ylabel("trained on", fontsize=9, color=TEXT)
     return figure

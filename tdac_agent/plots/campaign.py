@@ -6,12 +6,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tdac_agent.plots.style import COLOURS, MARKERS, TEXT, legend_above, panels
+from tdac_agent.plots.style import ENTRANTS, GRID, TEXT, legend_above, panels
 
 ROOM = {"left": 2.3, "above": 0.75, "narrowest": 6.4}
 """Inches that the labels need."""
 ASKS = "language model", "no language model"
 """Whether a learner asks one, by `free`."""
+LOOKS = ENTRANTS["controller"], ENTRANTS["builtin"]
+"""How those are drawn."""
 
 
 def plot_rates(rows: pd.DataFrame, label: str) -> Figure:
@@ -36,8 +38,13 @@ def plot_rates(rows: pd.DataFrame, label: str) -> Figure:
         axes.set_ylim(0.5, len(kinds) + 0.7)
         axes.set_xlim(-0.02, 1.02)
         axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "", "0.5", "", "1"])
-        axes.grid(visible=True, axis="x", color="#E5E5E5", linewidth=0.8)
+        axes.grid(visible=True, axis="x", color=GRID, linewidth=0.8)
     legend_above(figure, grid, len(ASKS))
+    figure.set_label(f"Rates of kinds of runs: {', '.join(tasks)}")
+    figure.description = (
+        f"A panel per task, a row per kind of run. {label}: a dot with its value, "
+        "and its interval as a line. R is the number of runs."
+    )
     figure.supxlabel(label, fontsize=9, color=TEXT)
     return figure
 
@@ -61,8 +68,8 @@ def _dot(axes: Axes, row: dict[str, object], place: float) -> None:
         rate,
         place,
         xerr=ends,
-        fmt=MARKERS[free],
-        color=COLOURS[free],
+        fmt=LOOKS[free].marker,
+        color=LOOKS[free].colour,
         markersize=5,
         linewidth=1.2,
         capsize=2.5,

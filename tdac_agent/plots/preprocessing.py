@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from tdac_agent.plots.style import (
     COLOURS,
     FAILED,
-    PASSED,
     TEXT,
     apply_style,
+    mark_task,
     new_plot,
     title,
 )
@@ -102,11 +102,7 @@ def _plot_room(axes: Axes, grid: OccupancyGrid, params: MapParams) -> None:
         vmin=-0.3 * float(clear.max()),  # stands out from the pale background
         interpolation="nearest",
     )
-    path = planned_path(grid, params)
-    axes.plot(path[:, 0], path[:, 1], color=COLOURS[1], linewidth=1.8)
-    for place, mark in ((params.start, "o"), (params.goal, "*")):
-        if place is not None:
-            axes.plot(*place, mark, color=PASSED, markeredgecolor="w", markersize=11)
+    mark_task(axes, params.start, params.goal, planned_path(grid, params))
     margin = f" + {params.inflation:g} px" if params.inflation else ""
     subtitle = f"for a disc of {params.robot.radius:g} px{margin}"
     if params.score_terms is not None:

@@ -6,11 +6,15 @@ import io
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+from xml.sax.saxutils import escape
 
+import numpy as np
 from matplotlib import matplotlib_fname, rc_context, rcdefaults, rcParams
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from tdac_agent.storage.files import write_atomic
 
@@ -24,9 +28,31 @@ if not os.path.isabs(matplotlib_fname()):
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LINES = ("-", "--", "-.", ":")
+
+
+class Look(NamedTuple):
+    """How a kind of entrant is drawn in all figures."""
+
+    words: str
+    colour: str
+    marker: str
+
+
+ENTRANTS = {
+    "builtin": Look("our own program", COLOURS[0], MARKERS[0]),
+    "planner": Look("classical planner", COLOURS[1], MARKERS[1]),
+    "controller": Look("controller file", COLOURS[2], MARKERS[2]),
+    "learned": Look("learned policy", COLOURS[3], MARKERS[3]),
+    "baseline": Look("baseline", COLOURS[4], MARKERS[4]),
+    "privileged": Look("knows the true world", COLOURS[5], MARKERS[5]),
+}
+"""By the kind of a row of a bench."""
 PASSED, FAILED, NOTHING = "#009E73", "#D55E00", "#D9D9D9"
 PALE = "#D8EEE6"  # passed tests, where failed ones must stand out
 TEXT, GRID = "#333333", "#E5E5E5"
+START, GOAL, PATH, TRAIL = "#FAF9F5", "#0E8C5C", "#555B66", "#5848C6"
+"""As in the pictures of maps and worlds: a light disc, a green ring, grey dashes, and
+the nominal drive."""
 _ON_DARK = {
     "#ffffff": "#0d1117", "#000000": "#e6edf3", "#333333": "#e6edf3",
     "#666666": "#9da7b3", "#999999": "#6e7681", "#e5e5e5": "#30363d",
@@ -38,11 +64,25 @@ _ON_DARK = {
 class Plot(Figure):
     """A figure that notebooks show as SVG.
 
-    It is not registered with pyplot and need not be closed.
+    It is not registered with pyplot and need not be closed. Its label
+    (`figure.set_label`) is the title of an SVG for those who cannot see it, or else the
+    title that it shows.
+
+    Attributes:
+        description: What an SVG says of itself besides: what its marks mean.
     """
+
+    description = ""
 
     def _repr_svg_(self) -> str:
         return figure_bytes(self).decode("utf-8")
+
+
+def shade(colour: str, number: int) -> str:
+    """One of several colours of a kind of entrant: itself, and darker ones."""
+    light = (1.0, 0.3, 0.6)[number % 3]
+    red, green, blue = to_rgb(colour)
+    return to_hex((light * red, light * green, light * blue))
 
 
 def new_figure(width: float, height: float) -> tuple[Plot, Axes]:
@@ -130,21 +170,28 @@ def title(
         )
 
 
+def mark_task(
+    axes: Axes,
+    start: tuple[float, ...] | None,
+    goal: tuple[float, float] | None,
+    path: NDArray[np.float64],
+) -> None:
+    """Marks start, goal and path on a map, as the pictures of maps do."""
+    axes.plot(path[:, 0], path[:, 1], color="w", linewidth=4.0, alpha=0.7)
+    axes.plot(path[:, 0], path[:, 1], "--", color=PATH, linewidth=1.8)
+    if goal is not None:
+        ring: dict[str, Any] = {"mfc": "#FFFFFFAA", "mec": GOAL, "mew": 2.0}
+        axes.plot(*goal[:2], "o", markersize=13, **ring)
+        axes.plot(*goal[:2], "o", markersize=4, color=GOAL)
+    if start is not None:
+        disc: dict[str, Any] = {"mfc": START, "mec": PATH, "mew": 2.0}
+        axes.plot(*start[:2], "o", markersize=9, **disc)
+
+
 def colours_of(names: Iterable[str]) -> dict[str, str]:
     """A colour for each name, in the order of the names."""
     unique = dict.fromkeys(names)
     return {name: COLOURS[n % len(COLOURS)] for n, name in enumerate(unique)}
-
-
-def line_style(number: int) -> dict[str, Any]:
-    """Colour, marker and line of one of up to 49 lines, no two of them alike."""
-    again, own = divmod(number, len(COLOURS))
-    return {
-        "color": COLOURS[own],
-        "marker": MARKERS[(own + again) % len(MARKERS)],
-        "linestyle": LINES[number % len(LINES)],
-        "markerfacecolor": "white" if again % 2 else COLOURS[own],
-    }
 
 
 def legend(axes: Axes, count: int) -> None:
@@ -205,19 +252,31 @@ def save_dark(figure: Figure, path: Path) -> None:
 def figure_bytes(figure: Figure, kind: str = "svg") -> bytes:
     """Encodes a figure as svg, pdf or png; equal figures give equal bytes.
 
-    The label of a figure (`figure.set_label`) is the title of an SVG, for those who
-    cannot see it.
+    An SVG has a title, and the description of a `Plot`.
     """
     stream = io.BytesIO()
     stamps: dict[str, dict[str, str | None]] = {
         "svg": {"Date": None},
         "pdf": {"CreationDate": None},
     }
-    if figure.get_label():
-        stamps["svg"]["Title"] = str(figure.get_label())
+    name = _name_of(figure)
+    if name:
+        stamps["svg"]["Title"] = name
     with rc_context({"svg.hashsalt": "tdac"}):  # for the ids of elements
         figure.savefig(stream, format=kind, dpi=150, metadata=stamps.get(kind))
-    return stream.getvalue()
+    drawn, described = stream.getvalue(), getattr(figure, "description", "")
+    if kind == "svg" and name and described:
+        end = b"</title>"
+        text = f"</title>\n <desc>{escape(described)}</desc>".encode()
+        return drawn.replace(end, text, 1)
+    return drawn
+
+
+def _name_of(figure: Figure) -> str:
+    """What a figure is called: its label, or a title that it shows."""
+    shown = [axes.get_title(loc="left") for axes in figure.axes[:1]]
+    names = [str(figure.get_label()), figure.get_suptitle(), *shown]
+    return next((" ".join(name.split()) for name in names if name), "")
 
 
 def spread(count: int, width: float = 0.8) -> Sequence[float]:

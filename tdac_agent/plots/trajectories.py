@@ -17,6 +17,7 @@ from tdac_agent.plots.style import (
     FAILED,
     LINES,
     TEXT,
+    TRAIL,
     apply_style,
     colours_of,
     new_plot,
@@ -24,6 +25,7 @@ from tdac_agent.plots.style import (
 )
 from tdac_agent.tasks.task import Task
 from tdac_envs.drawing.backdrop import Chart
+from tdac_envs.drawing.runs import NOMINAL
 
 WIDTH = 7.0
 """Width of the map, inches; reduced if the map is higher than 0.8 of its width."""
@@ -42,7 +44,8 @@ def plot_trajectories(
     Args:
         task: Task whose map or world is drawn.
         ways: Trajectories by name in the legend, each as recorded by the judge, or as
-            poses of shape (T + 1, 3) or positions of shape (T + 1, 2), px or m.
+            poses of shape (T + 1, 3) or positions of shape (T + 1, 2), px or m. One
+            that is called `nominal` is strong, and the others are thin.
         outcomes: Outcome of each trajectory, as in a report: `reached`, `collision` ….
         heading: Title; the task's name by default.
         provenance: Line below the title.
@@ -59,12 +62,16 @@ def plot_trajectories(
     axes = apply_style(figure.add_subplot())
     axes.grid(visible=False)
     axes.imshow(picture, extent=extent, interpolation="antialiased")
-    colours = colours_of(ways)
+    colours = colours_of(ways) | {NOMINAL: TRAIL}
+    strong = NOMINAL in ways and len(ways) > 1
     for number, (name, way) in enumerate(ways.items()):
         outcome = (outcomes or {}).get(name, "")
         line = LINES[number // len(COLOURS) % len(LINES)]
         label = f"{name}: {outcome}" if outcome else name
-        _draw(axes, _places(way), colours[name], line, label, outcome)
+        width = 1.8
+        if strong:
+            width = 3.0 if name == NOMINAL else 1.0
+        _draw(axes, _places(way), colours[name], line, label, outcome, width)
     unit = task.setting.units.place
     axes.set_xlabel(f"x, {unit}", color=TEXT)
     axes.set_ylabel(f"y, {unit}", color=TEXT)
@@ -99,10 +106,16 @@ def _draw(
     line: str,
     label: str,
     outcome: str,
+    width: float,
 ) -> None:
     x, y = places.T
-    axes.plot(x, y, color="w", linewidth=3.6, alpha=0.5, zorder=2)
-    axes.plot(x, y, line, color=colour, linewidth=1.8, alpha=0.8, label=label, zorder=3)
+    # The strong one lies above the thin ones.
+    over = 2.0 + 0.1 * width
+    axes.plot(x, y, color="w", linewidth=1.8 + width, alpha=0.5, zorder=over)
+    axes.plot(
+        x, y, line, color=colour, linewidth=width, alpha=0.8, label=label,
+        zorder=over + 0.01,
+    )  # fmt: skip
     marks = {"reached": ("o", colour), "collision": ("X", FAILED)}
     mark, fill = marks.get(outcome, ("s", colour))
     end: dict[str, Any] = {

@@ -15,6 +15,7 @@ from tdac_agent.studio.source_view import Kind, Place, SourceView
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import TaskFile
 from tdac_envs.core.errors import TdacError
+from tdac_envs.drive.stepping import wrap_angle
 from tdac_envs.grid.plan import path_length
 from tdac_envs.map2d.source import has_resolution
 from tdac_envs.map2d.task import Map2DTask
@@ -100,8 +101,7 @@ class TaskDraft:
         Args:
             angle: How far it turns, rad, from +x towards +y.
         """
-        turned = (self.heading or 0.0) + angle
-        wrapped = math.atan2(math.sin(turned), math.cos(turned))
+        wrapped = wrap_angle((self.heading or 0.0) + angle)
         return replace(self, heading=round(wrapped, 3))
 
     def task_file(self) -> TaskFile:

@@ -49,7 +49,7 @@ def trajectory_picture(
     chart = WorldChart(view)
     runs = [chart.poses(np.asarray(run, np.float64)) for run in trajectories]
     body = max(BODY_RADIUS * view.scale, SMALLEST_BODY)
-    draw_runs(view.canvas, runs, ends, body)
+    draw_runs(view.canvas, runs, ends, body, labels)
     legend.write(view.canvas)
     return view.canvas.image
 

@@ -91,16 +91,33 @@ class Carried:
         robot.outcome[TOUCHED] = robot.outcome[CONTACT] = moved.touched
         finish(words)
 
-    def measuring(
-        self, calls: list[Callable[[], None]], robot: Map2DArrays, task: Map2DTask
+    def calls(
+        self,
+        begin: Callable[[], None],
+        words: Words,
+        robot: Map2DArrays,
+        task: Map2DTask,
+        is_measured: bool,
     ) -> list[Callable[[], None]]:
-        """Calls of kernels, with MuJoCo's ranges in place of theirs."""
+        """What begins an episode, and what drives a step, with MuJoCo's body.
+
+        Args:
+            begin: What begins an episode with the exact body.
+            words: Addresses of the arrays; see `kernels.begin`.
+            robot: The arrays of the robot.
+            task: Its task.
+            is_measured: Whether MuJoCo measures the ranges, too.
+        """
+        both: list[Callable[[], None]] = [begin]
+        both.append(partial(self.step, words, robot, task))
+        if not is_measured:
+            return both
 
         def measured(call: Callable[[], None]) -> None:
             call()
             self.measure(robot, task)
 
-        return [partial(measured, call) for call in calls]
+        return [partial(measured, call) for call in both]
 
     def measure(self, robot: Map2DArrays, task: Map2DTask) -> None:
         """Replaces the ranges by those that MuJoCo measures, at the robot's top."""

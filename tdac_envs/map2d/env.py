@@ -505,9 +505,8 @@ class Map2DEnv(DrivenEnv, gym.Env[Observation, NDArray[np.float32]]):
         kernels = (begin_among, drive_among) if among else alone
         calls: list[Callable[[], None]] = [partial(call, words) for call in kernels]
         if self._carried is not None:
-            calls[1] = partial(self._carried.step, words, self.robot, self.task)
-            if self.setup.physics.measures:
-                calls = self._carried.measuring(calls, self.robot, self.task)
+            own = words, self.robot, self.task, self.setup.physics.measures
+            calls = self._carried.calls(calls[0], *own)
         if self.setup.sonar is not None:
             calls = [partial(self._then_listen, call) for call in calls]
         self._call_begin, self._call_drive = calls

@@ -143,6 +143,6 @@ def trajectory_picture(
     canvas = Canvas(cells, strip=legend.height)
     draw_task(canvas, start, goal, goal_tolerance, path)
     draw_movers(canvas, movers)
-    draw_runs(canvas, runs, ends, max(radius * canvas.scale, SMALLEST_BODY))
+    draw_runs(canvas, runs, ends, max(radius * canvas.scale, SMALLEST_BODY), labels)
     legend.write(canvas)
     return canvas.image

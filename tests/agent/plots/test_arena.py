@@ -9,12 +9,13 @@ import pytest
 
 from tdac_agent.plots.arena import (
     BINS,
+    DIFFICULTY,
     mean_scores,
     plot_difficulty,
     plot_scores,
     plot_training,
 )
-from tdac_agent.plots.style import figure_bytes, line_style, save_dark
+from tdac_agent.plots.style import ENTRANTS, figure_bytes, save_dark, shade
 
 
 @pytest.fixture
@@ -92,7 +93,7 @@ def test_training(rows):
 
 
 def test_an_entrant_looks_alike_on_all_sets(rows):
-    """Also where others are missing; and no two of many look alike."""
+    """Also where others are missing."""
     other = rows[rows["kind"] == "learned"].assign(entrant="sac")
     both = pd.concat([rows, other])
     panels = plot_training(both[(both["set"] == "known") | (both["entrant"] == "sac")])
@@ -106,8 +107,6 @@ def test_an_entrant_looks_alike_on_all_sets(rows):
     ]
     assert looks[1].items() <= looks[0].items()
     assert looks[1].keys() == {"sac"}
-    styles = [tuple(sorted(line_style(number).items())) for number in range(49)]
-    assert len({*styles}) == 49
 
 
 def test_difficulty():
@@ -117,15 +116,58 @@ def test_difficulty():
         {
             "set": "known",
             "entrant": "a",
+            "index": np.arange(count),
             "gap": np.arange(count)[::-1] / count,
             "success": np.arange(count) < 10,
             "density": np.linspace(0.1, 0.3, count),
             **dict.fromkeys(("least_steps", "detour", "in_sight", "movers"), 1.0),
         }
     )
-    gap, density = plot_difficulty(worlds, "known").axes[:2]
-    assert gap.get_xlabel() == "gap, body diameters"
-    assert gap.lines[0].get_ydata().tolist() == [0.0] * (BINS - 1) + [1.0]
-    assert density.lines[0].get_ydata().tolist() == [1.0] + [0.0] * (BINS - 1)
-    x = gap.lines[0].get_xdata()
-    assert x[-1] == pytest.approx(worlds["gap"][:10].mean())
+    figure = plot_difficulty(worlds, "known", {"a": "planner"})
+    gap, density = figure.axes[:2]
+    assert gap.get_title(loc="left") == "gap, body diameters"
+    assert [text.get_text() for text in gap.texts] == ["0"] * (BINS - 1) + ["100"]
+    assert [text.get_text() for text in density.texts] == ["100"] + ["0"] * (BINS - 1)
+    last = gap.get_xticklabels()[-1].get_text()
+    assert float(last) == pytest.approx(worlds["gap"][:10].mean(), rel=1e-2)
+    (mark,) = gap.lines
+    assert mark.get_marker() == ENTRANTS["planner"].marker
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "classical planner"
+    ]
+
+
+def test_files_of_an_entrant_share_the_groups():
+    """A world is in one group, however many files drove it; gaps stay empty."""
+    worlds = pd.DataFrame(
+        [
+            {"set": "known", "entrant": name, "index": k, "gap": k, "success": k < n}
+            for name, n in (("a", 10), ("b", 5), ("b", 20))
+            for k in range(20)
+            if name == "a" or k >= 5
+        ]
+    ).assign(**dict.fromkeys(set(DIFFICULTY) - {"gap"}, 1.0))
+    (gap,) = [
+        axes for axes in plot_difficulty(worlds, "known").axes if axes.get_visible()
+    ]
+    words = [text.get_text() for text in gap.texts]
+    assert words == ["100", "100", "0", "0", "50", "50", "50"]
+
+
+def test_a_figure_says_what_it_is(rows):
+    """Its SVG has a title and a description, in plain characters."""
+    svg = ElementTree.fromstring(figure_bytes(plot_training(rows)))
+    title, description = svg[0], svg[1]
+    assert title.tag.endswith("title")
+    assert "learned policies" in title.text
+    assert description.tag.endswith("desc")
+    assert "dashed line" in description.text
+
+
+def test_kinds_are_told_apart_without_colour():
+    """Each kind of entrant has a shape and a colour of its own."""
+    for part in ("words", "colour", "marker"):
+        assert len({getattr(look, part) for look in ENTRANTS.values()}) == len(ENTRANTS)
+    pink = ENTRANTS["learned"].colour
+    assert len({shade(pink, number) for number in range(3)}) == 3
+    assert shade(pink, 0) == pink.lower()

@@ -12,6 +12,7 @@ from tdac_agent.plots.baselines import (
     plot_learning_curves,
     plot_success_by_policy,
 )
+from tdac_agent.plots.style import ENTRANTS
 from tdac_agent.tasks.task_file import bundled_tasks
 
 RESULTS = Path(__file__).parents[3] / "results" / "baselines"
@@ -67,9 +68,10 @@ def test_dots_are_rates_with_exact_intervals():
     assert found == [0.9, 1.0]
     ends = axes.containers[0].lines[2][0].get_segments()[0][:, 0]
     np.testing.assert_allclose(ends, exact_interval(90, 100))
-    assert [text.get_text() for text in axes.texts if text.get_text()] == ["–"]
+    assert [text.get_text() for text in axes.texts if text.get_text()] == ["95", "–"]
     labels = [label.get_text() for label in axes.get_yticklabels()]
-    assert labels == ["PPO", "recorded model"]
+    assert labels == ["PPO (+ guidance)", "recorded model (+ map)"]
+    assert axes.containers[0].lines[0].get_marker() == ENTRANTS["learned"].marker
 
 
 def test_cells_are_means_of_seeds_and_say_what_was_seen():

@@ -246,6 +246,18 @@ def test_ways_lie_where_they_were_driven(name, small_task):
     assert green > red + 40
 
 
+def test_the_nominal_way_is_strong(small_task):
+    """And above the others, which are thin; without it, all are alike."""
+    way = np.array([small_task.nominal.start[:2], small_task.nominal.goal])
+    axes = plot_trajectories(small_task, {"nominal": way, "jitter 1": way}).axes[0]
+    nominal, other = [line for line in axes.lines if line.get_label()[0] != "_"]
+    assert nominal.get_linewidth() > 2 * other.get_linewidth()
+    assert nominal.get_zorder() > other.get_zorder()
+    axes = plot_trajectories(small_task, {"one": way, "two": way}).axes[0]
+    one, two = [line for line in axes.lines if line.get_label()[0] != "_"]
+    assert one.get_linewidth() == two.get_linewidth()
+
+
 def test_a_recorded_trajectory_is_drawn_by_its_poses(small_task):
     """The judge's record, as it comes from a folder."""
     poses = np.array([[30.0, 30.0, 0.0], [32.0, 31.0, 0.1]])

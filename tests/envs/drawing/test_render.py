@@ -13,7 +13,7 @@ from tdac_envs.controller_kit.sensors import Ultrasonic
 from tdac_envs.core.extras import install_command
 from tdac_envs.drawing.canvas import FREE, GREEN, RED, TRAIL, WALL, Canvas, frame_scale
 from tdac_envs.drawing.marks import LEFT_RAYS, OUTCOMES, RIGHT_RAYS
-from tdac_envs.drawing.runs import Status
+from tdac_envs.drawing.runs import Status, run_colour, run_widths
 from tdac_envs.drawing.window import Window
 from tdac_envs.map2d.picture import MapScene
 from tdac_envs.map2d.run_picture import trajectory_picture
@@ -244,8 +244,25 @@ def test_trajectories_have_a_line_a_body_an_end_and_a_legend():
         gaps = np.hypot(*(near(image, colour, 30) - run[-1, :2]).T)
         assert (gaps < 17).sum() > 50
     strip = image[400:]
-    for colour in (TRAIL, (0, 136, 126), (206, 98, 0)):
-        assert len(near(strip, colour, 0)) == 18 * 3
+    for number, width in enumerate((4, 1, 1)):
+        assert len(near(strip, run_colour(number), 0)) == 18 * width
+
+
+def test_the_nominal_trajectory_stands_out():
+    """It is strong and alone shows its room; trajectories without one are alike."""
+    assert run_widths(3, ["jitter 1", "nominal", "jitter 2"]) == [1, 4, 1]
+    assert run_widths(2, ["one", "two"]) == [2, 2]
+    assert run_widths(1, ["nominal"]) == [2]
+    assert run_widths(3, ["jitter 1"]) == [2, 2, 2]
+    options = {"goal_tolerance": 20.0, "radius": 12.0}
+    runs = [spiral(1, 250, 100), spiral(1, 250, 100)]
+    images = [
+        trajectory_picture(MAP, runs, START, GOAL, labels=labels, **options)[:400]
+        for labels in (["nominal", "jitter 1"], ["jitter 1", "nominal"])
+    ]
+    for number, image in enumerate(images):
+        assert len(near(image, run_colour(number), 40)) > 400
+        assert len(near(image, run_colour(1 - number), 40)) < 200
 
 
 def test_the_legend_wraps_on_narrow_maps():

@@ -91,7 +91,7 @@ def test_the_legend_names_the_run_whose_movers_are_drawn():
     def texts(labels, movers=True):
         outcomes = [""] * len(labels)
         legend = Legend.of(outcomes, labels, path=False, width=900, movers=movers)
-        return [text for row in legend.rows for *_, text in row]
+        return [entry.text for row in legend.rows for _, entry in row]
 
     assert texts(["one"])[-1] == "movers at the end"
     assert texts(["one", "two"])[-1] == "movers at the end of one"
