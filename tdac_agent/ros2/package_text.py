@@ -14,7 +14,9 @@ import numpy as np
 from tdac_agent.ros2.package.scans import Guard
 from tdac_agent.ros2.package.settings import LATENCY, LOST, PERIODS, usual_deviation
 
-NOT_RUN = "The node was driven with rclpy of ROS 2 Jazzy in a simulation, but on no robot."
+NOT_RUN = (
+    "The node was driven with rclpy of ROS 2 Jazzy in a simulation, but on no robot."
+)
 SMOOTHER = 2.5, 3.2
 """Default accelerations of Nav2's velocity smoother, m/s² and rad/s²."""
 MAINTAINER = {"maintainer": "maintainer", "email": "maintainer@example.com"}
