@@ -39,7 +39,7 @@ def test_export_says_what_it_wrote(tdac, run, tmp_path):
     text = " ".join(printed.out.split())
     assert "(ROS 2 package tdac_floor)" in text
     assert "not verified: the package says so" in text
-    assert "stops within 0.405 m" in text
+    assert "stops within 0.435 m" in text
     assert "but on no robot" in text
     assert "The map's unknown cells are walls." in text
     words = "export", "ros2", run, "--out", tmp_path / "b", "--unverified", "--json"
