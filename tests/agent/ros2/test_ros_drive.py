@@ -1,6 +1,7 @@
 """An exported package drives the simulated robot over DDS, whatever goes wrong."""
 
 import dataclasses
+import gc
 import marshal
 import math
 import os
@@ -213,19 +214,52 @@ def test_a_slow_node(task, settings, package, stated, domain, here):
 @pytest.mark.slow
 def test_a_simulation_that_ends(task, settings, package, domain):
     """When the clock stands still, the node ends by itself, with zero."""
-    with NodeProcess(package, domain) as node:
-        Simulator(robot_of(task, settings), Bus(domain), patience=30.0).run(1.0)
+    # It still takes commands, which the robot does not obey any more.
+    simulator = Simulator(robot_of(task, settings), Bus(domain), patience=30.0)
+    with NodeProcess(package, domain, "--recover") as node:
+        simulator.run(1.0)
         printed = node.output()
     assert "ended: the clock stands still" in printed
+    assert node.process.returncode == 1
+
+
+class Gone(Exception):
+    """The simulation ends at once."""
+
+
+@pytest.mark.slow
+def test_a_robot_that_takes_no_commands_any_more(task, settings, package, domain):
+    """Its driver has ended: the node ends, too, and says why."""
+
+    def watch(robot):
+        if robot.time >= 1.0:
+            raise Gone
+
+    with NodeProcess(package, domain) as node:
+        bus = Bus(domain)
+        simulator = Simulator(robot_of(task, settings), bus, patience=30.0, watch=watch)
+        with pytest.raises(Gone):
+            simulator.run(60.0)
+        clock, now = bus.writer("clock"), simulator._clock
+        del simulator
+        gc.collect()
+        end = time.monotonic() + 30.0
+        while node.process.poll() is None and time.monotonic() < end:
+            now += 0.1
+            clock.write(msg.Clock(time_of(now)))
+            time.sleep(0.1)
+        printed = " ".join(node.output().split())
+    assert "ended: nobody takes the commands" in printed
     assert node.process.returncode == 1
 
 
 @pytest.mark.slow
 def test_a_simulation_that_begins_again(task, settings, package, domain):
     """Its clock goes back: the node ends, and does not drive on in the new one."""
-    with NodeProcess(package, domain) as node:
+    with NodeProcess(package, domain, "--recover") as node:
         bus = Bus(domain)
-        Simulator(robot_of(task, settings), bus, patience=30.0).run(1.0)
+        simulator = Simulator(robot_of(task, settings), bus, patience=30.0)
+        simulator.run(1.0)
         clock = bus.writer("clock")
         end = time.monotonic() + 30.0
         while node.process.poll() is None and time.monotonic() < end:
