@@ -141,7 +141,7 @@ def place(tmp_path_factory):
     (folder / "plans" / "kitchen").mkdir(parents=True)
     (folder / "plans" / "kitchen" / "task.yaml").write_text(TASK)
     (folder / "my.yaml").write_text(CAMPAIGN)
-    (folder / "my.salt").write_bytes(bytes(range(32)))
+    (folder / "my.hex").write_text(bytes(range(32)).hex())
     template = "Write controller.py. {{ env_description }} {{ rules_block }}"
     (folder / "mine.j2").write_text(template)
     for name, world in (("maze", "maze"), ("my", "arena")):
