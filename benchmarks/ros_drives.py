@@ -134,9 +134,13 @@ def fault_drive(task, settings, package, seed, bus, domain):
     finally:
         node.end()
     stated = core_settings(settings, dead_man=3 * settings["dt"]).stops_within()
-    old = stated["a scan or a pose is late, lost or old"]
     gone = stated["the node is killed, frozen or unreachable"]
-    far = [str(c) for c in report.faults if c["kind"] in STOPPING and c["way"] > old]
+    far = [
+        str(course)
+        for course in report.faults
+        if course["kind"] in STOPPING
+        and course["way"] > stated[STOPPING[course["kind"]]]
+    ]
     if node.stood is not None and node.stood > gone:
         far.append(f"{kind}: {node.stood:.3f} m")
     return kind, report, far

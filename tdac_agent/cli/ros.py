@@ -60,10 +60,12 @@ def sim(options: SimOptions, flags: TaskFlags) -> int:
     simulator = Simulator(
         robot, bus, real_time=options.real_time, faults=faults, bag=bag
     )
-    report = simulator.run(options.seconds)
-    if bag is not None and options.mcap is not None:
-        write_atomic(options.mcap, bag.finish())
-        print_plain(console, f"wrote {options.mcap}")
+    try:
+        report = simulator.run(options.seconds)
+    finally:  # also what was recorded until an interruption
+        if bag is not None and options.mcap is not None:
+            write_atomic(options.mcap, bag.finish())
+            print_plain(console, f"wrote {options.mcap}")
     if options.as_json:
         print_json({"schema_version": 1, "task": task.name, **asdict(report)})
     else:
@@ -144,11 +146,11 @@ def _show(
     table.add_row("smallest gap", f"{1000 * report.smallest_gap:.1f} mm")
     console.print(table)
     most = core_settings(settings, dead_man=dead_man).stops_within()
-    limit = next(iter(most.values()))
     for fault in report.faults:
         name = f"{fault['kind']}@{fault['begin']:g}+{fault['lasts']:g}"
         what = "stood after" if fault["stood"] else "did not stand; drove"
-        stated = f" (stated: {limit:.3f} m)" if fault["kind"] in STOPPING else ""
+        row = STOPPING.get(fault["kind"])
+        stated = "" if row is None else f" (stated: {most[row]:.3f} m)"
         print_plain(console, f"{name}: {what} {fault['way']:.3f} m{stated}")
     colour = "green" if report.outcome == "reached" else "red"
     console.print(f"[bold {colour}]{report.outcome}[/]")

@@ -120,7 +120,7 @@ def settings_of(task: Task) -> dict[str, Any]:
         )
     if setting.view is None:
         raise TaskError(
-            f"{task.name} is a task in pixels, which cannot be exported: robots "
+            f"{task.name} is a task in pixels, which is not for ROS 2: robots "
             "drive in metres; synthesize again on a map with a resolution (map.yaml), "
             "with --metres"
         )

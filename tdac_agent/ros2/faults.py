@@ -23,11 +23,13 @@ KINDS = {
     "second-publisher": "another node has a publisher of commands",
 }
 """Faults of the robot and its sensors; those of the node come from outside."""
-STOPPING = (
-    *("no-scans", "late-scans", "old-scans", "nan-scans", "zero-scans", "no-poses"),
-    *("pose-jump", "unsure-pose"),
-)
-"""Faults that stop the robot, if they last."""
+OLD, JUMPS = "a scan or a pose is late, lost or old", "the pose jumps or is unsure"
+STOPPING = {
+    **dict.fromkeys(("no-scans", "late-scans", "old-scans", "nan-scans"), OLD),
+    **dict.fromkeys(("zero-scans", "no-poses"), OLD),
+    **dict.fromkeys(("pose-jump", "unsure-pose"), JUMPS),
+}
+"""Faults that stop the robot if they last, with the row of `Settings.stops_within`."""
 LATE = 0.5
 """Delay of a late scan, s."""
 _FAULT = re.compile(r"([a-z-]+)@(\d+(?:\.\d+)?)\+(\d+(?:\.\d+)?)")

@@ -82,7 +82,8 @@ class RecordedReport:
         scan_gap: Smallest gap by the scans, m; None without a return.
         place: Where the map's gap was smallest: x, y, m.
         rolled: From the last command, if it was a motion, to the last pose that
-            moved, s: what `dead_man` must cover; None if the drive ended with a zero.
+            moved, s: what `dead_man` must cover. None if the drive ended with a zero,
+            or the bag before the robot.
         outcome: State of the replayed node at the end.
     """
 
@@ -303,8 +304,9 @@ class _Drive:
             off = math.dist(before[:2], after[:2]) + abs(math.sin(after[2] - before[2]))
             if off > STANDS:
                 moved = max(moved, stamp)
-        # At the end of the bag the robot must stand, or the time is not known.
-        return None if moved >= self.poses[-1][0] > last else round(moved - last, 3)
+        # The robot must have rolled on, and stand at the end of the bag.
+        is_known = last < moved < self.poses[-1][0]
+        return round(moved - last, 3) if is_known else None
 
     def report(self, task: Task) -> RecordedReport:
         """What the bag shows, at its end."""

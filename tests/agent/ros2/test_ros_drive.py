@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from floor_task import Ready, forward
+from floor_task import Ready, forward, write_task
 
 pytest.importorskip("cyclonedds", reason="no wheel of Cyclone DDS")
 
@@ -124,7 +124,7 @@ def test_each_fault_stops_it_in_time(task, settings, package, stated, domain, ki
         report = simulator.run(60.0)
     assert report.outcome == "reached"
     assert report.faults[0]["stood"]
-    assert report.faults[0]["way"] <= stated["a scan or a pose is late, lost or old"]
+    assert report.faults[0]["way"] <= stated[STOPPING[kind]]
 
 
 @pytest.mark.slow
@@ -223,6 +223,27 @@ def test_a_simulation_that_ends(task, settings, package, domain):
     assert node.process.returncode == 1
 
 
+@pytest.mark.slow
+def test_an_interrupted_simulation_keeps_its_recording(tmp_path, domain):
+    """Ctrl-C while it waits for a node: what it published is in the file."""
+    reader = pytest.importorskip("mcap.reader", reason="mcap is not installed")
+    task, file = write_task(tmp_path), tmp_path / "drive.mcap"
+    command = [sys.executable, "-m", "tdac_agent", "ros", "sim", "--task", task]
+    process = subprocess.Popen(
+        [*map(str, command), "--mcap", str(file), "--domain", str(domain)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout.readline().startswith("floor: a robot on domain")
+    time.sleep(2.0)
+    process.send_signal(signal.SIGINT)
+    printed = process.communicate(timeout=60)[0]
+    assert process.returncode == 130
+    assert "wrote" in printed
+    with file.open("rb") as bag:
+        assert reader.make_reader(bag).get_summary().statistics.message_count > 0
+
+
 class Gone(Exception):
     """The simulation ends at once."""
 
@@ -283,7 +304,7 @@ def test_random_faults(task, settings, package, stated, steps, domain, seed):
     assert report.contact == ""
     for course in report.faults:
         if course["kind"] in STOPPING:
-            assert course["way"] <= stated["a scan or a pose is late, lost or old"]
+            assert course["way"] <= stated[STOPPING[course["kind"]]]
 
 
 def test_a_changed_package_needs_trust(package, tmp_path):
