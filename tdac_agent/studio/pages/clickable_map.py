@@ -57,6 +57,7 @@ class ClickableMap:
         self._view: SourceView | None = None
         self._first: Place | None = None
         self._cursor: MapCursor | None = None
+        self._turns = 0
         self._marks = ""
         self._mode = ui.toggle(
             {"start": "click the start", "heading": "its heading", "goal": "the goal"},
@@ -134,7 +135,11 @@ class ClickableMap:
         key, shift = event.args["key"], bool(event.args["shift"])
         before = self._cursor or MapCursor.on(view, self._first)
         if key == "h":
-            self._told.text = await self._turned(-TURN if shift else TURN)
+            self._turns += 1
+            number = self._turns
+            text = await self._turned(-TURN if shift else TURN)
+            if number == self._turns:  # a later turn may be told before this one
+                self._told.text = text
             return
         if key in PLACES:
             self._cursor = before
