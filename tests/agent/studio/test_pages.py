@@ -59,7 +59,8 @@ def wait(browser, condition):
 
 
 def text_of(browser):
-    return browser.execute_script("return document.body.innerText")
+    """What a person reads; nothing while the page still loads."""
+    return browser.execute_script("return document.body ? document.body.innerText : ''")
 
 
 def says(browser, text):
