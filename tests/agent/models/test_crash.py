@@ -171,14 +171,18 @@ def test_a_run_that_is_killed(model, task_folder, whole, tmp_path, kills):
 
 
 @pytest.mark.slow
-def test_killed_at_every_line(model, task_folder, whole, tmp_path):
-    """Once at each line of the journal, cut at a drawn place, then the same again."""
+@pytest.mark.parametrize("first", range(1, 9))
+def test_killed_at_every_line(model, task_folder, whole, tmp_path, first):
+    """Once at each line of the journal, cut at a drawn place, then the same again.
+
+    A test has every eighth line.
+    """
     reference = whole(6)
     lines = len(read_records(reference / "journal.jsonl"))
     assert lines > 40
     expected = state(reference)
-    cut = random.Random(7)
-    for kill_at in range(1, lines + 1):
+    cut = random.Random(first)
+    for kill_at in range(first, lines + 1, 8):
         folder = tmp_path / f"killed-{kill_at}" / "run"
         folder.parent.mkdir()
         model.asked.clear()
