@@ -1,6 +1,6 @@
 """How many controllers of a known success rate the judge calls verified.
 
-    python -m benchmarks.confirmations [--each 20] [--number 0]
+    python -m benchmarks.confirmations [--each 20] [--number 0] [--first 0]
 
 The built-in controller of a small room fails on purpose in a share of its drives, which
 the start decides; so its success rate is known, up to its own failures, which the row
@@ -10,7 +10,8 @@ the six drives of a suite would let 97 % of those at 99.5 % pass.
 Wanted of 200 controllers: at most 5 % verified of those below 95 %, at least 80 % of
 those at 99.5 %, and in each row a count that the exact probability explains. Most
 controllers are close to the two limits (94 % and 99.5 %), where a fault would show.
-About 11,000 drives, which take less than 30 minutes on two cores.
+About 11,000 drives, which take less than 30 minutes on two cores. `--first 1000` has
+other controllers than `--first 0`.
 """
 
 from __future__ import annotations
@@ -82,6 +83,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--each", type=int, default=20, help="controllers per weight")
     parser.add_argument("--number", type=int, default=0, help="of the confirmation")
+    parser.add_argument("--first", type=int, default=0, help="the first controller")
     options = parser.parse_args()
     columns = "fails on purpose", "controllers", "drives", "failed", "verified"
     table = Table(*columns, "95 % interval of its share", "exact")
@@ -90,7 +92,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder, WarmJudge() as judge:
         task = small_room(Path(folder))
         for row in rows:
-            drive(row, task, options.number, judge)
+            drive(row, task, options.number, judge, options.first)
             table.add_row(*row.told(test.characteristics(1.0 - row.share).accepted))
     console = Console()
     console.print(table)
@@ -102,9 +104,9 @@ def main() -> int:
     return int(bool(wrong))
 
 
-def drive(row: Row, task: Task, number: int, judge: WarmJudge) -> None:
-    """Has the controllers of a row drive blind, and counts."""
-    for salt in range(row.controllers):
+def drive(row: Row, task: Task, number: int, judge: WarmJudge, first: int) -> None:
+    """Has the controllers of a row, from `first` on, drive blind, and counts."""
+    for salt in range(first, first + row.controllers):
         source = failing(task, row.share, salt)
         found = confirm(source, task, number, judge=judge)
         row.drives += found.count
