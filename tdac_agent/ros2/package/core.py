@@ -320,15 +320,14 @@ class Core:
     def _drive(self, action: Any, now: float) -> Command:
         left, right = action
         self.commands += 1
-        before = self._wheels.last
+        last = self._wheels.last
         v, omega = self._wheels.twist(*self._wheels.limited(left, right))
-        moved = self._driven.between(self._scan_stamp, now)
         stamp, age = self._scan_stamp, self._scan_age
-        x, y, yaw = self._driven.between(stamp - age, stamp)
-        turned = max(abs(yaw), abs(self._driven.between(stamp, min(stamp + age, now))[2]))
-        full, extra = self.settings.full_speed, math.hypot(x, y)
-        if self._guard.blocked(v, omega, full, moved, extra, turned):
-            self._wheels.last = before
+        before, after, rest = self._driven.parts(stamp - age, stamp, min(stamp + age, now), now)
+        moved, turned = compose(after, rest), max(abs(before[2]), abs(after[2]))
+        extra = math.hypot(*before[:2])
+        if self._guard.blocked(v, omega, self.settings.full_speed, moved, extra, turned):
+            self._wheels.last = last
             return self._stand('stopped', 'something is ahead within the stopping distance')
         self._begun, self._drove_at = True, now
         self._place = compose(self.where.pose, self._driven.between(self.where.stamp, now))
