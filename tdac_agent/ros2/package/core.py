@@ -27,6 +27,8 @@ SETTLED = 1.0
 """Time after the last motion in which the robot has come to a stand, s."""
 FORGOTTEN = 5.0
 """Time from the call of `start` after which the first plan needs another call, s."""
+MOST_TURNED = 0.5
+"""Turn from a place within which the robot counts as there, as a verified start has it, rad."""
 AGAIN = 'call the service start to drive on'
 
 
@@ -355,7 +357,7 @@ class Core:
         radius = float(self.settings.robot['radius'])
         return (
             f'the robot stands {apart} from the verified start ({x:g}, {y:g}, {yaw:g}); at most '
-            f'{radius:g} m and 0.5 rad are covered (any_start)')
+            f'{radius:g} m and {MOST_TURNED:g} rad are covered (any_start)')
 
     def _was_moved(self) -> str:
         """Return why a drive cannot go on from where the robot stands, or an empty text."""
@@ -372,7 +374,7 @@ class Core:
         """Return how far the robot is from a place, or nothing if it counts as there."""
         own = self.where.pose
         off, turn = math.dist(own[:2], place[:2]), abs(wrapped(own[2] - place[2]))
-        is_there = off <= float(self.settings.robot['radius']) and turn <= 0.5
+        is_there = off <= float(self.settings.robot['radius']) and turn <= MOST_TURNED
         return '' if is_there else f'{off:.2f} m and {turn:.2f} rad'
 
     def _stand(self, state: str, reason: str) -> Command:
