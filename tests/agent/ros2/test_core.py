@@ -337,7 +337,7 @@ def test_stop_stops_until_it_is_started(make_core, robot):
     assert (
         robot.way - before
         <= core.settings.stops_within()[
-            "something is ahead, the goal, ~/stop, SIGTERM, a second publisher"
+            "something is ahead, the goal, /drive/stop, SIGTERM, a second publisher"
         ]
     )
     assert core.start(robot.time - robot.dt) == (True, "the drive goes on")
