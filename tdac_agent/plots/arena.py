@@ -13,14 +13,15 @@ from matplotlib.ticker import MaxNLocator
 
 from tdac_agent.plots.style import (
     ENTRANTS,
-    GRID,
     MARKERS,
     TEXT,
     Look,
     apply_style,
+    describe,
     legend_above,
     new_plot,
     panels,
+    rows_of,
     shade,
 )
 
@@ -74,6 +75,8 @@ def plot_scores(
     means = mean_scores(rows, over)
     order = _in_order(rows, means)
     columns = ["", *sets] if len(sets) > 1 else sets
+    mean = "mean" if len(over) == len(sets) else f"mean of {len(over)}"
+    names = [spoken(each) for each in order]
     width = _NAMES + 1.3 * len(columns)
     figure = new_plot(max(width, 5.0), 1.1 + 0.27 * len(order) + 0.3 * told)
     for axes, name in zip(
@@ -82,34 +85,31 @@ def plot_scores(
         strict=True,
     ):
         apply_style(axes)
-        axes.grid(visible=True, axis="x", color=GRID, linewidth=0.8)
         own = rows[rows["set"] == name].set_index("entrant")
         for place, entrant in enumerate(order):
             if name == "" and entrant in means.index:
                 _dot(axes, means.loc[entrant], len(order) - place, heavy=True)
             elif entrant in own.index:
                 _dot(axes, own.loc[entrant], len(order) - place)
-        axes.set_title(
-            name or ("mean" if len(over) == len(sets) else f"mean of {len(over)}"),
-            loc="left", fontsize=9, color=TEXT,
-        )  # fmt: skip
-        axes.set_yticks(range(len(order), 0, -1), [spoken(each) for each in order])
-        axes.set_ylim(0.4, len(order) + 0.6)
+        rows_of(axes, name or mean, names, size=9, labels=9)
         axes.set_xlim(-0.03, 1.0)
         axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
         axes.tick_params(axis="y", length=0)
     finding = best_of_kinds(means)
-    figure.set_label(f"Time scores. {finding}" if len(means) else "Time scores")
-    figure.description = (
-        "A column per set of worlds, a row per entrant, the best one at the top. The "
-        "colour and shape of a mark say the kind of entrant; its value is at the right."
-    )
     legend_above(figure, figure.axes, 6, title=finding if told else "")
     least, most = int(rows["worlds"].min()), int(rows["worlds"].max())
     worlds = f"{least}" if least == most else f"{least} to {most}"
     label = "time score: mean of success × OT / T, with 95 % intervals"
     label += f"; {worlds} worlds per set"
-    figure.supxlabel(label, fontsize=8.5, color=TEXT)
+    describe(
+        figure,
+        f"Time scores. {finding}" if len(means) else "Time scores",
+        "A column per set of worlds, a row per entrant, the best one at the top. "
+        "The colour and shape of a mark say the kind of entrant; its value is at the "
+        "right.",
+        below=label,
+        size=8.5,
+    )
     return figure
 
 
@@ -222,16 +222,15 @@ def plot_difficulty(
         legend_above(figure, grid, 6, title=title)
     else:
         figure.suptitle(title, x=0.01, ha="left", fontsize=11, weight="bold")
-    figure.set_label(f"{name}: goals reached, by difficulty")
-    figure.description = (
+    describe(
+        figure,
+        f"{name}: goals reached, by difficulty",
         f"A panel per figure of difficulty, a row per entrant, and {BINS} columns with "
         "a quarter of the worlds each, small values first. A cell has the share of "
-        "goals reached, in per cent."
-    )
-    figure.supxlabel(
-        f"mean of the worlds of a column; the {BINS} columns have as many worlds each",
-        fontsize=8.5,
-        color=TEXT,
+        "goals reached, in per cent.",
+        below=f"mean of the worlds of a column; the {BINS} columns have as many worlds "
+        "each",
+        size=8.5,
     )
     return figure
 
@@ -291,17 +290,15 @@ def plot_training(rows: pd.DataFrame) -> Figure:
         axes.set_ylim(0, 1)
     finding = "Time score of learned policies over their training"
     legend_above(figure, grid, 4, title=finding)
-    figure.set_label(finding)
-    figure.description = (
+    describe(
+        figure,
+        finding,
         "A panel per set of worlds, a mark with its value per kind of training; a "
-        "dashed line is the best entrant that did not learn."
+        "dashed line is the best entrant that did not learn.",
+        below="millions of steps to the kept policy, mean of its trainings; "
+        "dashed: the best other entrant",
+        beside="time score, 95 % intervals",
     )
-    label = (
-        "millions of steps to the kept policy, mean of its trainings; "
-        "dashed: the best other entrant"
-    )
-    figure.supxlabel(label, fontsize=9, color=TEXT)
-    figure.supylabel("time score, 95 % intervals", fontsize=9, color=TEXT)
     return figure
 
 

@@ -14,13 +14,14 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, PercentFormatter
 from tdac_agent.metrics.exact import exact_interval
 from tdac_agent.plots.style import (
     ENTRANTS,
-    GRID,
     LINES,
     TEXT,
     Look,
+    describe,
     legend_above,
     new_plot,
     panels,
+    rows_of,
     shade,
     title,
 )
@@ -55,18 +56,17 @@ def plot_learning_curves(curves: pd.DataFrame) -> Figure:
         axes.set_ylim(-0.03, 1.05)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x / 1000:.0f}k"))
-    legend_above(figure, grid, 5, title="Success of learned policies in training")
-    figure.description = (
+    heading = "Success of learned policies in training"
+    legend_above(figure, grid, 5, title=heading)
+    describe(
+        figure,
+        heading,
         "A panel per task: thin lines are single seeds, a bold line is their mean, and "
-        "the shaded area is their range."
+        "the shaded area is their range.",
+        below="training steps of all robots; "
+        "thin: each seed, bold: mean, shaded: range",
+        beside="evaluation episodes with goal reached",
     )
-    figure.set_label("Success of learned policies in training")
-    figure.supxlabel(
-        "training steps of all robots; thin: each seed, bold: mean, shaded: range",
-        fontsize=9,
-        color=TEXT,
-    )
-    figure.supylabel("evaluation episodes with goal reached", fontsize=9, color=TEXT)
     return figure
 
 
@@ -110,21 +110,12 @@ def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
             known = rows[rows["policy"] == policy].dropna(subset=["episodes"])
             _dots(axes, known, len(policies) - place, _look(rows, policy))
             missing |= known.empty
-        axes.set_title(task, loc="left", fontsize=9.5, color=TEXT, pad=4)
-        axes.set_yticks(range(len(policies), 0, -1), names)
-        axes.tick_params(axis="y", labelsize=8)
-        axes.set_ylim(0.4, len(policies) + 0.6)
+        rows_of(axes, task, names, pad=4)
         axes.set_xlim(-0.05, 1.05)
         axes.set_xticks([0, 0.5, 1])
         axes.xaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.grid(visible=True, axis="x", color=GRID, linewidth=0.8)
     heading = "Goals reached, by task and policy"
     legend_above(figure, grid, 5, title=heading)
-    figure.set_label(heading)
-    figure.description = (
-        "A panel per task, a row per policy with what it knows. The colour and shape "
-        "of a dot say the kind of policy."
-    )
     label = (
         "episodes with goal reached without contact, exact 95 % intervals; "
         "at the right: % of all"
@@ -133,7 +124,13 @@ def plot_success_by_policy(evaluation: pd.DataFrame) -> Figure:
         label += "\none dot per training seed"
     if missing:
         label += "; –: no such policy"
-    figure.supxlabel(label, fontsize=9, color=TEXT)
+    describe(
+        figure,
+        heading,
+        "A panel per task, a row per policy with what it knows. The colour and shape "
+        "of a dot say the kind of policy.",
+        below=label,
+    )
     return figure
 
 
@@ -212,10 +209,13 @@ def plot_generalisation(results: pd.DataFrame) -> Figure:
     axes.set_yticks(range(len(rows)), rows, fontsize=8)
     axes.tick_params(length=0, colors=TEXT)
     axes.spines[:].set_visible(False)
-    title(axes, "Goals reached on the training task and on others, in %", pad=10)
-    figure.description = (
+    heading = "Goals reached on the training task and on others, in %"
+    title(axes, heading, pad=10)
+    describe(
+        figure,
+        heading,
         "A row per task of training, a column per task of evaluation; a frame marks "
-        "the task of training. A cell is the mean of all seeds."
+        "the task of training. A cell is the mean of all seeds.",
     )
     axes.set_xlabel("evaluated on (framed: training task)", fontsize=9, color=TEXT)
     axes.set_ylabel("trained on", fontsize=9, color=TEXT)

@@ -6,7 +6,14 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tdac_agent.plots.style import ENTRANTS, GRID, TEXT, legend_above, panels
+from tdac_agent.plots.style import (
+    ENTRANTS,
+    TEXT,
+    describe,
+    legend_above,
+    panels,
+    rows_of,
+)
 
 ROOM = {"left": 2.3, "above": 0.75, "narrowest": 6.4}
 """Inches that the labels need."""
@@ -32,20 +39,18 @@ def plot_rates(rows: pd.DataFrame, label: str) -> Figure:
     for axes, task in zip(grid, tasks, strict=False):
         for row in rows[rows["task"] == task].to_dict("records"):
             _dot(axes, row, len(kinds) - kinds.index(row["kind"]))
-        axes.set_title(task, loc="left", fontsize=9.5, color=TEXT)
-        axes.set_yticks(range(len(kinds), 0, -1), kinds)
-        axes.tick_params(axis="y", labelsize=8)
-        axes.set_ylim(0.5, len(kinds) + 0.7)
+        rows_of(axes, task, kinds)
+        axes.set_ylim(0.5, len(kinds) + 0.7)  # with room for the values
         axes.set_xlim(-0.02, 1.02)
         axes.set_xticks([0, 0.25, 0.5, 0.75, 1], ["0", "", "0.5", "", "1"])
-        axes.grid(visible=True, axis="x", color=GRID, linewidth=0.8)
     legend_above(figure, grid, len(ASKS))
-    figure.set_label(f"Rates of kinds of runs: {', '.join(tasks)}")
-    figure.description = (
+    describe(
+        figure,
+        f"Rates of kinds of runs: {', '.join(tasks)}",
         f"A panel per task, a row per kind of run. {label}: a dot with its value, "
-        "and its interval as a line. R is the number of runs."
+        "and its interval as a line. R is the number of runs.",
+        below=label,
     )
-    figure.supxlabel(label, fontsize=9, color=TEXT)
     return figure
 
 

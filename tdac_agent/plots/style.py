@@ -170,6 +170,34 @@ def title(
         )
 
 
+def rows_of(
+    axes: Axes,
+    heading: str,
+    names: Sequence[str],
+    *,
+    size: float = 9.5,
+    pad: float = 6.0,
+    labels: float = 8.0,
+) -> None:
+    """Gives a panel a row per name, the first one at the top, and a grid in x.
+
+    The rows are at y = `len(names)`, …, 1.
+
+    Args:
+        axes: The panel.
+        heading: Its title, at the left.
+        names: Names of the rows.
+        size: Font size of the title, pt.
+        pad: Distance of the title from the axes, pt.
+        labels: Font size of the names, pt.
+    """
+    axes.set_title(heading, loc="left", fontsize=size, color=TEXT, pad=pad)
+    axes.set_yticks(range(len(names), 0, -1), names)
+    axes.tick_params(axis="y", labelsize=labels)
+    axes.set_ylim(0.4, len(names) + 0.6)
+    axes.grid(visible=True, axis="x", color=GRID, linewidth=0.8)
+
+
 def mark_task(
     axes: Axes,
     start: tuple[float, ...] | None,
@@ -233,6 +261,33 @@ def legend_above(
         title_fontproperties={"size": 11, "weight": "bold"},
         alignment="left",
     ).get_title().set_color(TEXT)
+
+
+def describe(
+    figure: Plot,
+    name: str,
+    description: str,
+    *,
+    below: str = "",
+    beside: str = "",
+    size: float = 9.0,
+) -> None:
+    """Says what a figure shows, and labels all its panels together.
+
+    Args:
+        figure: The figure.
+        name: What it is called: the title of its SVG.
+        description: What its marks mean: the description of its SVG.
+        below: Label of the horizontal axes.
+        beside: Label of the vertical axes.
+        size: Font size of the labels, pt.
+    """
+    figure.set_label(name)
+    figure.description = description
+    if below:
+        figure.supxlabel(below, fontsize=size, color=TEXT)
+    if beside:
+        figure.supylabel(beside, fontsize=size, color=TEXT)
 
 
 def save_figure(figure: Figure, *paths: Path) -> None:

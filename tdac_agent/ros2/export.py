@@ -38,7 +38,8 @@ from tdac_envs.mapping.ros_writer import write_ros_map
 PACKAGE = Path(__file__).parent / "package"
 COPIED = (
     *("core.py", "settings.py", "motion.py", "scans.py"),
-    *("localisation.py", "worker.py", "ending.py", "node.py", "watchdog.py"),
+    *("localisation.py", "worker.py", "ending.py"),
+    *("running.py", "node.py", "watchdog.py"),
 )
 """Modules of the package, byte for byte those of this one."""
 CONTROLLER = "controller"

@@ -27,6 +27,8 @@ SETTLED = 1.0
 """Time after the last motion in which the robot has come to a stand, s."""
 FORGOTTEN = 5.0
 """Time from the call of `start` after which the first plan needs another call, s."""
+MOST_TURNED = 0.5
+"""Turn from a place within which the robot counts as there, as a verified start has it, rad."""
 AGAIN = 'call the service start to drive on'
 
 
@@ -320,15 +322,14 @@ class Core:
     def _drive(self, action: Any, now: float) -> Command:
         left, right = action
         self.commands += 1
-        before = self._wheels.last
+        last = self._wheels.last
         v, omega = self._wheels.twist(*self._wheels.limited(left, right))
-        moved = self._driven.between(self._scan_stamp, now)
         stamp, age = self._scan_stamp, self._scan_age
-        x, y, yaw = self._driven.between(stamp - age, stamp)
-        turned = max(abs(yaw), abs(self._driven.between(stamp, min(stamp + age, now))[2]))
-        full, extra = self.settings.full_speed, math.hypot(x, y)
-        if self._guard.blocked(v, omega, full, moved, extra, turned):
-            self._wheels.last = before
+        before, after, rest = self._driven.parts(stamp - age, stamp, min(stamp + age, now), now)
+        moved, turned = compose(after, rest), max(abs(before[2]), abs(after[2]))
+        extra = math.hypot(*before[:2])
+        if self._guard.blocked(v, omega, self.settings.full_speed, moved, extra, turned):
+            self._wheels.last = last
             return self._stand('stopped', 'something is ahead within the stopping distance')
         self._begun, self._drove_at = True, now
         self._place = compose(self.where.pose, self._driven.between(self.where.stamp, now))
@@ -356,7 +357,7 @@ class Core:
         radius = float(self.settings.robot['radius'])
         return (
             f'the robot stands {apart} from the verified start ({x:g}, {y:g}, {yaw:g}); at most '
-            f'{radius:g} m and 0.5 rad are covered (any_start)')
+            f'{radius:g} m and {MOST_TURNED:g} rad are covered (any_start)')
 
     def _was_moved(self) -> str:
         """Return why a drive cannot go on from where the robot stands, or an empty text."""
@@ -373,7 +374,7 @@ class Core:
         """Return how far the robot is from a place, or nothing if it counts as there."""
         own = self.where.pose
         off, turn = math.dist(own[:2], place[:2]), abs(wrapped(own[2] - place[2]))
-        is_there = off <= float(self.settings.robot['radius']) and turn <= 0.5
+        is_there = off <= float(self.settings.robot['radius']) and turn <= MOST_TURNED
         return '' if is_there else f'{off:.2f} m and {turn:.2f} rad'
 
     def _stand(self, state: str, reason: str) -> Command:

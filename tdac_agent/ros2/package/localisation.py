@@ -39,7 +39,7 @@ class Localisation:
         self.strays = ''
         self._jump, self._jump_stamp, self._unsure = '', -math.inf, ''
         self._transform: float | None = None
-        self._is_renewed, self._renewed = False, math.inf
+        self._renewed = math.inf
         self._past: deque[tuple[float, Pose]] = deque(maxlen=1000)
 
     def take(self, stamp: float, pose: Pose) -> None:
@@ -63,7 +63,7 @@ class Localisation:
         the time counts in which the stamp does not change.
         """
         if stamp != self._transform and math.isfinite(stamp):
-            self._transform, self._is_renewed = stamp, True
+            self._transform, self._renewed = stamp, math.inf  # the next `tick` says when
 
     def take_variances(self, variances: tuple[float, float, float]) -> None:
         """Take the variances of x, y and yaw that a localiser states; 0 or less says nothing."""
@@ -77,8 +77,7 @@ class Localisation:
 
     def tick(self, now: float) -> None:
         """Take the time of a control period."""
-        if self._is_renewed:
-            self._is_renewed, self._renewed = False, now
+        self._renewed = min(self._renewed, now)
 
     def begin(self) -> None:
         """Forget how the robot moved."""

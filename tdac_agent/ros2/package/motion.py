@@ -135,17 +135,26 @@ class Driven:
 
     def between(self, since: float, until: float) -> tuple[float, float, float]:
         """Return the motion in a time, as a pose in the body's first frame."""
-        moved = (0.0, 0.0, 0.0)
+        return self.parts(since, until)[0]
+
+    def parts(self, *times: float) -> list[tuple[float, float, float]]:
+        """Return the motion from each time to the next one, each as a pose in its first frame."""
+        moved = [(0.0, 0.0, 0.0)] * (len(times) - 1)
         steps = list(self._commands)
-        steps.append((max(until, steps[-1][0] if steps else until), 0.0, 0.0))
+        steps.append((max(*times, steps[-1][0] if steps else times[-1]), 0.0, 0.0))
         for (begin, v, omega), (end, _, _) in pairwise(steps):
-            lasted = min(end, until, begin + self._dead_man) - max(begin, since)
-            if lasted > 0.0:
-                half = 0.5 * omega * lasted
-                chord = v * lasted * float(np.sinc(half / math.pi))
-                step = (chord * math.cos(half), chord * math.sin(half), 2.0 * half)
-                moved = compose(moved, step)
+            for i, (since, until) in enumerate(pairwise(times)):
+                lasted = min(end, until, begin + self._dead_man) - max(begin, since)
+                if lasted > 0.0:
+                    moved[i] = compose(moved[i], _arc(v, omega, lasted))
         return moved
+
+
+def _arc(v: float, omega: float, lasted: float) -> tuple[float, float, float]:
+    """Return the motion of a command that lasted some time."""
+    half = 0.5 * omega * lasted
+    chord = v * lasted * float(np.sinc(half / math.pi))
+    return chord * math.cos(half), chord * math.sin(half), 2.0 * half
 
 
 class Wheels:

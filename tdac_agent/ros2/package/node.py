@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-import sys
 import time
 from typing import Any
 
@@ -14,27 +13,21 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, Twist, Twi
 from nav_msgs.msg import OccupancyGrid, Odometry, Path as PathMessage
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 from rcl_interfaces.srv import GetParameters
-import rclpy
-from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, qos_profile_sensor_data, QoSProfile
-from rclpy.signals import SignalHandlerOptions
 from rclpy.time import Time
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 from tf2_ros import Buffer, TransformException, TransformListener
 
-from . import core, ending, motion, scans, worker
+from . import core, ending, motion, running, scans, worker
 
 PACKAGE = __package__ or ''
 PATH_STEP, MOST_POSES = 0.05, 5000
 """Distance of two poses of the published path, m; the most of them."""
 ASKED, ANSWERED = 2.0, 1.0
 """Time between two questions to `dead_man_node`, and the longest for an answer, s."""
-WAKES = 0.1
-"""Longest time in which a signal waits for its handler, s of the wall clock."""
 ONLOOKERS, WATCHDOG = ('rosbag2', '_ros2cli'), 'watchdog'
 """How names of nodes begin that only record or show commands; one that sends zeros alone."""
 DEFAULTS: dict[str, Any] = {
@@ -302,6 +295,11 @@ class DriveNode(Node):  # type: ignore[misc]
             self._state.publish(String(data=text))
             self.get_logger().info(text)
 
+    def send_last(self, reason: str) -> None:
+        """End the drive, and send its last command."""
+        lasts = core.PERIODS * self.core.settings.dt
+        ending.send_last(self.publish, self.core.end(reason), lasts)
+
 
 def _seconds(stamp: Any) -> float:
     return float(stamp.sec) + 1e-9 * float(stamp.nanosec)
@@ -309,37 +307,7 @@ def _seconds(stamp: Any) -> float:
 
 def main(args: Any = None) -> None:
     """Drive until the process is told to end; the last command is zero."""
-    ending.take_signals()
-    node, reason = None, 'the node failed'
-    try:
-        _begin(args)
-        node = DriveNode()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while rclpy.ok() and not ending.is_told():  # a paused clock must not delay this
-            executor.spin_once(timeout_sec=WAKES)
-        reason = 'the node was told to end'
-    except KeyboardInterrupt:
-        reason = 'the node was told to end'
-    except (NameValidationException, OSError, ParameterException, ValueError) as error:
-        said = ' '.join(each.strip() for each in str(error).splitlines()[:2])
-        print(f'drive: {said}', file=sys.stderr)
-        raise SystemExit(2) from None
-    finally:
-        ending.ignore_signals()
-        if node is not None:
-            last = node.core.end(reason)
-            ending.send_last(node.publish, last, core.PERIODS * node.core.settings.dt)
-            node.destroy_node()
-        rclpy.try_shutdown()
-
-
-def _begin(args: Any) -> None:
-    """Initialise rclpy; ValueError says what is wrong with the command line or its files."""
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:  # its own class is private
-        raise ValueError(str(error).split(', at ')[0]) from None
+    running.run('drive', DriveNode, args)
 
 
 if __name__ == '__main__':

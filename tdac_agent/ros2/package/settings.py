@@ -141,7 +141,7 @@ class Settings:
             'the localiser is silent': v * (self.max_localiser_age + self.dt) + own,
             'the pose jumps or is unsure': own,
             'the controller is late, raises or is not finite': own,
-            'something is ahead, the goal, ~/stop, SIGTERM, a second publisher': own,
+            'something is ahead, the goal, /drive/stop, SIGTERM, a second publisher': own,
             'the node is killed, frozen or unreachable': v * self.dead_man + own,
         }
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import math
-import sys
 import time
 from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
-import rclpy
-from rclpy.exceptions import ParameterException
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
-from . import ending
+from . import ending, running
 
 LASTS, PERIOD = 2.0, 0.05
 """How long zeros are sent, and the time between two of them, s."""
@@ -27,9 +22,6 @@ class Watchdog(Node):  # type: ignore[misc]
     It is for the case that what sends the commands, such as a smoother, dies while the robot
     drives. Where commands of zero came anyway, its own change nothing. When it is told to
     end after a motion, it sends zeros, too: a launch file ends the smoother at the same time.
-
-    Attributes:
-        moved: Time of the last command of motion, of `time.monotonic`.
     """
 
     def __init__(self) -> None:
@@ -38,7 +30,7 @@ class Watchdog(Node):  # type: ignore[misc]
         self._stamped = self.declare_parameter('stamped', False).value
         self._silent = self.declare_parameter('silent', 0.3).value
         kind = TwistStamped if self._stamped else Twist
-        self.moved = -math.inf
+        self._moved = -math.inf
         self._out = self.create_publisher(kind, topic, 1)
         self.create_subscription(kind, topic, self._on_command, 10)
         self.create_timer(PERIOD, self._tick)
@@ -46,13 +38,18 @@ class Watchdog(Node):  # type: ignore[misc]
     def _on_command(self, message: Any) -> None:
         twist = message.twist if self._stamped else message
         if twist.linear.x or twist.linear.y or twist.angular.z:
-            self.moved = time.monotonic()
+            self._moved = time.monotonic()
 
     def _tick(self) -> None:
-        if 0.0 <= time.monotonic() - self.moved - self._silent < LASTS:
-            self.stop()
+        if 0.0 <= time.monotonic() - self._moved - self._silent < LASTS:
+            self._stop()
 
-    def stop(self, _command: Any = None) -> None:
+    def send_last(self, _reason: str) -> None:
+        """Send zeros for the last time, if there was a motion just now."""
+        if time.monotonic() - self._moved < LASTS:
+            ending.send_last(self._stop, None, LASTS)
+
+    def _stop(self, _command: Any = None) -> None:
         """Send a command of zero."""
         message = TwistStamped() if self._stamped else Twist()
         if self._stamped:
@@ -62,27 +59,7 @@ class Watchdog(Node):  # type: ignore[misc]
 
 def main(args: Any = None) -> None:
     """Watch until the process is told to end; the last commands are zero."""
-    ending.take_signals()
-    node = None
-    try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-        node = Watchdog()
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        while rclpy.ok() and not ending.is_told():
-            executor.spin_once(timeout_sec=PERIOD)
-    except KeyboardInterrupt:
-        pass
-    except ParameterException as error:
-        print(f'watchdog: {error}', file=sys.stderr)
-        raise SystemExit(2) from None
-    finally:
-        ending.ignore_signals()
-        if node is not None:
-            if time.monotonic() - node.moved < LASTS:
-                ending.send_last(node.stop, None, LASTS)
-            node.destroy_node()
-        rclpy.try_shutdown()
+    running.run('watchdog', Watchdog, args)
 
 
 if __name__ == '__main__':

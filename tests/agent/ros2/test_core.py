@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from tdac_agent.ros2.export import core_settings
 from tdac_agent.ros2.package.core import Command, Core, SettingsError
 from tdac_agent.ros2.package.motion import (
+    Driven,
     Wheels,
     check_pose_parameters,
     compose,
@@ -336,7 +337,7 @@ def test_stop_stops_until_it_is_started(make_core, robot):
     assert (
         robot.way - before
         <= core.settings.stops_within()[
-            "something is ahead, the goal, ~/stop, SIGTERM, a second publisher"
+            "something is ahead, the goal, /drive/stop, SIGTERM, a second publisher"
         ]
     )
     assert core.start(robot.time - robot.dt) == (True, "the drive goes on")
@@ -1037,6 +1038,22 @@ def test_poses_compose_as_matrices(a, b):
         return np.array([[c, -s, x], [s, c, y], [0, 0, 1]])
 
     assert np.allclose(matrix(*compose(a, b)), matrix(*a) @ matrix(*b), atol=1e-8)
+
+
+@given(times=st.lists(st.floats(-0.5, 3.0), min_size=2, max_size=5).map(sorted))
+def test_parts_of_a_motion_make_the_whole(times):
+    """The commands of some time lead as far in one piece as in several."""
+    driven = Driven(0.3)
+    for now, v, omega in ((0.0, 0.2, 0.0), (0.1, 0.1, 2.0), (1.0, 0.2, -1.5)):
+        driven.take(now, v, omega)
+    whole = (0.0, 0.0, 0.0)
+    for part in driven.parts(*times):
+        whole = compose(whole, part)
+    assert np.allclose(whole, driven.between(times[0], times[-1]), atol=1e-9)
+    # Straight for 0.1 s, then a left turn until the timer ends it.
+    straight, turn = driven.parts(0.0, 0.1, 0.9)
+    assert straight == pytest.approx((0.02, 0.0, 0.0))
+    assert turn[2] == pytest.approx(2.0 * 0.3)
 
 
 def localised_by_amcl(core, robot, random, lost=0.0, silent=math.inf):

@@ -31,6 +31,8 @@ from tdac_envs import preprocess
 from tdac_envs.core.errors import TaskError
 
 SCRIPTS = {"drive": "node", "watchdog": "watchdog"}
+WITH_ROS = {"node.py", "running.py", "watchdog.py"}
+"""Modules of a package that import ROS."""
 # The rules of `ament_flake8`: its file ament_flake8.ini.
 AMENT = """[flake8]
 extend-ignore = B902,C816,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404,I202
@@ -87,13 +89,22 @@ def test_the_layout_is_that_of_ament_python(package):
     assert root.find("maintainer").get("email")
     assert TRIED in root.findtext("description")
     depends = {each.text for each in root.findall("exec_depend")}
-    node = (package / name / "node.py").read_text()
     used = {
         line.split()[1].split(".")[0]
-        for line in node.splitlines()
+        for module in WITH_ROS
+        for line in (package / name / module).read_text().splitlines()
         if line.startswith(("import ", "from ")) and " . " not in line
     }
-    ours = {"__future__", "json", "math", "pathlib", "sys", "time", "typing"}
+    ours = {
+        "__future__",
+        "collections",
+        "json",
+        "math",
+        "pathlib",
+        "sys",
+        "time",
+        "typing",
+    }
     assert used - ours <= depends
     assert {"rviz2", "nav2_bringup", "nav2_velocity_smoother"} <= depends
     config = configparser.ConfigParser()
@@ -136,8 +147,8 @@ def _printed(*command):
 
 
 def test_no_module_but_the_nodes_knows_ros(package):
-    """All but the two nodes import the standard library and numpy alone."""
-    for name in set(COPIED) - {f"{module}.py" for module in SCRIPTS.values()}:
+    """All but the nodes and what runs them import the standard library and numpy."""
+    for name in set(COPIED) - WITH_ROS:
         text = (package / "tdac_floor" / name).read_text()
         imported = {
             line.split()[1].partition(".")[0]
