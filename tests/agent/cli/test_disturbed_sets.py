@@ -87,6 +87,7 @@ def test_bad_input(tmp_path, words, said):
     assert len(errors.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_verify_drives_with_them(tmp_path):
     """The report is about a set of its own, and says how to watch a failure."""
     file = tmp_path / "mine.py"

@@ -50,6 +50,7 @@ def test_export_says_what_it_wrote(tdac, run, tmp_path):
     assert record["answers"]["budget"] == 0.05
 
 
+@pytest.mark.slow
 def test_a_controller_that_is_slower_than_the_node_is_named(task):
     """The judge allows 10 s for an answer, the node half a period."""
     slow = (

@@ -491,6 +491,7 @@ def test_a_localiser_that_is_silent(
         assert tick != last_tick + 1 or last.reason.startswith(why)
 
 
+@pytest.mark.slow
 def test_a_latched_stop_ends_the_drive(task, settings, package, domain):
     """Over DDS no service starts it again: one line, exit code 1."""
     fault = Fault("second-publisher", 2.0, 2.0)

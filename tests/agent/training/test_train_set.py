@@ -333,7 +333,8 @@ def test_seeds_are_checked_first(few, config, tmp_path):
     assert pickle.loads(pickle.dumps(told.value)).lines == told.value.lines
 
 
-@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [1, 2])
 def test_a_seed_that_fails_stops_no_other(few, config, tmp_path, count):
     """The others train as alone, to the last digit; their progress is told."""
     plan = make_set_plan(few(), steps=128, episodes=2, config=config())
