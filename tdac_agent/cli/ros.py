@@ -58,7 +58,12 @@ def sim(options: SimOptions, flags: TaskFlags) -> int:
     )
     bag = None if options.mcap is None else Bag()
     simulator = Simulator(
-        robot, bus, real_time=options.real_time, faults=faults, bag=bag
+        robot,
+        bus,
+        real_time=options.real_time,
+        faults=faults,
+        bag=bag,
+        say=lambda text: print_plain(Console(stderr=True), text),
     )
     try:
         report = simulator.run(options.seconds)
