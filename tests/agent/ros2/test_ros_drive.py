@@ -2,6 +2,7 @@
 
 import dataclasses
 import gc
+import itertools
 import marshal
 import math
 import os
@@ -31,7 +32,7 @@ from tdac_agent.ros2.robot import Robot
 from tdac_agent.ros2.simulator import Simulator
 from tdac_envs.core.errors import TaskError
 
-DOMAINS = iter(range(20 + os.getpid() % 40, 100))
+DOMAINS = (20 + (os.getpid() + number) % 80 for number in itertools.count())
 
 
 @pytest.fixture
