@@ -136,7 +136,7 @@ class RevealOptions:
 
 
 @bench_app.command(
-    "reveal", epilog="Example: `tdac bench reveal bench-1 --salt-file my.salt`"
+    "reveal", epilog="Example: `tdac bench reveal bench-1 --salt-file my.hex`"
 )
 @typed_options("bench:reveal")
 def reveal_command(options: RevealOptions) -> None:

@@ -58,7 +58,12 @@ def sim(options: SimOptions, flags: TaskFlags) -> int:
     )
     bag = None if options.mcap is None else Bag()
     simulator = Simulator(
-        robot, bus, real_time=options.real_time, faults=faults, bag=bag
+        robot,
+        bus,
+        real_time=options.real_time,
+        faults=faults,
+        bag=bag,
+        say=lambda text: print_plain(Console(stderr=True), text),
     )
     try:
         report = simulator.run(options.seconds)
@@ -92,11 +97,11 @@ def drive(options: DriveOptions) -> int:
         sim_time=not options.real_time,
         origin=options.origin,
         max_localiser_age=options.max_localiser_age,
-        max_speed=options.max_speed,
+        max_speed=options.max_speed or 0.0,
         recover=options.recover,
         resample_scan=options.resample_scan,
         max_jump=options.max_jump or 0.0,
-        max_deviation=options.max_deviation,
+        max_deviation=options.max_deviation or 0.0,
         any_start=options.any_start,
         any_map=options.any_map,
         say=lambda text: print_plain(console, text),

@@ -115,8 +115,8 @@ class DriveOptions:
         "radius of the robot]",
         metavar="METRES",
     )
-    max_deviation: float = option(
-        0.0,
+    max_deviation: float | None = option(
+        None,
         "Largest standard deviation of x and y that the localiser may state, m.  "
         "[default: three times the pose noise of the verification, at most the radius]",
         metavar="METRES",
@@ -126,8 +126,8 @@ class DriveOptions:
         "Largest time in which the localiser does not renew its transform, s.",
         metavar="SECONDS",
     )
-    max_speed: float = option(
-        0.0,
+    max_speed: float | None = option(
+        None,
         "Drive no faster, m/s.  [default: the speed of the robot]",
         metavar="SPEED",
     )

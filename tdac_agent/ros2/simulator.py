@@ -73,9 +73,11 @@ class Simulator:
         bus: Where it publishes.
         real_time: Whether it drives in real time, whatever the node does.
         faults: What goes wrong.
-        patience: Longest wait for a command in simulated time, s.
+        patience: Longest wait for a command in simulated time, s; after as long without
+            one, in either time, `say` is told so.
         watch: Called with the robot after each period.
         bag: What is published and commanded is written to it.
+        say: Called with a sentence when it waits.
     """
 
     def __init__(
@@ -88,11 +90,13 @@ class Simulator:
         patience: float = PATIENCE,
         watch: Callable[[Robot], None] | None = None,
         bag: Bag | None = None,
+        say: Callable[[str], None] = lambda _: None,
     ) -> None:
         self._robot, self._bus, self._real = robot, bus, real_time
         self._courses = [Course(fault) for fault in faults]
         self._active: set[str] = set()
         self._patience, self._watch, self._bag = patience, watch, bag
+        self._say, self._heard, self._has_said = say, time.monotonic(), False
         names = ("scan", "odom", "tf", "tf_static", "map", "amcl_pose", "clock")
         self._out = {name: bus.writer(name) for name in names}
         self._commands = bus.reader("cmd_vel")
@@ -113,6 +117,7 @@ class Simulator:
 
         Before the first motion it waits for at most `IDLE_SECONDS`.
         """
+        self._heard = time.monotonic()
         if not self._wait_for_motion():
             return self._report("no command")
         self._is_patient = True
@@ -131,6 +136,7 @@ class Simulator:
                     due += self._robot.dt
             else:
                 self._await()
+            self._note_silence()
         self._let_end()
         robot = self._robot
         if robot.contact:
@@ -148,7 +154,21 @@ class Simulator:
                 self._clock += 0.0 if self._moves else self._robot.dt
             if self._moves:
                 return True
+            self._note_silence()
         return False
+
+    def _note_silence(self) -> None:
+        """Says once what it waits for when no command has come for some time."""
+        silent = time.monotonic() - self._heard
+        if self._has_said or silent < self._patience:
+            return
+        self._has_said = True
+        wanted = (
+            f"it waits at most {IDLE_SECONDS:g} s for a node, such as tdac ros drive"
+        )
+        if self._moves:
+            wanted = "it waits for another node if its own has ended; Ctrl-C ends it"
+        self._say(f"no command on /cmd_vel for {silent:.0f} s: {wanted}")
 
     def _period(self) -> None:
         """Drives for a control period."""
@@ -173,6 +193,7 @@ class Simulator:
         taken = self._commands.take()
         if not taken:
             return False
+        self._heard, self._has_said = time.monotonic(), False
         for each in taken:
             self._record("cmd_vel", each)
         self._answered = 1e-9 * taken[-1].sample_info.source_timestamp

@@ -2,6 +2,7 @@
 
 import dataclasses
 import gc
+import itertools
 import marshal
 import math
 import os
@@ -31,7 +32,7 @@ from tdac_agent.ros2.robot import Robot
 from tdac_agent.ros2.simulator import Simulator
 from tdac_envs.core.errors import TaskError
 
-DOMAINS = iter(range(20 + os.getpid() % 40, 100))
+DOMAINS = (20 + (os.getpid() + number) % 80 for number in itertools.count())
 
 
 @pytest.fixture
@@ -100,6 +101,48 @@ def test_the_pose_from_odometry(task, settings, package, steps, domain):
         report = Simulator(robot_of(task, settings), bus, patience=30.0).run(60.0)
     assert report.outcome == "reached"
     assert report.steps == steps
+
+
+def test_a_simulation_says_what_it_waits_for(task, settings, domain):
+    """In one line, while there is no node, and again when its node has gone."""
+    said, sent, moved = [], Bus(domain).writer("cmd_vel"), threading.Event()
+    simulator = Simulator(
+        robot_of(task, settings),
+        Bus(domain),
+        patience=0.5,
+        watch=lambda _: moved.set(),
+        say=said.append,
+    )
+
+    def move():
+        while not moved.wait(0.05):
+            if said:
+                sent.write(msg.Twist(msg.Vector3(0.05)))
+
+    mover = threading.Thread(target=move, daemon=True)
+    mover.start()
+    report = simulator.run(4.0)
+    moved.set()
+    mover.join()
+    assert report.outcome == "out of time"
+    waits, lost = said
+    assert waits.endswith("it waits at most 60 s for a node, such as tdac ros drive")
+    assert lost.endswith("waits for another node if its own has ended; Ctrl-C ends it")
+
+
+def test_the_command_says_it_on_stderr(run, domain):
+    """Beside --json, too, whose output stays that of a record."""
+    command = [sys.executable, "-m", "tdac_agent", "ros", "sim", str(run), "--json"]
+    with subprocess.Popen(
+        [*command, "--domain", str(domain)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert "it waits for /cmd_vel" in process.stderr.readline()
+        assert process.stderr.readline().startswith("no command on /cmd_vel for ")
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=60)[0] == ""
 
 
 @pytest.mark.slow
