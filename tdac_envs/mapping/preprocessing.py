@@ -32,7 +32,7 @@ from tdac_envs.mapping.scene import (
 )
 from tdac_envs.mapping.score import Point
 from tdac_envs.mapping.snapping import body_fits, snap
-from tdac_envs.mapping.wording import metres_hint
+from tdac_envs.mapping.wording import light_hint, metres_hint, scale_hint
 
 Source = str | Path | NDArray[np.generic] | MapImage
 
@@ -198,6 +198,8 @@ def _refusal(
     grid = _grid(scene, reading)
     if scene.units == PIXELS:
         reason += metres_hint(grid, params.start, params.goal)
+    hints = light_hint(reading), scale_hint(params.robot.radius, grid.resolution)
+    reason = "; ".join(filter(None, (reason, *hints)))
     picture = (scene.image, grid, params, scene.units)
     return RefusedError(f"{name}: {reason}", name, {"refused": picture})
 

@@ -84,6 +84,36 @@ def metres_hint(
     return "; did you mean --metres? As metres, start and goal are free places"
 
 
+def scale_hint(radius: float, resolution: float | None) -> str:
+    """Asks whether a scale is right if the body is smaller than a pixel; else empty.
+
+    Args:
+        radius: Of the body, px.
+        resolution: Length of a pixel, m; None if it is not known.
+    """
+    if radius >= 1.0:
+        return ""
+    if resolution is None:
+        return (
+            f"the body's radius is {radius:g} px; if it is in metres, give the metres "
+            "per px (--resolution, resolution=)"
+        )
+    return (
+        f"the body's radius is {radius:.2g} px: is a resolution of {resolution:g} m "
+        "per px right?"
+    )
+
+
+def light_hint(read: Read) -> str:
+    """Says that light pixels were found to be the obstacles, as they may not be."""
+    if read.polarity != "light" or "polarity as given" in read.method.split(", "):
+        return ""
+    return (
+        "light pixels were taken for the obstacles; if they are the dark ones, give "
+        "polarity='dark' (--polarity dark)"
+    )
+
+
 def _of_file(method: str) -> str:
     """The rule of a file that itself defines the obstacles."""
     kind, _, mode = method.partition(" ")

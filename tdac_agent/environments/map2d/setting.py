@@ -40,7 +40,12 @@ from tdac_envs.mapping.image import read_bytes
 from tdac_envs.mapping.map_folder import preview_of, write_grid
 from tdac_envs.mapping.params import MapParams, ReadingOptions
 from tdac_envs.mapping.preprocessing import as_image
-from tdac_envs.mapping.wording import metres_hint, obstacles_text, scale_text
+from tdac_envs.mapping.wording import (
+    metres_hint,
+    obstacles_text,
+    scale_hint,
+    scale_text,
+)
 from tdac_envs.movers.spec import AnySpec
 from tdac_envs.robots.robot_file import Body, body_in, body_written
 
@@ -308,6 +313,8 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
         raise RefusedError(message, params.source, pictures) from error
     check_movers(spec.movers, nominal)
     notes = with_tolerance_note(params.notes, nominal, units.length)
+    hint = scale_hint(params.robot.radius, prepared.grid.resolution)
+    notes = (*notes, hint) if hint and hint not in notes else notes
     params = params.model_copy(update={"notes": notes})
     robot_image = ROBOT_IMAGE if spec.robot.image is None else base / spec.robot.image
     if not robot_image.is_file():

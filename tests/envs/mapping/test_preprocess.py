@@ -19,7 +19,7 @@ from tdac_envs.core.errors import MapError, TaskError
 from tdac_envs.grid.grid import body_free, clearance
 from tdac_envs.grid.pieces import nearest_free
 from tdac_envs.mapping.cleanup import cleanings
-from tdac_envs.mapping.image import luminance
+from tdac_envs.mapping.image import MapImage, luminance
 from tdac_envs.mapping.map_files import load_image
 from tdac_envs.mapping.map_folder import FILES, planned_path, write_map
 from tdac_envs.mapping.params import MapParams
@@ -175,6 +175,24 @@ def test_closed_map_is_refused(wall: int, negative: bool) -> None:
     image = rooms(wall, closed=True)
     with pytest.raises(TaskError, match="no robot gets through: a wall blocks the way"):
         preprocess(255 - image if negative else image, START, GOAL, 12.0)
+
+
+def test_a_body_smaller_than_a_pixel_is_asked_for_its_units() -> None:
+    """Metres without a resolution, and a resolution that is 100 times too large."""
+    in_wall = (150.0, 20.0)
+    with pytest.raises(TaskError, match=r"0\.2 px; if it is in metres, give"):
+        preprocess(rooms(), in_wall, GOAL, 0.2, polarity="dark")
+    image = MapImage(rooms(), "plan", "", resolution=5.0)
+    with pytest.raises(TaskError, match=r"is a resolution of 5 m per px right\?"):
+        preprocess(image, in_wall, GOAL, 0.04, polarity="dark")
+
+
+def test_a_refusal_says_that_light_pixels_are_obstacles() -> None:
+    """Start and goal lie in two black walls, so the white floor is taken for them."""
+    image = rooms(12)
+    cv2.rectangle(image, (60, 100), (80, 120), (0, 0, 0), -1)
+    with pytest.raises(TaskError, match="light pixels were taken for the obstacles"):
+        preprocess(image, (8.0, 100.0), (70.0, 110.0), 4.0)
 
 
 def test_closed_by_a_thinner_wall_is_refused() -> None:
