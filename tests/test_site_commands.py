@@ -97,12 +97,14 @@ PREPARED = {
     "campaigns/my": "tdac campaign my.yaml",
     r"demo-1|--rules": "tdac demo",
     "--rules": "tdac rules export runs/demo-1 --out rules.md",
-    "runs/ppo/": "tdac train --set unknown --steps 4096 --out runs/ppo",
+    "runs/ppo/|--from POLICY": "tdac train --set unknown --steps 4096 --out runs/ppo",
     r"\.zip|ppo-maze-1": "tdac train --task maze --steps 4096",
 }
 """Commands that must have run before others, by what these name."""
 LEARNED = "runs/ppo-maze-1/policy.zip"
-"""This policy stands for all those that the pages name."""
+"""This policy stands for all those that the pages name, but for one."""
+FURTHER = "runs/ppo/policy.zip"
+"""The one with which a training on a set begins."""
 
 
 def runs_here(line):
@@ -172,7 +174,8 @@ def prepare(line, folder):
     for name in re.findall(r"[\w/-]+\.zip", line):
         if not (folder / name).exists():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(folder / LEARNED, folder / name)
+            source = FURTHER if "--from" in line else LEARNED
+            shutil.copy(folder / source, folder / name)
 
 
 def test_what_is_left_out():

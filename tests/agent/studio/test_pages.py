@@ -15,6 +15,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 from studio_process import Studio, running_studio
 
+from tdac_agent import load_task, synthesize
 from tdac_agent.runs.replay import DEMO
 from tdac_agent.studio.jobs import STATE, jobs
 from tdac_agent.verification.verify_episodes import verify_episodes
@@ -230,16 +231,16 @@ def test_a_controller_of_ones_own_is_repaired(page, plan, tmp_path):
 @pytest.mark.slow
 def test_two_runs_side_by_side(page, studio, plan):
     """Their figures in one table, and both reports."""
-    run = studio.place / "runs/plan-1"
-    assert (run / "run.json").is_file(), "that of the first test"
+    run = studio.place / "runs/compared"
+    synthesize(load_task("maze"), "builtin", out=run)
     shutil.copytree(run, studio.place / "runs/copy", dirs_exist_ok=True)
-    page.get(f"{studio.base}/compare?one=runs/plan-1&other=runs/copy")
+    page.get(f"{studio.base}/compare?one=runs/compared&other=runs/copy")
     wait(page, lambda b: len(b.find_elements(By.CSS_SELECTOR, "iframe.report")) == 2)
     cells = [cell.text for cell in page.find_elements(By.CSS_SELECTOR, "td")]
     assert cells[:4] == ["", "status", "verified", "verified"]
     assert page.find_elements(By.CSS_SELECTOR, ".compared .differs") == []
     assert "The controllers are the same." in text_of(page)
-    page.get(f"{studio.base}/compare?one=runs/plan-1&other=runs/missing")
+    page.get(f"{studio.base}/compare?one=runs/compared&other=runs/missing")
     says(page, "There is no run 'runs/missing' here.")
 
 
