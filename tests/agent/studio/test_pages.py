@@ -241,7 +241,7 @@ def test_two_runs_side_by_side(page, studio, plan):
     assert page.find_elements(By.CSS_SELECTOR, ".compared .differs") == []
     assert "The controllers are the same." in text_of(page)
     page.get(f"{studio.base}/compare?one=runs/compared&other=runs/missing")
-    says(page, "There is no run 'runs/missing' here.")
+    says(page, "There is no run 'runs/missing'")
 
 
 @pytest.mark.slow
