@@ -98,7 +98,7 @@ def check_same(before: Run, now: Run, further: Mapping[str, Any] | None = None) 
     Raises:
         RunError: They differ; names all differences.
     """
-    before = _completed(before, now)
+    before, now = _completed(before, now), _completed(now, now)
     others = [
         name for name in CONFIGURATION if getattr(before, name) != getattr(now, name)
     ]
@@ -124,7 +124,7 @@ def check_same(before: Run, now: Run, further: Mapping[str, Any] | None = None) 
 
 
 def _completed(before: Run, now: Run) -> Run:
-    """A run with what records of earlier versions do not say."""
+    """A run with what records of earlier versions, and of agents, do not say."""
     known = {"search": before.search or "paper", "ask": before.ask or now.ask}
     return before.model_copy(update=known)
 
