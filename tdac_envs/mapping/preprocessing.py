@@ -32,7 +32,7 @@ from tdac_envs.mapping.scene import (
 )
 from tdac_envs.mapping.score import Point
 from tdac_envs.mapping.snapping import body_fits, snap
-from tdac_envs.mapping.wording import light_hint, metres_hint, scale_hint
+from tdac_envs.mapping.wording import with_hints
 
 Source = str | Path | NDArray[np.generic] | MapImage
 
@@ -196,10 +196,7 @@ def _refusal(
     """The error with a picture of a reading on which the task is infeasible."""
     name = scene.image.name
     grid = _grid(scene, reading)
-    if scene.units == PIXELS:
-        reason += metres_hint(grid, params.start, params.goal)
-    hints = light_hint(reading), scale_hint(params.robot.radius, grid.resolution)
-    reason = "; ".join(filter(None, (reason, *hints)))
+    reason = with_hints(reason, grid, params, scene.units)
     picture = (scene.image, grid, params, scene.units)
     return RefusedError(f"{name}: {reason}", name, {"refused": picture})
 

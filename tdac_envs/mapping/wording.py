@@ -6,7 +6,8 @@ import re
 from typing import Protocol
 
 from tdac_envs.grid.grid import OccupancyGrid
-from tdac_envs.grid.map_units import MapUnits
+from tdac_envs.grid.map_units import PIXELS, MapUnits
+from tdac_envs.mapping.params import MapParams
 
 OUTSIDE_CLOSED = "outside of the plan closed"
 """Note of a reading in which the area around the plan is not free."""
@@ -62,26 +63,37 @@ def scale_text(resolution: float | None) -> str:
     return f"{resolution:g} m per px"
 
 
-def metres_hint(
-    grid: OccupancyGrid,
-    start: tuple[float, float] | None,
-    goal: tuple[float, float] | None,
+def with_hints(
+    reason: str, grid: OccupancyGrid, params: MapParams, units: MapUnits
 ) -> str:
+    """The reason of a refusal, with questions on what may have been meant.
+
+    Args:
+        reason: Why the task is infeasible on the map.
+        grid: The map.
+        params: Start, goal, robot, and how the picture was read.
+        units: Units in which start and goal were given.
+    """
+    hints = (
+        _metres_hint(grid, params) if units == PIXELS else "",
+        _light_hint(params),
+        scale_hint(params.robot.radius, grid.resolution),
+    )
+    return "; ".join(filter(None, (reason, *hints)))
+
+
+def _metres_hint(grid: OccupancyGrid, params: MapParams) -> str:
     """Asks whether places that were given in px are in metres; else empty.
 
     They may be if the map has a resolution, and both are free places of it in metres.
-
-    Args:
-        grid: The map.
-        start: (x, y) as given, px.
-        goal: (x, y) as given, px.
     """
-    if grid.resolution is None or start is None or goal is None:
+    if grid.resolution is None or params.start is None or params.goal is None:
         return ""
     units = MapUnits.metres(grid)
-    if any(grid.is_occupied(*units.pixels(place)) for place in (start, goal)):
+    places = params.start, params.goal
+    if any(grid.is_occupied(*units.pixels(place)) for place in places):
         return ""
-    return "; did you mean --metres? As metres, start and goal are free places"
+    return "did you mean --metres? As metres, start and goal are free places"
 
 
 def scale_hint(radius: float, resolution: float | None) -> str:
@@ -104,7 +116,7 @@ def scale_hint(radius: float, resolution: float | None) -> str:
     )
 
 
-def light_hint(read: Read) -> str:
+def _light_hint(read: Read) -> str:
     """Says that light pixels were found to be the obstacles, as they may not be."""
     if read.polarity != "light" or "polarity as given" in read.method.split(", "):
         return ""

@@ -41,10 +41,10 @@ from tdac_envs.mapping.map_folder import preview_of, write_grid
 from tdac_envs.mapping.params import MapParams, ReadingOptions
 from tdac_envs.mapping.preprocessing import as_image
 from tdac_envs.mapping.wording import (
-    metres_hint,
     obstacles_text,
     scale_hint,
     scale_text,
+    with_hints,
 )
 from tdac_envs.movers.spec import AnySpec
 from tdac_envs.robots.robot_file import Body, body_in, body_written
@@ -306,9 +306,8 @@ def open_map_task(spec: TaskFile, base: Path) -> tuple[str, Map2DSetting]:
             raise
         image = as_image(prepared.image or prepared.grid.cells)
         picture = (image, prepared.grid, params, units)
-        message = f"{params.source}: {error}"
-        if units == MAP_PIXELS:
-            message += metres_hint(prepared.grid, params.start, params.goal)
+        reason = with_hints(str(error), prepared.grid, params, units)
+        message = f"{params.source}: {reason}"
         pictures = {"refused": picture}
         raise RefusedError(message, params.source, pictures) from error
     check_movers(spec.movers, nominal)
