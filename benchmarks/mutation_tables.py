@@ -43,8 +43,8 @@ def write_markdown(
         f"({100 * killed / max(len(harmful), 1):.1f} %). Harmful: an independent judge "
         "finds that the mutant violates the contract or succeeds on less than 90 % of "
         f"{seeds} jittered starts, where the original succeeds on all of them.",
-        f"Of the {len(harmless)} harmless ones {len(alive)} pass the suite, as they "
-        f"may; {len(harmless) - len(alive)} are killed all the same.",
+        f"Of the {len(harmless)} harmless ones, the suite passes {len(alive)}, as it "
+        f"may, and kills {len(harmless) - len(alive)}.",
         "",
         f"Controllers: {', '.join(controllers)}.",
         *_excuse(left_out),
