@@ -95,8 +95,10 @@ PREPARED = {
     "theirs": "tdac bench other.py --set unknown -n 2 --out theirs",
     "show arena": "tdac bench go-to-goal --set unknown -n 2 --out arena",
     "campaigns/my": "tdac campaign my.yaml",
-    r"demo-1|--rules": "tdac demo",
-    "--rules": "tdac rules export runs/demo-1 --out rules.md",
+    "demo-1": "tdac demo",
+    "rules-1|--rules": "tdac synth --prompt underspecified --learner replay:rules "
+    "--no-confirm --out runs/rules-1",
+    "--rules": "tdac rules export runs/rules-1 --out rules.md",
     "runs/ppo/|--from POLICY": "tdac train --set unknown --steps 4096 --out runs/ppo",
     r"\.zip|ppo-maze-1": "tdac train --task maze --steps 4096",
 }

@@ -2,14 +2,15 @@
 
     python -m tools.moving_pictures docs
 
-`repair.gif` shows a run of `tdac synth --task office --from controller.py`: the given
-controller plans for a point and hits a corner, and the built-in template repairs it.
-The texts are those of its report. The others show an episode in each environment.
+`repair.gif` shows the run of `tdac demo`, recorded answers of a language model: what
+its first controller does, what the model says of the failure, lines of its repair, and
+the repaired drive. The others show an episode in each environment.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 import tempfile
 import textwrap
 from collections.abc import Iterator
@@ -20,55 +21,113 @@ import numpy as np
 
 from tdac_agent import load_task, synthesize
 from tdac_agent.episodes.trajectory import Trajectory
-from tdac_agent.html_report.story import changed_in, told_of
-from tdac_agent.runs.history import CandidateHistory, RunHistory, gather_run
-from tdac_envs.drawing.canvas import INK, PAPER, Image, blank, write_text
+from tdac_agent.html_report.code import count_changes
+from tdac_agent.html_report.story import told_of
+from tdac_agent.runs.history import RunHistory, gather_run
+from tdac_envs.drawing.canvas import INK, PAPER, Colour, Image, blank, write_text
 from tdac_envs.drawing.runs import Status
 from tdac_envs.drawing.video import write_video
 from tdac_envs.map2d.picture import MapScene
-from tools import for_a_point
 from tools.run import tdac
 
 WIDTH, FPS, SPEED = 600, 12, 7.0
 """Width of a picture, px; frames a second; simulated seconds a second."""
 HOLD = 3.0
 """Seconds for which a text is shown at the end of an episode."""
+SHOWN = 12.0
+"""Simulated seconds of a drive that fails."""
 LINE, ROWS = 22, 2
+SAID = "The turning sign was wrong and could never be corrected."
+"""What the model says of the failure, in its answer."""
+REPAIR = (
+    "-    S.W = 2.0 * C.vmax / C.base",
+    "+    S.W = C.sign * 2.0 * C.vmax / C.base",
+    "+                if S.vote * C.sign < -2.0:",
+    "+                    C.sign = -C.sign",
+)
+"""Lines of its repair that tell what it is about."""
+ADDED, REMOVED = (0, 110, 80), (180, 50, 30)
 
 
 def repair(out: Path) -> None:
     """Draws `repair.gif`."""
     with tempfile.TemporaryDirectory() as name:
-        run, near = Path(name) / "run", for_a_point.write(Path(name))
-        words = "--task", for_a_point.TASK, "--from", str(near), "--out", str(run)
-        tdac("synth", *words)
+        run = Path(name) / "run"
+        tdac("demo", "--out", str(run))
         told = gather_run(run)
+        answer = (told.tried[1].folder / "edit.reply.md").read_text(encoding="utf-8")
+        assert SAID in answer
         write_video(_frames(told), out / "repair.gif", FPS)
 
 
 def _frames(told: RunHistory) -> Iterator[Image]:
-    for number, one in enumerate(told.tried, 1):
-        trajectory = dict(one.trajectories())["nominal"]
-        before, after = _captions(one, number, trajectory.dt)
-        yield from _episode(told, trajectory, before, after)
+    first, second = told.tried
+    assert first.report is not None
+    assert second.report is not None
+    assert told.task is not None
+    dt = told.task.nominal.dt
+    fails = _episode(
+        told,
+        dict(first.trajectories())["nominal"],
+        "A language model wrote version 1. The question did not say which wheel "
+        "turns the robot left.",
+        f"Version 1. {told_of(first.report, dt)}",
+        SHOWN,
+    )
+    for frame in fails:
+        yield frame
+    changed = _repair_picture(second.diff or "", frame)
+    yield from [changed] * round(2 * HOLD * FPS)
+    blind = told.run.confirmations[-1].episodes
+    verified = f"{told_of(second.report, dt)[:-1]}, and {blind} blind drives: verified."
+    yield from _episode(
+        told,
+        dict(second.trajectories())["nominal"],
+        "Version 2 drives.",
+        f"Version 2. {verified}",
+    )
 
 
-def _captions(one: CandidateHistory, number: int, dt: float) -> tuple[str, str]:
-    """What is written below a version that drives, and that has driven."""
-    assert one.report is not None
-    name = f"Version {number}"
-    before = f"{name} plans its path for a point."
-    if number > 1:
-        before = (
-            "The template is told where and why, and repairs it: "
-            f"{changed_in(one)}. {name} drives."
-        )
-    return before, f"{name}. {told_of(one.report, {'dt': dt})}"
+def _repair_picture(diff: str, frame: Image) -> Image:
+    """What the model says, and the lines that it changed, as large as another one."""
+    lines = diff.splitlines()
+    assert all(line in lines for line in REPAIR), "the repair is another one"
+    added, removed = count_changes(diff)
+    picture = blank(*frame.shape[:2], PAPER)
+    texts: list[tuple[str, Colour]] = [
+        (line, INK)
+        for line in [
+            "The model is told where and why. It answers:",
+            *textwrap.wrap(f'"{SAID}"', 66),
+            "",
+            f"It adds {added} lines and removes {removed}, among them:",
+            "",
+        ]
+    ]
+    texts += [(line, ADDED if line[0] == "+" else REMOVED) for line in REPAIR]
+    step = round(1.4 * LINE)
+    top = (picture.shape[0] - step * len(texts)) // 2 + step
+    for row, (line, colour) in enumerate(texts):
+        write_text(picture, 60, top + step * row, line, colour)
+    return picture
 
 
 def _episode(
-    told: RunHistory, trajectory: Trajectory, before: str, after: str
+    told: RunHistory,
+    trajectory: Trajectory,
+    before: str,
+    after: str,
+    seconds: float = math.inf,
 ) -> Iterator[Image]:
+    """An episode with a text below it, and another one at its end.
+
+    Args:
+        told: The run.
+        trajectory: The episode.
+        before: The text while it drives.
+        after: The text at the end.
+        seconds: Simulated seconds after which the picture ends.
+    """
     assert told.task is not None
     nominal = told.task.nominal
     scene = MapScene(
@@ -81,12 +140,13 @@ def _episode(
     )
     stride = max(1, round(SPEED / FPS / trajectory.dt))
     ends = np.hypot(*(trajectory.poses[:, :2] - nominal.goal).T)
-    for step in trajectory.every(stride):
+    steps = [n for n in trajectory.every(stride) if n * trajectory.dt <= seconds]
+    for step in steps:
         status = Status(step, nominal.horizon, float(ends[step]), "")
         trail = trajectory.poses[: step + 1, :2]
         pose = trajectory.poses[step].tolist()
         frame = scene.frame(pose, trajectory.ranges[step], trail, status, [])
-        last = step == trajectory.steps
+        last = step == steps[-1]
         shown = _with_caption(frame, after if last else before)
         for _ in range(round(HOLD * FPS) if last else 1):
             yield shown

@@ -101,7 +101,7 @@ PICTURES = {
     "maze.png": Picture(maze, ("tdac_agent/environments/map2d/pictures.py", DRAWING)),
     "failure.png": Picture(failure, ("tools/for_a_point.py", DRAWING)),
     "repair.gif": Picture(
-        moving, ("tools/moving_pictures.py", "tools/for_a_point.py", DRAWING)
+        moving, ("tools/moving_pictures.py", "tdac_agent/runs/demo/*.json*", DRAWING)
     ),
     **{
         name: Picture(moving, ("tools/moving_pictures.py", DRAWING))

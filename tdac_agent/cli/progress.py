@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from rich.live import Live
@@ -42,12 +43,22 @@ class SynthProgress:
         console: Console to print to.
         heading: Line to print when the run begins.
         on_set: Whether the run is on a task set.
+        told: Tells in a sentence how candidate (k, j) failed; without it, the names of
+            the failed tests are printed.
     """
 
-    def __init__(self, console: Console, heading: str, *, on_set: bool = False) -> None:
+    def __init__(
+        self,
+        console: Console,
+        heading: str,
+        *,
+        on_set: bool = False,
+        told: Callable[[int, int], str] | None = None,
+    ) -> None:
         self._console = console
         self._heading = heading
         self._on_set = on_set
+        self._told = told
         self._has_quoted = False
         self._spinner = Spinner("dots", text="preparing")
 
@@ -183,8 +194,9 @@ class SynthProgress:
             self.say(f"[red]✘ {at}[/]", f"[red]{note}[/]")
         else:
             failed = record["failed_tests"]
-            names = escape(list_tests(failed, 3))
-            self.say(f"[red]✘ {at}[/]", f"[red]{len(failed)} failed:[/] {names}")
+            names = f"{len(failed)} failed: {list_tests(failed, 3)}"
+            text = names if self._told is None else self._told(record["k"], record["j"])
+            self.say(f"[red]✘ {at}[/]", escape(text or names))
 
     def say(self, place: str, text: str, style: str = "") -> None:
         """Prints a line in two columns, so that wrapped text stays below the text."""

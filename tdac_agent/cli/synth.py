@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
@@ -34,13 +34,15 @@ from tdac_agent.runs.resume import (
     resume_arguments,
     resume_line,
 )
-from tdac_agent.runs.run_record import AGENT, RUN_FILE, Run, load_run
+from tdac_agent.runs.run_record import AGENT, RUN_FILE, Run, candidate_at, load_run
+from tdac_agent.storage.printable_record import read_record
 from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.synthesis.synthesize import synthesize
 from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task import Task, display_name
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE
 from tdac_agent.verification.diagnosis.measures import shortest_path_length
+from tdac_agent.verification.diagnosis.report import Report
 
 RECORDED = ("learner", "optimizer", "base_url", "max_cost", "max_tokens")
 WITH_RESUME = frozenset({"resume", "trust", "as_json"})
@@ -112,9 +114,9 @@ def write(
     """
     before = existing_run(folder)
     heading = _heading(problem, options.learner, options.optimizer)
-    on_set = problem.tasks is not None
+    on_set, told = problem.tasks is not None, teller(folder, problem)
     try:
-        with SynthProgress(console, heading, on_set=on_set) as progress:
+        with SynthProgress(console, heading, on_set=on_set, told=told) as progress:
             result = synthesize(
                 problem, out=folder, options=options, index=index, on_event=progress
             )
@@ -122,6 +124,21 @@ def write(
         print_plain(console, _so_far(folder))
         raise
     return _show(result, console, before=before)
+
+
+def teller(folder: Path, problem: Problem) -> Callable[[int, int], str] | None:
+    """Tells from a run's folder how a candidate failed on a task."""
+    if problem.task is None:
+        return None
+    dt = problem.task.nominal.dt
+
+    def told(k: int, j: int) -> str:
+        from tdac_agent.html_report.story import told_of  # slow to import
+
+        report = read_record(Report, folder / candidate_at(k, j), "report.json")
+        return "" if report is None else told_of(report, dt)
+
+    return told
 
 
 def resume(options: SynthOptions, run_flags: RunFlags, typed: Collection[str]) -> int:

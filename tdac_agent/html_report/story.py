@@ -98,7 +98,7 @@ def _card(
         end = (float(places[-1, 0]), float(places[-1, 1]))
         contact = drive["contact"] and tuple(drive["contact"])
     changed = changed_in(one) if number else ""
-    told = told_of(one.report, drive)
+    told = told_of(one.report, drive and drive["dt"])
     return Card(one, number + 1, told, line, end, contact, changed, skipped)
 
 
@@ -111,12 +111,12 @@ def _drive_of(
     return next(iter([*failed, *own]), None)
 
 
-def told_of(report: Report, drive: dict[str, Any] | None) -> str:
+def told_of(report: Report, dt: float | None) -> str:
     """What drives and tests of a version showed, such as `Passes all 41 tests`.
 
     Args:
         report: Its verification.
-        drive: The drive that is shown, from `animations`.
+        dt: Duration of a step, s; None if no time is to be told.
     """
     drives = [each for each in report.episodes if each.outcome != "not run"]
     reached = sum(each.outcome == "reached" for each in drives)
@@ -125,8 +125,9 @@ def told_of(report: Report, drive: dict[str, Any] | None) -> str:
     failures = [each.diagnosis for each in report.failures if each.diagnosis]
     shown = [each for each in failures if each.cause in ENDINGS]
     if reached < len(drives) and shown:
-        text = _ending(shown[0], drive)
-        return f"{text[0].upper()}{text[1:]}; {reached} of {len(drives)} drives arrive."
+        text = _ending(shown[0], dt)
+        several = f"; {reached} of {len(drives)} drives arrive"
+        return f"{text[0].upper()}{text[1:]}{several if len(drives) > 1 else ''}."
     names = [short_test(each.test) for each in report.failures]
     listed = first_of(names, MOST_NAMES)
     tests = f"{len(names)} test{'' if len(names) == 1 else 's'}"
@@ -135,12 +136,12 @@ def told_of(report: Report, drive: dict[str, Any] | None) -> str:
     return f"{text[0].upper()}{text[1:]}"
 
 
-def _ending(diagnosis: Diagnosis, drive: dict[str, Any] | None) -> str:
+def _ending(diagnosis: Diagnosis, dt: float | None) -> str:
     text = ENDINGS[diagnosis.cause]
     if diagnosis.cause == "collision":
         text = f"hits {_touched(diagnosis.thing)}"
-    if diagnosis.step and drive is not None:
-        text += f" after {diagnosis.step * drive['dt']:.1f} s"
+    if diagnosis.step and dt is not None:
+        text += f" after {diagnosis.step * dt:.1f} s"
     return text
 
 

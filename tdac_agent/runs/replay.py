@@ -1,6 +1,7 @@
 """`replay:RUN`: the answers of a recorded run; no model is asked, no cost arises.
 
-`replay:demo` is the shipped run of `tdac demo`.
+Two runs are shipped: `replay:demo` is the one of `tdac demo`, and `replay:rules` is one
+in which the optimizer derives rules from the failures.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ from tdac_agent.storage.journal import JournalRecord, read_records
 from tdac_envs.core.intake import RECORD_BYTES
 
 DEMO = Path(__file__).parent / "demo"
+RULES = Path(__file__).parent / "demo_rules"
+SHIPPED = {"demo": DEMO, "rules": RULES}
+"""The shipped runs by their names."""
 Place = tuple[str, int, int]
 
 
@@ -35,7 +39,7 @@ def make(words: str, options: Options) -> Replay:
     del options
     if not words:
         raise ProviderError("replay: needs a run folder, as in replay:runs/maze-1")
-    folder = DEMO if words == "demo" else Path(words)
+    folder = SHIPPED.get(words, Path(words))
     try:
         recorded = load_run(folder)
         records = read_records(folder / JOURNAL)
@@ -43,7 +47,7 @@ def make(words: str, options: Options) -> Replay:
         raise ProviderError(f"cannot replay: {error}") from error
     except OSError as error:
         raise ProviderError(f"cannot replay {folder}: {error.strerror}") from error
-    shipped = folder == DEMO
+    shipped = words in SHIPPED
     seed = recorded.seed if shipped or is_own_folder(recorded) else None
     replay = Replay(words, folder, records, reworded=shipped, seed=seed)
     replay.fixed = recorded.on_set and recorded.learner == recorded.optimizer == OURS
