@@ -163,4 +163,4 @@ def changed_in(one: CandidateHistory) -> str:
     learnt = f" after {rules} new rule{'' if rules == 1 else 's'}" if rules else ""
     if is_rewritten(one.diff, one.source or ""):
         return f"written anew{learnt}"
-    return f"{added} lines added, {removed} removed{learnt}"
+    return f"{added} line{'' if added == 1 else 's'} added, {removed} removed{learnt}"

@@ -103,8 +103,7 @@ async def _show_difference(names: Sequence[str], folders: Sequence[Path]) -> Non
     else:
         added, removed = count_changes(diff)
         ui.label(
-            f"{removed} lines are in {names[0]} alone (−), {added} in {names[1]} "
-            "alone (+)."
+            f"Lines only in {names[0]} (−): {removed}; only in {names[1]} (+): {added}."
         ).classes("note")
         text = shown_diff(diff, MOST_LINES)  # with all that was in the files escaped
         ui.html(text, sanitize=False, tag="pre").classes("diff").props("tabindex=0")

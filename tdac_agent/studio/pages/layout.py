@@ -20,6 +20,8 @@ from tdac_agent.studio.pages.trail import Step, trail_html
 
 PATIENCE = 120.0
 """Seconds that a browser may need to show a page."""
+AWAITED = "The report is being made …"
+SHOWN = "(event) => { event.target.previousElementSibling.hidden = true; }"
 LINKS = {
     "New controller": "/",
     "Runs": "/runs",
@@ -76,8 +78,9 @@ def say_missing(kind: str, at: str, page: str) -> None:
     """
     heading(f"There is no {kind} {at!r}" if at else f"No {kind} is chosen", 1)
     with ui.row().classes("items-baseline gap-1"):
-        ui.label("It may have been moved or deleted.")
-        ui.link(f"To all {kind}s", LINKS[page])
+        if at:
+            ui.label("It may have been moved or deleted.")
+        ui.link(f"All {page.lower()}", LINKS[page])
 
 
 def say_empty(text: str, *, link: Step | None = None, command: str = "") -> None:
@@ -208,6 +211,10 @@ def file_frame(at: str, version: str, title: str) -> None:
 
 
 def _frame(address: str, title: str) -> None:
-    """A page in a frame without any rights."""
+    """A page in a frame without any rights; until it is there, a text says so."""
     rights = {"src": address, "sandbox": "allow-scripts", "title": title}
-    ui.element("iframe").classes("report").props.update(rights)
+    with ui.element("div").classes("reported"):
+        ui.label(AWAITED).classes("note")
+        frame = ui.element("iframe").classes("report")
+        frame.props.update(rights)
+        frame.on("load", js_handler=SHOWN)

@@ -86,7 +86,8 @@ class RunPage(JobPage):
         self._awaited = ui.label().classes("note text-sm whitespace-pre-line")
         self._report = ui.column().classes("w-full")
         self._robust = Robustness(self._place, self._at)
-        with ui.expansion("What the command printed").classes("w-full"):
+        self._printed = ui.expansion("What the command printed").classes("w-full")
+        with self._printed:
             ui.label(LETTERS).classes("note text-sm")
             with ui.element("pre").classes("output"):
                 self._output = ui.label()
@@ -106,6 +107,7 @@ class RunPage(JobPage):
         self._seen = state
         self._show_row(state, job)
         self._output.text = state.output
+        self._printed.visible = bool(state.output)
         new = state.version not in ("", self._reported)
         if new and (self._follow.value or not self._reported or not state.running):
             self._reported = state.version
@@ -136,8 +138,8 @@ class RunPage(JobPage):
         if state.running and job is not None:
             parts = filter(None, (text, state.driven))
             text = f"{'; '.join(parts)} ({job.seconds:.0f} s)"
-            lines = last_step(state.output), "" if state.version else FIRST
-            self._awaited.text = "\n".join(filter(None, lines))
+        lines = last_step(state.output), "" if state.version else FIRST
+        self._awaited.text = "\n".join(filter(None, lines))
         self._awaited.visible = state.running
         self._now.text = text
         judged = job_of(self._place, self._verdict_about)

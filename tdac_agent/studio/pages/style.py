@@ -19,6 +19,11 @@ body.body--dark {
   --added-pale: #12372a; --added: #7fe0b4; --removed-pale: #46241a;
   --removed: #ffae8c; --hunk: #b3abff; --hunk-pale: #262a40; --paper: #1d2127;
 }
+:root { color-scheme: light dark; }
+/* Until the scripts say which of both it is. */
+@media (prefers-color-scheme: dark) {
+  body:not(.body--dark, .body--light) { --page: #14171c; }
+}
 body, body.body--dark { font-family: system-ui, sans-serif; background: var(--page);
   color: var(--ink); }
 h1, h2, h3 { margin: 0; line-height: 1.3; }
@@ -26,7 +31,11 @@ h1 { font-size: 1.4rem; font-weight: 700; overflow-wrap: anywhere; }
 h2 { font-size: 1.125rem; font-weight: 700; }
 h3 { font-size: 1rem; font-weight: 700; }
 .q-btn { text-transform: none; }
-.body--dark .q-btn--outline, .body--dark .q-btn--flat { --q-primary: var(--link); }
+.body--dark :is(.q-btn--outline, .q-btn--flat, .q-radio, .q-checkbox, .q-slider,
+  .q-toggle) { --q-primary: var(--link); }
+.q-btn-group { border: 1px solid var(--edge); box-shadow: none; }
+.q-btn-group .q-btn { padding-inline: .7em; }
+.body--dark .q-chip { background: var(--line); }
 .q-header a { color: white; text-decoration: none; padding: .1em 0; }
 .q-header a[aria-current] { border-bottom: 2px solid #8db8f0; }
 .q-header { background: #23262e; }
@@ -68,6 +77,8 @@ kbd { font: inherit; font-size: .85em; padding: 0 .4em; border-radius: 4px;
 .trail a { color: var(--link); }
 .empty { border: 1px dashed var(--edge); border-radius: 8px; padding: .8em 1em;
   width: 100%; gap: .5rem; }
+.reported { position: relative; width: 100%; }
+.reported > .note { position: absolute; padding: 1em 1.2em; }
 iframe.report { border: 1px solid var(--line); border-radius: 6px; width: 100%;
   height: 82vh; background: var(--paper); }
 .q-uploader { width: 100%; max-width: 32rem; border: 2px dashed var(--edge);
@@ -91,6 +102,10 @@ iframe.report { border: 1px solid var(--line); border-radius: 6px; width: 100%;
 .compared td:nth-child(2) { color: var(--soft); width: auto; }
 .compared .differs { background: var(--differs); }
 .compared .differs td { font-weight: 600; }
+@media (max-width: 600px) {
+  .compared { font-size: .8rem; }
+  .compared td, .compared th { padding-inline: .3em; }
+}
 .diff { background: var(--paper); border: 1px solid var(--line);
   border-radius: 6px; width: 100%; margin: 0; padding: .6em 0; overflow: auto;
   max-height: 36rem; font-size: .8rem; }

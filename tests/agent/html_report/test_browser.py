@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from selenium.webdriver.common.by import By
@@ -21,6 +22,16 @@ for (let i = 0; i < width * height; i++) {
   if (near) { count++; x = Math.max(x, i % width); y += Math.floor(i / width); }
 }
 return [x / width, y / count / height];
+"""
+# Tables of episodes that must be scrolled, and controls outside of their section.
+CUT = """
+const tables = [...document.querySelectorAll(".scroll:has(> .episodes)")];
+const controls = [...document.querySelectorAll(".player :is(select, input, button)")];
+const end = (part) => part.getBoundingClientRect().right;
+return [
+  ...tables.filter((part) => part.scrollWidth > part.clientWidth),
+  ...controls.filter((part) => end(part) > end(part.closest("section")) - 20),
+].map((part) => part.outerHTML);
 """
 PICTURE = "return document.querySelector(arguments[0] + ' canvas').toDataURL()"
 
@@ -77,6 +88,33 @@ def test_it_fits(opened):
     size = "return parseFloat(getComputedStyle(arguments[0]).fontSize)"
     for selector in ("p", "td", "pre.code", "button", ".diagnosis", ".message"):
         assert opened.execute_script(size, find(opened, selector)) >= 12
+
+
+@pytest.mark.slow_after(1)
+def test_tables_of_episodes_are_wholly_in_sight(opened):
+    """On a screen none has to be scrolled, and no control leaves its section."""
+    for part in opened.find_elements(By.CSS_SELECTOR, "details"):
+        opened.execute_script("arguments[0].open = true", part)
+    for width in (1024, 1196, 1440):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        opened.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        assert opened.execute_script(CUT) == []
+
+
+@pytest.mark.slow_after(1)
+def test_charts_are_dark_where_the_page_is(opened):
+    """Their white would be the brightest part of the page."""
+    lightness = {}
+    for scheme in ("light", "dark"):
+        about = [{"name": "prefers-color-scheme", "value": scheme}]
+        opened.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": about})
+        chart = find(opened, ".charts img")
+        opened.execute_script("arguments[0].scrollIntoView({block: 'center'})", chart)
+        shown = cv2.imdecode(np.frombuffer(chart.screenshot_as_png, np.uint8), 0)
+        lightness[scheme] = np.median(shown)
+    opened.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert lightness["light"] == 255
+    assert lightness["dark"] < 60
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ PAGES = {
     "unknown": "/nothing/here",
     "missing": "/run?at=runs/none",
 }
+COLOUR = "return getComputedStyle(document.body).backgroundColor"
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +103,26 @@ def test_an_address_without_a_page_leads_back(browser, filled):
         )
     )  # fmt: skip
     assert "Nothing is at /nothing/here" in browser.page_source
+
+
+@pytest.mark.parametrize("kind", ["run", "campaign", "bench"])
+def test_what_is_missing_leads_to_its_list(browser, filled, kind):
+    """In words that exist."""
+    browser.get(filled.address)
+    WebDriverWait(browser, SECONDS).until(lambda b: "token" not in b.current_url)
+    browser.get(f"{filled.base}/{kind}?at=none")
+    shown = {"bench": "All benches"}.get(kind, "All runs")
+    WebDriverWait(browser, SECONDS).until(lambda b: b.find_elements("link text", shown))
+
+
+def test_a_dark_page_is_never_white(window, filled):
+    """Not before its scripts have run, either."""
+    window.get(filled.address)
+    WebDriverWait(window, SECONDS).until(lambda b: "token" not in b.current_url)
+    settled(window)
+    before = window.execute_script(COLOUR)
+    window.execute_script("document.body.classList.remove('body--dark', 'body--light')")
+    assert window.execute_script(COLOUR) == before
 
 
 @pytest.mark.slow
