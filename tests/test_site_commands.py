@@ -90,6 +90,7 @@ PREPARED = {
     "depot-1": "tdac synth --map depot.yaml --start 0 2 --goal 6 3 "
     "--robot turtlebot3-burger",
     r"drive\.mcap": "tdac play runs/depot-1 --mcap drive.mcap",
+    r"sim\.mcap": "tdac play runs/depot-1 --mcap sim.mcap",
     "unknown-1": "tdac synth --set unknown --episodes 8",
     "mine theirs": "tdac bench go-to-goal --set unknown -n 2 --out mine",
     "theirs": "tdac bench other.py --set unknown -n 2 --out theirs",
