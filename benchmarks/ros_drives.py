@@ -1,6 +1,6 @@
 """Drives an exported ROS 2 package many times over DDS, with faults and under load.
 
-    python -m benchmarks.ros_drives runs/depot-1 depot_package --drives 200 --real 20
+    python -m benchmarks.ros_drives runs/depot-1 depot_drive --drives 200 --real 20
 
 Each drive with faults draws two of the robot and its sensors, and one of the node:
 none, killed and started again, frozen for a second, or ended and started again.

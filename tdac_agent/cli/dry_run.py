@@ -68,6 +68,7 @@ def dry_run(
     console = Console(stderr=True, highlight=False)
     unbounded = _unbounded(forecast) if options.base_url is None else []
     estimates = _estimates(forecast, race=race)
+    estimates += _prices(forecast, elsewhere=options.base_url is not None)
     for line in [*estimates, *_still_needed([*missing, *unbounded])]:
         print_sentences(console, line)
     return 0
@@ -98,7 +99,7 @@ def _estimates(forecast: CostForecast, *, race: bool) -> list[str]:
             f": at most {format_usd(forecast.cost_once)}, or "
             f"{format_usd(forecast.cost_most)} if each question is asked three times"
         )
-    return [*lines, whole, *_budget(forecast), *_prices(forecast)]
+    return [*lines, whole, *_budget(forecast)]
 
 
 def _budget(forecast: CostForecast) -> list[str]:
@@ -129,19 +130,29 @@ def _unbounded(forecast: CostForecast) -> list[str]:
     ]
 
 
-def _prices(forecast: CostForecast) -> list[str]:
-    """The source of the prices, and the models without one."""
+def _prices(forecast: CostForecast, *, elsewhere: bool) -> list[str]:
+    """The source of the prices, and the models without one.
+
+    Args:
+        forecast: The forecast.
+        elsewhere: Whether another server answers, to which no listed price applies.
+    """
+    if forecast.cost_most == 0.0:
+        return []
     lines = []
     if forecast.uncounted:
         names = " and ".join(forecast.uncounted)
         lines.append(f"cost of {names}: not counted; tdac cannot know it")
     if forecast.unknown_prices:
         names = " and ".join(forecast.unknown_prices)
-        lines.append(
-            f"price of {names}: unknown; to see the cost, add it to a copy of "
-            f"{SHIPPED} at ~/.config/tdac/prices.yaml (or at the path in $TDAC_PRICES)"
+        way = (
+            f"to see the cost, add it to a copy of {SHIPPED} at "
+            "~/.config/tdac/prices.yaml (or at the path in $TDAC_PRICES)"
         )
-    if forecast.unknown_prices or forecast.first_cost is not None:
+        if elsewhere:
+            way = "listed prices do not apply to the server of --base-url"
+        lines.append(f"price of {names}: unknown; {way}")
+    if forecast.first_cost is not None or (forecast.unknown_prices and not elsewhere):
         lines.append(f"prices of {forecast.prices_dated}: {price_file()}")
     return lines
 

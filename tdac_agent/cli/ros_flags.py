@@ -151,7 +151,7 @@ class DriveOptions:
     as_json: bool = json_option()
 
 
-@ros_app.command("drive", epilog="Example: `tdac ros drive depot_package`")
+@ros_app.command("drive", epilog="Example: `tdac ros drive depot_drive`")
 @typed_options("ros:drive")
 def drive(options: DriveOptions) -> None:
     """Drive a package of `tdac export ros2` over DDS, as its ROS node would.

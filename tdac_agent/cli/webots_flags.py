@@ -127,7 +127,7 @@ class ExportRos2Options:
 
 
 @export_app.command(
-    "ros2", epilog="Example: `tdac export ros2 runs/depot-1 --out depot_package`"
+    "ros2", epilog="Example: `tdac export ros2 runs/depot-1 --out depot_drive`"
 )
 @typed_options("export:run_ros2")
 def export_ros2(options: ExportRos2Options) -> None:

@@ -122,8 +122,8 @@ def settings_of(task: Task) -> dict[str, Any]:
     if setting.view is None:
         raise TaskError(
             f"{task.name} is a task in pixels, which is not for ROS 2: robots "
-            "drive in metres; synthesize again on a map with a resolution (map.yaml), "
-            "with --metres"
+            "drive in metres; synthesize again on a map with a resolution (map.yaml) "
+            "without --frame pixels, or with frame: metres in task.yaml"
         )
     grid = setting.nominal.terrain.grid
     written, ends = setting.portable()["robot"], setting.ends()

@@ -138,6 +138,18 @@ def test_a_dry_run_with_models_of_ones_own(tmp_path, tdac):
         assert list(Path().iterdir()) == []
 
 
+def test_a_dry_run_with_a_server_of_ones_own(tmp_path, tdac):
+    """No price file can say what it costs, so none is suggested."""
+    folder = write_small_task(tmp_path / "task")
+    words = ("synth", "--task", folder, "--dry-run", "--learner", "openai:mine")
+    code, _, told = tdac(*words, "--base-url", "http://localhost:1/v1")
+    assert code == 0
+    assert "listed prices do not apply to the server of --base-url" in told
+    assert "prices.yaml" not in told
+    told = tdac(*words, "--max-tokens", 10**6)[2]
+    assert "to see the cost, add it to a copy of" in told
+
+
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
