@@ -33,7 +33,7 @@ exclude_patterns = [".*", "build", "runs", "node_modules"]
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 html_theme, html_title = "furo", "tdac"
 html_extra_path = ["site"]
-html_static_path, html_css_files = ["static"], ["dark.css"]
+html_static_path, html_css_files = ["static"], ["pictures.css"]
 # Notebooks are kept with their outputs: `make notebooks` executes them.
 nb_execution_mode = "off"
 nb_merge_streams = True
