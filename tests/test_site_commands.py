@@ -171,6 +171,8 @@ def prepare(line, folder):
     if "LegoTallWall" in line:  # a node that is not modelled
         world = folder / "my.wbt"
         world.write_text(world.read_text() + "LegoTallWall {\n}\n")
+    if "export ros2" in line:  # several pages write the same package
+        shutil.rmtree(folder / "depot_drive", ignore_errors=True)
     for pattern, first in PREPARED.items():
         if re.search(pattern, line):
             run_once(first, folder)
