@@ -20,7 +20,7 @@ from tdac_agent.storage.links import refuse_links
 from tdac_agent.tasks.installation import seed_of
 from tdac_agent.tasks.provenance import origin, versions
 from tdac_agent.tasks.task import Task, display_name, lay_out
-from tdac_agent.tasks.task_file import Profile
+from tdac_agent.tasks.task_file import Profile, check_frame
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.diagnosis.report import (
     OWN,
@@ -91,7 +91,8 @@ def verify(
 
     Raises:
         ControllerFileError: The file cannot be read.
-        TaskError: The other physics is not installed, or cannot drive on this task.
+        TaskError: The other physics is not installed, or cannot drive on this task; or
+            the task is in metres, which the profile `paper` does not know.
         Fault: The sandbox or the suite is broken; this is neither pass nor fail.
         RunError: A link leads out of `out`, where the results are written.
     """
@@ -99,6 +100,7 @@ def verify(
     if out is not None:
         refuse_links(out, *WRITTEN)
     source = read_source(controller)
+    check_frame(task.spec.frame, profile or task.spec.profile)
     check_physics(task, physics)
     suites = _suites(task, suite, shipped)
     with contextlib.ExitStack() as stack:

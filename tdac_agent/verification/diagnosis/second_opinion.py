@@ -17,8 +17,8 @@ TEST = "second_opinion[{}]"
 def opinion_text(opinion: SecondOpinion, units: Units) -> str:
     """The opinion in one line.
 
-    Such as `second opinion (MuJoCo 4.0): 6 of 6 arrive; smallest gap 19.6 mm here, 19.5
-    mm there`.
+    Such as `second opinion (MuJoCo 4.0): 6 of 6 arrive; smallest gap 19.6 mm with the
+    exact step, 19.5 mm with MuJoCo`.
     """
     name, _, version = opinion.engine.partition(" ")
     about = f"{name} {'.'.join(version.split('.')[:2])}"
@@ -35,8 +35,8 @@ def opinion_text(opinion: SecondOpinion, units: Units) -> str:
         )
     )
     if here is not None and there is not None:
-        text += f"; smallest gap {gap_figure(here, units)} here, "
-        text += f"{gap_figure(there, units)} there"
+        text += f"; smallest gap {gap_figure(here, units)} with the exact step, "
+        text += f"{gap_figure(there, units)} with {name}"
     return text
 
 

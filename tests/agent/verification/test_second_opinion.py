@@ -83,7 +83,7 @@ def test_the_line_has_arrivals_and_both_gaps(crates):
     )
     assert opinion_text(opinion, crates.setting.shown) == (
         "second opinion (MuJoCo 4.0): 1 of 2 arrive (jitter 1: collision in step 7); "
-        "smallest gap 20.1 mm here, 0 mm there"
+        "smallest gap 20.1 mm with the exact step, 0 mm with MuJoCo"
     )
 
 
