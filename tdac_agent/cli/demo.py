@@ -46,6 +46,7 @@ def run(out: Path | None, as_json: bool) -> int:
         patience=recorded.patience,
         seed=recorded.seed,
         prompt=str(prompt),
+        confirm=False,  # half a minute is enough for a first look
     )
     folder = out or next_folder("demo")
     code = write(problem_of(task), folder, options, console)
