@@ -52,7 +52,7 @@ def test_a_map_without_metres_is_scaled_and_says_so(good, done):
     line = said.splitlines()[-1]
     assert line.startswith("second opinion (MuJoCo ")
     assert ", with a body radius of 0.1 m): 1 of 1 arrive; smallest gap " in line
-    assert " px here, " in line
+    assert " px with the exact step, " in line
     report = json.loads(Path("out/report.json").read_text())
     assert report["second_opinion"]["scaled"] is True
     assert report["tests"]["second_opinion[mujoco]"] == "passed"
