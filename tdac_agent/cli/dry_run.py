@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.omitted_facts import check_omitted
@@ -40,6 +41,7 @@ def dry_run(
     check_omitted(options, typed, on_set=problem.has_hidden)
     options = settled(options, on_set=problem.has_hidden)
     template = load_template(options.prompt)
+    base_url = _server_of(names, options.base_url)
     server = Options(problem.setting, options.base_url, options.key_over_http)
     missing = [line for each in names for line in missing_for_name(each, server)]
     episodes = options.episodes if problem.has_hidden else None
@@ -55,7 +57,7 @@ def dry_run(
         ask=options.ask if race else "",
         refine=options.refine,
         variations=0 if race else shares(episodes, options.improve).asked,
-        base_url=options.base_url,
+        base_url=base_url,
         max_output=options.max_output,
         max_cost=options.max_cost,
         max_tokens=options.max_tokens,
@@ -66,12 +68,19 @@ def dry_run(
     sys.stdout.write(forecast.prompt)
     sys.stdout.flush()
     console = Console(stderr=True, highlight=False)
-    unbounded = _unbounded(forecast) if options.base_url is None else []
+    unbounded = _unbounded(forecast) if base_url is None else []
     estimates = _estimates(forecast, race=race)
-    estimates += _prices(forecast, elsewhere=options.base_url is not None)
+    estimates += _prices(forecast, elsewhere=base_url is not None)
     for line in [*estimates, *_still_needed([*missing, *unbounded])]:
         print_sentences(console, line)
     return 0
+
+
+def _server_of(names: Sequence[str], base_url: str | None) -> str | None:
+    """The server that answers for all of the models; None for the vendors' own."""
+    vendors = [vendor for name in names if (vendor := vendor_of(name)) is not None]
+    urls = {base_url or os.environ.get(vendor.base_url) or None for vendor in vendors}
+    return urls.pop() if len(urls) == 1 else base_url
 
 
 def _estimates(forecast: CostForecast, *, race: bool) -> list[str]:
@@ -150,7 +159,7 @@ def _prices(forecast: CostForecast, *, elsewhere: bool) -> list[str]:
             "~/.config/tdac/prices.yaml (or at the path in $TDAC_PRICES)"
         )
         if elsewhere:
-            way = "listed prices do not apply to the server of --base-url"
+            way = "listed prices do not apply to a server of your own"
         lines.append(f"price of {names}: unknown; {way}")
     if forecast.first_cost is not None or (forecast.unknown_prices and not elsewhere):
         lines.append(f"prices of {forecast.prices_dated}: {price_file()}")

@@ -98,7 +98,7 @@ def _card(
         end = (float(places[-1, 0]), float(places[-1, 1]))
         contact = drive["contact"] and tuple(drive["contact"])
     changed = changed_in(one) if number else ""
-    told = told_of(one.report, drive and drive["dt"])
+    told = told_of(one.report, None if drive is None else drive["dt"])
     return Card(one, number + 1, told, line, end, contact, changed, skipped)
 
 

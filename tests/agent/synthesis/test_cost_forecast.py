@@ -138,14 +138,19 @@ def test_a_dry_run_with_models_of_ones_own(tmp_path, tdac):
         assert list(Path().iterdir()) == []
 
 
-def test_a_dry_run_with_a_server_of_ones_own(tmp_path, tdac):
+@pytest.mark.parametrize("by", ["flag", "variable"])
+def test_a_dry_run_with_a_server_of_ones_own(tmp_path, tdac, monkeypatch, by):
     """No price file can say what it costs, so none is suggested."""
     folder = write_small_task(tmp_path / "task")
     words = ("synth", "--task", folder, "--dry-run", "--learner", "openai:mine")
-    code, _, told = tdac(*words, "--base-url", "http://localhost:1/v1")
+    url = "http://localhost:1/v1"
+    if by == "variable":
+        monkeypatch.setenv("OPENAI_BASE_URL", url)
+    code, _, told = tdac(*words, *(["--base-url", url] if by == "flag" else []))
     assert code == 0
-    assert "listed prices do not apply to the server of --base-url" in told
+    assert "listed prices do not apply to a server of your own" in told
     assert "prices.yaml" not in told
+    monkeypatch.delenv("OPENAI_BASE_URL", raising=False)
     told = tdac(*words, "--max-tokens", 10**6)[2]
     assert "to see the cost, add it to a copy of" in told
 
