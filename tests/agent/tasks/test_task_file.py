@@ -26,7 +26,7 @@ def test_each_key_has_a_row():
 def test_the_examples_are_task_files():
     """Each block of YAML is accepted."""
     blocks = re.findall(r"```yaml\n(.*?)```", MANUAL.read_text("utf-8"), re.DOTALL)
-    assert len(blocks) == 2
+    assert len(blocks) == 4
     for block in blocks:
         checked(parse_yaml(block.encode()), "docs/tasks.md")
 
