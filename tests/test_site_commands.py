@@ -85,7 +85,7 @@ iterations: 2
 """
 PREPARED = {
     r"maze-1\b(?<!ppo-maze-1)": "tdac synth",
-    r"runs( |$)|office-1": "tdac synth --task office",
+    r"runs( |$)|office": "tdac synth --task office",
     "epuck-1": "tdac synth --task epuck",
     "depot-1": "tdac synth --map depot.yaml --start 0 2 --goal 6 3 "
     "--robot turtlebot3-burger",
