@@ -63,7 +63,7 @@ class BenchOptions:
     )
     out: Path | None = out_option(
         "Folder for the results; after an interruption, the same command drives only "
-        "what is missing.  [default: bench-1, …]"
+        "what is missing.  [default: runs/bench-1, …]"
     )
     salt_file: Path | None = option(
         None,
@@ -119,7 +119,7 @@ class ShowOptions:
 
 @bench_app.command(
     "show",
-    epilog="Examples: `tdac bench show bench-1`; "
+    epilog="Examples: `tdac bench show runs/bench-1`; "
     "`tdac bench show mine theirs --out both`",
 )
 @typed_options("bench:show_folders")
@@ -136,7 +136,7 @@ class RevealOptions:
 
 
 @bench_app.command(
-    "reveal", epilog="Example: `tdac bench reveal bench-1 --salt-file my.hex`"
+    "reveal", epilog="Example: `tdac bench reveal runs/bench-1 --salt-file my.hex`"
 )
 @typed_options("bench:reveal")
 def reveal_command(options: RevealOptions) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tdac_agent.html_report import make_page
 from tdac_agent.html_report.terms import PLACE, TERMS, explain_terms
-from tdac_agent.runs.replay import DEMO
+from tdac_agent.runs.replay import DEMO, RULES
 
 GLOSSARY = Path(__file__).parents[3] / "docs" / "glossary.md"
 ENTRY = re.compile(r"^### (.+?)\n(.*?)(?=^##|\Z)", re.MULTILINE | re.DOTALL)
@@ -60,3 +60,11 @@ def test_a_report_explains_its_terms():
     assert {"candidate", "episode", "k"} <= {each.lower().rstrip("s") for each in found}
     listed = re.findall(r"<dt>(.*?)</dt>", html.partition("Terms on this page")[2])
     assert len(listed) == len(found)
+
+
+def test_green_is_for_verified_alone():
+    """A candidate of the timeline that only passed has another colour."""
+    verified, passed = (make_page(run).html.decode() for run in (DEMO, RULES))
+    assert 'class="cell verified"' in verified
+    assert 'class="cell passed"' in passed
+    assert 'class="cell verified"' not in passed

@@ -26,7 +26,7 @@ from tdac_agent.cli.task_choice import chosen_task
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.models.budget import Enough
 from tdac_agent.runs.ownership import sign
-from tdac_agent.runs.replay import DEMO
+from tdac_agent.runs.replay import DEMO, RULES
 from tdac_agent.runs.run_record import load_run
 from tdac_agent.storage.journal import append_record
 from tdac_agent.studio.comparison import (
@@ -338,7 +338,7 @@ def test_a_run_from_elsewhere_is_marked():
 
 def test_a_run_from_elsewhere_always_asks(tmp_path):
     """Also one that wants nothing special; the limit that it suggests is named."""
-    plain = load_run(DEMO).model_copy(
+    plain = load_run(RULES).model_copy(
         update={"learner": "builtin", "optimizer": "builtin", "seed": None}
         | {"folder": tmp_path}
     )
