@@ -33,7 +33,8 @@ LEFT_OUT = {
     "needs a person": re.compile("manual:"),
     "needs the results of a clone": re.compile("results/"),
     "needs a second process": re.compile("tdac ros "),
-    "needs a display": re.compile(r"^tdac play (?!.*--(video|mcap))|studio --open"),
+    "needs the gallery's answers": re.compile("answers/"),
+    "needs a display": re.compile("studio --open"),
 }
 NEEDS = {
     "stable_baselines3": re.compile(r"tdac train|\.zip"),
@@ -118,6 +119,8 @@ def runs_here(line):
 def run(line, folder, patience):
     """Exit code and output of a command, interrupted when patience is over."""
     words = [Path(sys.executable).with_name("tdac")]
+    if re.match(r"tdac play (?!.*--(video|mcap))", line):
+        line = f"{line.partition('#')[0]} --video window.mp4"  # there is no screen
     process = subprocess.Popen(
         [*words, *shlex.split(line, comments=True)[1:]], cwd=folder, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
@@ -184,9 +187,9 @@ def prepare(line, folder):
 
 
 def test_what_is_left_out():
-    """Few commands are: most of them open a window or need a key."""
+    """Few commands are, and most of them for want of a key."""
     left_out = [line for _, line in CASES if not runs_here(line)]
-    assert len(left_out) < len(CASES) / 3
+    assert len(left_out) < len(CASES) / 4
 
 
 LINES = [(page, line) for page, line in CASES if runs_here(line)]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import webbrowser
 from pathlib import Path
 
 from tdac_agent.cli import report
 from tdac_agent.cli.console import Console
+from tdac_agent.cli.display import has_display
 from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.synth import write
 from tdac_agent.html_report.story import changed_in, told_of
@@ -78,7 +78,5 @@ def _tell(folder: Path, console: Console) -> None:
 
 def _open(page: Path) -> None:
     """Opens a page in the browser, if a person with a screen sees this terminal."""
-    screens = "DISPLAY", "WAYLAND_DISPLAY"
-    shown = sys.platform == "darwin" or any(map(os.environ.get, screens))
-    if sys.stdout.isatty() and shown:
+    if sys.stdout.isatty() and has_display():
         webbrowser.open(page.resolve().as_uri())

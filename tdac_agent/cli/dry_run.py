@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Collection, Sequence
 
@@ -79,7 +78,7 @@ def dry_run(
 def _server_of(names: Sequence[str], base_url: str | None) -> str | None:
     """The server that answers for all of the models; None for the vendors' own."""
     vendors = [vendor for name in names if (vendor := vendor_of(name)) is not None]
-    urls = {base_url or os.environ.get(vendor.base_url) or None for vendor in vendors}
+    urls = {vendor.server(base_url) for vendor in vendors}
     return urls.pop() if len(urls) == 1 else base_url
 
 

@@ -114,7 +114,7 @@ def write(
     """
     before = existing_run(folder)
     heading = _heading(problem, options.learner, options.optimizer)
-    on_set, told = problem.tasks is not None, teller(folder, problem)
+    on_set, told = problem.tasks is not None, _teller(folder, problem)
     try:
         with SynthProgress(console, heading, on_set=on_set, told=told) as progress:
             result = synthesize(
@@ -126,7 +126,7 @@ def write(
     return _show(result, console, before=before)
 
 
-def teller(folder: Path, problem: Problem) -> Callable[[int, int], str] | None:
+def _teller(folder: Path, problem: Problem) -> Callable[[int, int], str] | None:
     """Tells from a run's folder how a candidate failed on a task."""
     if problem.task is None:
         return None

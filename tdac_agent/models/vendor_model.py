@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import os
 from abc import ABC, abstractmethod
 from pkgutil import resolve_name
 from typing import Any, ClassVar, Generic, TypeVar
@@ -139,5 +138,5 @@ def make_model(vendor: Vendor, words: str, options: Options) -> VendorModel[Any]
         example = f"{vendor.name}:{vendor.example}"
         raise ProviderError(f"{vendor.name}: needs a model, as in {example}")
     model: type[VendorModel[Any]] = resolve_name(vendor.api.model)
-    base_url = options.base_url or os.environ.get(vendor.base_url) or None
+    base_url = vendor.server(options.base_url)
     return model(words, base_url, vendor=vendor, key_over_http=options.key_over_http)

@@ -11,6 +11,7 @@ listed there is refused without `--max-tokens`.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 
 
@@ -61,6 +62,13 @@ class Vendor:
     def base_url(self) -> str:
         """Environment variable of another server's URL."""
         return f"{self._variable}_BASE_URL"
+
+    def server(self, base_url: str | None) -> str | None:
+        """The server that answers: the given one, or that of `base_url`'s variable.
+
+        None for the vendor's own.
+        """
+        return base_url or os.environ.get(self.base_url) or None
 
     @property
     def _variable(self) -> str:

@@ -28,6 +28,7 @@ def test_the_demo_is_the_recorded_run_with_live_tests(done):
     assert (run["tau"], run["tokens_out"]) == (recorded.tau, 0)
     assert fates(run["attempts"]) == fates(recorded.attempts)
     again = Path("runs/demo-1")
+    assert (again / "controller.py").is_file()
     replies = [r for r in read_records(again / "journal.jsonl") if "blob" in r]
     assert [reply["kind"] for reply in replies] == ["generate", "edit"]
     for reply in replies:
