@@ -57,7 +57,7 @@ ENVELOPE = 64
 """Most episodes of each search of the arm `with`, in two worlds of the pool."""
 WORLDS = 100
 """Hidden worlds on which a delivered controller drives."""
-FAR = SearchPlan(episodes=256, split="test")
+FAR = SearchPlan(episodes=128, split="test", worlds=2)
 """The search that measures how far a delivered controller carries."""
 SCORES = "scores.csv"
 OUTCOME, SHARE, NORM = "time_score", "success", "norm"
