@@ -487,6 +487,7 @@ def test_the_page_in_a_browser(browser, warm, tmp_path, level, files):
     assert browser.get_log("browser") == []
 
 
+@pytest.mark.slow
 def test_tasks_beside_sets(warm, tmp_path, files, level, small_task):
     """Programs and planners drive on both, and are compared over all of them."""
     out = tmp_path / "out"

@@ -60,6 +60,7 @@ async def submissions(agent):
     return result.structured_content
 
 
+@pytest.mark.slow
 def test_a_request_is_not_kept_waiting_for_what_was_left(
     serve, small_task, out, monkeypatch
 ):

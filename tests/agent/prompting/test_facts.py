@@ -17,8 +17,8 @@ from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import set_names
 
 # Worlds of BARN take seconds to read; the second set has the same ones.
-SLOW = pytest.param("barn-slow", marks=pytest.mark.slow)
-SETS = (*set_names(), "barn", SLOW)
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("barn", "barn-slow")]
+SETS = (*set_names(), *SLOW)
 UNIT = (
     r"\bpx\b|\d m\b|\bm\b/s|\bmm\b|\bin m\b|[Pp]ixel|\brad\b|\bradian|\bmet(re|er)s?\b"
 )

@@ -18,10 +18,10 @@ from tdac_envs import load_set
 from tdac_envs.ladder.set_file import set_names
 from tdac_envs.ladder.shown import in_shown_units
 
-SLOW = pytest.param("barn-slow", marks=pytest.mark.slow)
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("barn", "barn-slow")]
 
 
-@pytest.mark.parametrize("name", [*set_names(), "barn", SLOW])
+@pytest.mark.parametrize("name", [*set_names(), *SLOW])
 def test_a_prompt_has_all_of_its_level(name):
     """The table of observations is that of the environment, and so are the limits."""
     tasks = load_set(name)

@@ -130,6 +130,7 @@ def test_a_simulation_says_what_it_waits_for(task, settings, domain):
     assert lost.endswith("waits for another node if its own has ended; Ctrl-C ends it")
 
 
+@pytest.mark.slow
 def test_the_command_says_it_on_stderr(run, domain):
     """Beside --json, too, whose output stays that of a record."""
     command = [sys.executable, "-m", "tdac_agent", "ros", "sim", str(run), "--json"]
@@ -548,7 +549,7 @@ def test_a_latched_stop_ends_the_drive(task, settings, package, domain):
     assert robot.stands
 
 
-@pytest.mark.slow_after(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("recovers", [False, True])
 def test_a_robot_that_has_gone(task, settings, package, domain, recovers):
     """In real time, a node whose robot has gone ends by itself."""

@@ -86,6 +86,7 @@ def becomes(browser, name, value):
     WebDriverWait(browser, SECONDS, 0.1).until(lambda b: number(b, name) == value)
 
 
+@pytest.mark.slow
 def test_places_are_set_by_keys_alone(browser, studio, plan):
     """Tab reaches the map; the page neither scrolls nor loses the browser's keys."""
     (studio.place / "keys.png").write_bytes(plan.read_bytes())

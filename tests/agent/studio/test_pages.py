@@ -382,6 +382,7 @@ def test_a_controller_for_a_set_of_worlds(page, studio):
     says(page, "Only hidden worlds, which nobody has seen, can verify it.")
 
 
+@pytest.mark.slow
 def test_a_campaign_is_a_card_with_its_runs_folded(page, studio):
     """What is not verified comes first; on 1024 px nothing scrolls sideways."""
     campaign = studio.place / "campaigns" / "folded"
@@ -428,6 +429,7 @@ def test_a_campaign_is_a_card_with_its_runs_folded(page, studio):
     resize(page, "desktop")
 
 
+@pytest.mark.slow
 def test_pages_without_anything_say_what_to_do(browser, tmp_path):
     """An empty folder: a sentence on each page, with a link or a command."""
     with running_studio(tmp_path) as empty:

@@ -93,6 +93,7 @@ def test_statistics_and_stacked_frames_go_with_it(level, tmp_path, warm):
     assert rows == driven(model, make, 4)
 
 
+@pytest.mark.slow
 def test_a_policy_of_single_environments(level, tmp_path, warm):
     """Wrappers are found by their classes; observations in a Dict, with statistics."""
     from stable_baselines3.common.monitor import Monitor

@@ -11,7 +11,7 @@ from tdac_agent import load_task, verify
 from tdac_envs.core.errors import TaskError
 from tdac_envs.worlds.bundled import world_file
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs/own-controllers.md").read_text("utf-8")
 FIRST = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1]
 PLANNER = (ROOT / "examples/plan_and_follow.py").read_text("utf-8")
@@ -46,25 +46,27 @@ def folder(tmp_path):
 
 
 @pytest.mark.parametrize("frame", TASKS)
-def test_the_controller_of_the_page_turns_to_the_right_side(frame, folder):
+def test_the_controller_of_the_page_turns_to_the_right_side(frame, folder, warm):
     """In pixels, in metres and in a world, from all starts of the suite."""
-    report = verify(FIRST, load_task(folder / f"{frame}.yaml"))
+    report = verify(FIRST, load_task(folder / f"{frame}.yaml"), judge=warm)
     assert report.passed, report
 
 
-@pytest.mark.parametrize("frame", ["pixels", "metres", "turned"])
-def test_the_example_plans_around_a_wall(frame, folder):
+@pytest.mark.slow_after(1)
+@pytest.mark.parametrize("frame", ["metres", "pixels", "turned"])
+def test_the_example_plans_around_a_wall(frame, folder, warm):
     """The controller of the page touches the wall, and the example does not."""
     (folder / "wall.png").replace(folder / "room.png")
     task = load_task(folder / f"{frame}.yaml")
-    assert not verify(FIRST, task).passed
-    report = verify(PLANNER, task)
+    assert not verify(FIRST, task, judge=warm).passed
+    report = verify(PLANNER, task, judge=warm)
     assert report.passed, report
 
 
-def test_the_example_on_a_bundled_map():
+def test_the_example_on_a_bundled_map(warm):
     """As its own text says."""
-    assert verify(PLANNER, load_task("clutter"), profile="policy").passed
+    report = verify(PLANNER, load_task("clutter"), profile="policy", judge=warm)
+    assert report.passed, report
 
 
 def test_no_profile_of_the_paper_in_metres(folder):
