@@ -11,8 +11,9 @@ library takes the object, or its fields as keywords.
 from __future__ import annotations
 
 import dataclasses
+import sys
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args, get_origin
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,3 +68,71 @@ def option(default: Any, help: str, *names: str, **look: Any) -> Any:  # noqa: A
 def flag_of(field: dataclasses.Field[Any]) -> Flag | None:
     """How the command line shows a field; None if it has no flag."""
     return field.metadata.get("flag")
+
+
+def flag_name(field: dataclasses.Field[Any]) -> str:
+    """The flag of a field, as in `--robot-radius`; the first if it has several."""
+    flag = flag_of(field)
+    if flag is not None and flag.argument:
+        return flag.metavar or field.name.upper()
+    names = flag.names if flag else ()
+    first = names[0].partition("/")[0] if names else ""
+    return first or f"--{field.name.replace('_', '-')}"
+
+
+def flags_of(kind: Any) -> dict[str, tuple[dataclasses.Field[Any], Flag, Any]]:
+    """The fields of a dataclass that have flags, with these and their types."""
+    flags = {}
+    for field in dataclasses.fields(kind):
+        flag = flag_of(field)
+        if flag is not None:
+            flags[field.name] = field, flag, flag.type or _type_of(kind, field.name)
+    return flags
+
+
+def _type_of(kind: Any, name: str) -> Any:
+    """The type of a field; types of others need not be imported."""
+    for owner in kind.__mro__:
+        hint = vars(owner).get("__annotations__", {}).get(name)
+        if hint is not None:
+            module = vars(sys.modules[owner.__module__])
+            return eval(hint, module) if isinstance(hint, str) else hint
+    raise TypeError(f"{kind.__name__} has no field {name}")
+
+
+def item_of(hint: Any) -> Any:
+    """The type of an item if a value is a tuple of any length, else None."""
+    for each in (hint, *get_args(hint)):
+        if get_origin(each) is tuple and get_args(each)[-1] is ...:
+            return get_args(each)[0]
+    return None
+
+
+def typed_fields(options: Any) -> list[dataclasses.Field[Any]]:
+    """The fields with flags whose values are not the defaults."""
+    fields = [each for each in dataclasses.fields(options) if flag_of(each)]
+    return [each for each in fields if getattr(options, each.name) != each.default]
+
+
+def words_of(options: Any) -> list[str]:
+    """The command line words that repeat the values, without defaults."""
+    words: list[str] = []
+    for field, flag, hint in flags_of(type(options)).values():
+        value = getattr(options, field.name)
+        if value == field.default or flag.argument:
+            continue
+        if isinstance(value, bool):
+            words.append(flag_name(field) if value else flag.names[0].split("/")[1])
+        elif item_of(hint) is not None:
+            words += [
+                word for each in value for word in (flag_name(field), _word(each))
+            ]
+        else:
+            values = value if isinstance(value, tuple) else (value,)
+            words += [flag_name(field), *map(_word, values)]
+    return words
+
+
+def _word(value: object) -> str:
+    """A value as typed on a command line; a number keeps all its digits."""
+    return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)

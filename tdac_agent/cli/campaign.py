@@ -35,13 +35,13 @@ from tdac_agent.cli.campaign_live import LiveView
 from tdac_agent.cli.campaign_table import make_console, progress_line
 from tdac_agent.cli.console import Console, print_json
 from tdac_agent.cli.sentences import print_plain, print_sentences
-from tdac_agent.cli.typed_options import words_of
 from tdac_agent.executors.local import executor_of
 from tdac_agent.models.choice import choose_models
 from tdac_agent.models.lifecycle import model_warnings
 from tdac_agent.models.provider import Provider
 from tdac_agent.models.ready import check_ready, check_servers
 from tdac_agent.models.tariff import bounds_of, tariffs_of
+from tdac_agent.option_fields import words_of
 from tdac_envs.core.intake import TEXT_BYTES, read_file
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from tdac_agent.cli.task_changes import changed_task
 from tdac_agent.cli.task_choice import NAMING, chosen_task, with_named_file
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import words_of
 from tdac_agent.errors import ControllerFileError
+from tdac_agent.option_fields import words_of
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.tasks.task import Task
 from tdac_agent.tasks.task_file import SET_FILE, TASK_FILE

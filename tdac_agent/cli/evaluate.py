@@ -21,7 +21,6 @@ from tdac_agent.cli.task_choice import (
     with_named_file,
 )
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import flag_name, typed_fields
 from tdac_agent.errors import ControllerFileError, Fault
 from tdac_agent.evaluation.evaluate import (
     EPISODES,
@@ -32,6 +31,7 @@ from tdac_agent.evaluation.evaluate import (
 )
 from tdac_agent.evaluation.evaluation_report import Evaluation
 from tdac_agent.evaluation.policies import entrants_of
+from tdac_agent.option_fields import flag_name, typed_fields
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.warm import WarmJudge

@@ -12,7 +12,6 @@ from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.spinner import Spinner
 from tdac_agent.cli.task_choice import check_tier, chosen
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import typed_fields
 from tdac_agent.cli.webots_flags import (
     ExportHarborOptions,
     ExportRos2Options,
@@ -20,6 +19,7 @@ from tdac_agent.cli.webots_flags import (
 )
 from tdac_agent.environments.epuck.export import SPARE, Project, export_webots
 from tdac_agent.harbor.folder import WORLDS, export_set, export_task
+from tdac_agent.option_fields import typed_fields
 from tdac_agent.ros2.answers import time_answers
 from tdac_agent.ros2.export import export_ros2
 from tdac_agent.ros2.package_text import TRIED

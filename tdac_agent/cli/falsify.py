@@ -16,7 +16,6 @@ from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.task_changes import changed_task
 from tdac_agent.cli.task_choice import check_scope, check_tier, chosen_task
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import words_of
 from tdac_agent.environments.epuck.pictures import WorldPictures
 from tdac_agent.environments.map2d.pictures import MapPictures
 from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted, prepared
@@ -24,6 +23,7 @@ from tdac_agent.evaluation.replay import drive_episode
 from tdac_agent.falsify.curves import draw_curves
 from tdac_agent.falsify.drives import named_disturbance
 from tdac_agent.falsify.falsify import SearchPlan, falsify, space_on
+from tdac_agent.option_fields import words_of
 from tdac_agent.problems.part import Part
 from tdac_agent.runs.falsification import PICTURE, Counterexample, Falsification
 from tdac_agent.runs.falsify_text import failure_text

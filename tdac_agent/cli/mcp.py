@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from tdac_agent.cli.mcp_flags import McpOptions
 from tdac_agent.cli.task_choice import chosen_problem
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import typed_fields
 from tdac_agent.library.listing import next_folder
+from tdac_agent.option_fields import typed_fields
 from tdac_agent.runs.run_record import Agent
 from tdac_envs.core.errors import TaskError
 from tdac_envs.core.extras import install_command

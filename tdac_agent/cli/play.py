@@ -23,12 +23,13 @@ from tdac_agent.cli.printed import show_printed
 from tdac_agent.cli.shared_options import NoiseFlags
 from tdac_agent.cli.task_choice import check_scope, check_tier
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import require_flag, typed_fields
+from tdac_agent.cli.typed_options import require_flag
 from tdac_agent.environments.epuck.pictures import WorldPictures
 from tdac_agent.environments.map2d.pictures import MapPictures
 from tdac_agent.episodes.trajectory import Rollout
 from tdac_agent.evaluation.policies import Entrant, entrant_of, fitted
 from tdac_agent.evaluation.replay import check_shown, drive_episode
+from tdac_agent.option_fields import typed_fields
 from tdac_agent.problems.episodes import episodes_of
 from tdac_agent.problems.part import Part
 from tdac_agent.ros2.bag import check_bag, write_bag

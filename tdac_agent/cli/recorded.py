@@ -13,8 +13,8 @@ from tdac_agent.cli.controller_choice import controller_and_task
 from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.shared_options import NoiseFlags
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import flag_name, typed_fields
 from tdac_agent.cli.verify_options import VerifyOptions
+from tdac_agent.option_fields import flag_name, typed_fields
 from tdac_agent.ros2.recorded import RecordedReport, compare
 from tdac_agent.verification.verify import read_source
 from tdac_envs.core.errors import TaskError

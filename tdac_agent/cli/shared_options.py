@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from tdac_agent.cli.typed_options import typed_fields
-from tdac_agent.option_fields import option
+from tdac_agent.option_fields import option, typed_fields
 from tdac_agent.synthesis.options import ENGINES, SUITE
 
 if TYPE_CHECKING:

@@ -21,11 +21,11 @@ from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.synth_flags import RunFlags
 from tdac_agent.cli.task_choice import check_tier, chosen_problem
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import flag_name
 from tdac_agent.errors import Fault, RunError
 from tdac_agent.library.listing import next_folder
 from tdac_agent.models.provider import Provider
 from tdac_agent.models.ready import check_ready
+from tdac_agent.option_fields import flag_name
 from tdac_agent.problems.problem import Problem
 from tdac_agent.runs.ownership import is_own_folder
 from tdac_agent.runs.resume import (

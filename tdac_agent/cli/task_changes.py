@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import flag_name, typed_fields
+from tdac_agent.option_fields import flag_name, typed_fields
 from tdac_agent.runs.ownership import load_task
 from tdac_agent.tasks.environment import Environment
 from tdac_agent.tasks.registry import own_environments

@@ -16,8 +16,7 @@ from tdac_agent.cli.task_changes import (
     shown,
 )
 from tdac_agent.cli.task_flags import TaskFlags
-from tdac_agent.cli.typed_options import flag_name, typed_fields
-from tdac_agent.option_fields import flag_of
+from tdac_agent.option_fields import flag_name, flag_of, typed_fields
 from tdac_agent.runs.ownership import load_set_problem, load_task
 from tdac_agent.sandbox import TIERS
 from tdac_agent.tasks.registry import environment_with_key

@@ -18,8 +18,8 @@ from tdac_agent.cli.sentences import print_plain
 from tdac_agent.cli.task_choice import check_scope, kind_of_file
 from tdac_agent.cli.task_flags import TaskFlags
 from tdac_agent.cli.train_flags import TrainOptions
-from tdac_agent.cli.typed_options import flag_name, typed_fields
 from tdac_agent.episodes.sb3_file import POLICY
+from tdac_agent.option_fields import flag_name, typed_fields
 from tdac_agent.tasks.disturbance import Disturbance
 from tdac_agent.training.curve import Point
 from tdac_agent.training.first_weights import begun_from

@@ -1,4 +1,4 @@
-"""Makes a flag of each field of an options dataclass, and words of its values again.
+"""Makes a flag of each field of an options dataclass.
 
     @app.command()
     @typed_options("bench:run")
@@ -14,15 +14,21 @@ import dataclasses
 import functools
 import inspect
 import math
-import sys
 from collections.abc import Callable, Collection, Iterable, Sequence
 from importlib import import_module
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
 
 from tdac_agent.cli.mistakes import begun
-from tdac_agent.option_fields import Flag, flag_of
+from tdac_agent.option_fields import (
+    Flag,
+    flag_name,
+    flag_of,
+    flags_of,
+    item_of,
+    typed_fields,
+)
 
 Command = Callable[..., Any]
 
@@ -91,28 +97,8 @@ class _WithFlags:
         return work
 
 
-def _fields(kind: Any) -> dict[str, tuple[dataclasses.Field[Any], Flag, Any]]:
-    """The fields of a dataclass that have flags, with these and their types."""
-    flags = {}
-    for field in dataclasses.fields(kind):
-        flag = flag_of(field)
-        if flag is not None:
-            flags[field.name] = field, flag, flag.type or _type_of(kind, field.name)
-    return flags
-
-
-def _type_of(kind: Any, name: str) -> Any:
-    """The type of a field; types of others need not be imported."""
-    for owner in kind.__mro__:
-        hint = vars(owner).get("__annotations__", {}).get(name)
-        if hint is not None:
-            module = vars(sys.modules[owner.__module__])
-            return eval(hint, module) if isinstance(hint, str) else hint
-    raise TypeError(f"{kind.__name__} has no field {name}")
-
-
 def _flags(kind: Any, without: Collection[str]) -> Iterable[inspect.Parameter]:
-    for name, (field, flag, hint) in _fields(kind).items():
+    for name, (field, flag, hint) in flags_of(kind).items():
         if name in without:
             continue
         look: dict[str, Any] = {
@@ -147,17 +133,9 @@ def _metavar(hint: Any) -> str | None:
     return "N" if {int, float} & {hint, *get_args(hint)} else None
 
 
-def _item(hint: Any) -> Any:
-    """The type of an item if a value is a tuple of any length, else None."""
-    for each in (hint, *get_args(hint)):
-        if get_origin(each) is tuple and get_args(each)[-1] is ...:
-            return get_args(each)[0]
-    return None
-
-
 def _on_command_line(hint: Any, default: Any) -> Any:
     """The type that Typer reads: lists for tuples of any length."""
-    item: Any = _item(hint)
+    item: Any = item_of(hint)
     read = hint if item is None else list[item]
     return read | None if default is None else read
 
@@ -165,7 +143,7 @@ def _on_command_line(hint: Any, default: Any) -> Any:
 def _object(kind: Any, typed: dict[str, Any]) -> Any:
     """The options; takes their values out of those of the command line."""
     values = {}
-    for name, (field, *_) in _fields(kind).items():
+    for name, (field, *_) in flags_of(kind).items():
         if name not in typed:
             continue
         value = typed.pop(name)
@@ -189,46 +167,6 @@ def _check_finite(flag: str, value: Any) -> None:
         from tdac_envs.core.errors import TaskError
 
         raise TaskError(f"{flag} must be finite, got {' '.join(map(str, numbers))}")
-
-
-def flag_name(field: dataclasses.Field[Any]) -> str:
-    """The flag of a field, as in `--robot-radius`; the first if it has several."""
-    flag = flag_of(field)
-    if flag is not None and flag.argument:
-        return flag.metavar or field.name.upper()
-    names = flag.names if flag else ()
-    first = names[0].partition("/")[0] if names else ""
-    return first or f"--{field.name.replace('_', '-')}"
-
-
-def typed_fields(options: Any) -> list[dataclasses.Field[Any]]:
-    """The fields with flags whose values are not the defaults."""
-    fields = [each for each in dataclasses.fields(options) if flag_of(each)]
-    return [each for each in fields if getattr(options, each.name) != each.default]
-
-
-def words_of(options: Any) -> list[str]:
-    """The command line words that repeat the values, without defaults."""
-    words: list[str] = []
-    for field, flag, hint in _fields(type(options)).values():
-        value = getattr(options, field.name)
-        if value == field.default or flag.argument:
-            continue
-        if isinstance(value, bool):
-            words.append(flag_name(field) if value else flag.names[0].split("/")[1])
-        elif _item(hint) is not None:
-            words += [
-                word for each in value for word in (flag_name(field), _word(each))
-            ]
-        else:
-            values = value if isinstance(value, tuple) else (value,)
-            words += [flag_name(field), *map(_word, values)]
-    return words
-
-
-def _word(value: object) -> str:
-    """A value as typed on a command line; a number keeps all its digits."""
-    return repr(value).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
 def check_needs(options: Iterable[Any]) -> None:

@@ -16,12 +16,8 @@ from tdac_agent.cli.controller_choice import (
 )
 from tdac_agent.cli.spinner import Spinner
 from tdac_agent.cli.task_choice import check_scope, check_set_profile, check_tier
-from tdac_agent.cli.typed_options import (
-    flag_name,
-    require_flag,
-    typed_fields,
-    words_of,
-)
+from tdac_agent.cli.typed_options import require_flag
+from tdac_agent.option_fields import flag_name, typed_fields, words_of
 from tdac_agent.tasks.trust import allowed
 from tdac_agent.verification.judge.child_pool import ChildPool
 from tdac_agent.verification.judge.sequential import SequentialTest

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import shlex
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from tdac_agent.errors import RunError
@@ -18,6 +19,7 @@ from tdac_agent.html_report.set_part import set_part_of
 from tdac_agent.html_report.still import MOST_STILLS, still_of
 from tdac_agent.html_report.story import story_of
 from tdac_agent.models.budget import format_usd
+from tdac_agent.option_fields import words_of
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import RunHistory, learner_named
 from tdac_agent.runs.improvement_record import read_improvement
@@ -27,8 +29,10 @@ from tdac_agent.runs.run_record import (
     GIVEN_FILE,
     GIVEN_RULES_FILE,
     PROMPT_FILE,
+    Run,
 )
 from tdac_agent.runs.selection_record import asked_text
+from tdac_agent.synthesis.options import PAPER, SynthOptions
 from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
@@ -217,40 +221,41 @@ def _commands(history: RunHistory, name: str) -> Iterator[tuple[str, str]]:
     if run.learner == AGENT:
         yield from _agent_commands(history, name, problem)
         return
-    flags: dict[str, object] = {
-        "--episodes": run.episodes,
-        "--feedback-episodes": run.feedback_episodes,
-        "--improve": run.improve or None,
-        "--rules": f"{name}/{GIVEN_RULES_FILE}" if run.given_rules else None,
-        "--candidates": run.candidates if run.candidates > 1 else None,
-    }
-    limits = _flags(flags)
-    kept = (run.folder / PROMPT_FILE).is_file()
-    prompt = f"{name}/{PROMPT_FILE}" if kept else run.prompt
-    own: dict[str, object] = {
-        "--learner": run.learner,
-        "--optimizer": run.optimizer if run.optimizer != run.learner else None,
-        "--base-url": run.base_url,
-        "--prompt": prompt if run.prompt != "full" else None,
-        "--from": f"{name}/{GIVEN_FILE}" if run.given_sha256 is not None else None,
-        "-K": run.iterations,
-        "-J": run.patience,
-        "--seed": run.seed,
-    }
-    words = ["tdac", "synth", *problem, *limits, *_flags(own)]
+    options, begin = _options(run, name), ["tdac", "synth", *problem, "--learner"]
+    again = replace(options, optimizer=None, base_url=None)
+    words = [*begin, run.learner, *words_of(options)]
     yield shlex.join(words), "repeat the run with new answers"
-    replay = ["tdac", "synth", *problem, *limits, "--learner", f"replay:{name}"]
-    yield shlex.join(replay), "repeat the run with the recorded answers"
+    words = [*begin, f"replay:{name}", *words_of(again)]
+    yield shlex.join(words), "repeat the run with the recorded answers"
     if not run.finished and history.status != "running":
         more = () if run.enough is None else run.enough.words
         yield shlex.join(["tdac", "synth", "--resume", name, *more]), "resume the run"
     yield from _uses(history, name, problem)
 
 
-def _flags(values: dict[str, object]) -> list[str]:
-    """Flags with their values, but for those without one."""
-    pairs = [(flag, str(value)) for flag, value in values.items() if value is not None]
-    return [word for pair in pairs for word in pair]
+def _options(run: Run, name: str) -> SynthOptions:
+    """The options with which a run began, but for its Learner.
+
+    Its files are in a folder of this name.
+    """
+    scope, usual = "set" if run.on_set else "task", SynthOptions()
+    kept = {
+        key: run.options.get(key, old) for key, old in usual.recorded(scope).items()
+    }
+    kept |= {key: getattr(run, key) for key in kept.keys() & Run.model_fields.keys()}
+    # Earlier versions did not record these.
+    earlier = {"search": PAPER, "ask": usual.ask, "max_output": usual.max_output}
+    kept |= {key: value for key, value in earlier.items() if not kept[key]}
+    written = (run.folder / PROMPT_FILE).is_file()
+    return replace(
+        usual,
+        **kept,
+        optimizer=None if run.optimizer == run.learner else run.optimizer,
+        prompt=f"{name}/{PROMPT_FILE}" if written else run.prompt,
+        rules=Path(name, GIVEN_RULES_FILE) if run.given_rules else None,
+        start_from=Path(name, GIVEN_FILE) if run.given_sha256 is not None else None,
+        seed=run.seed,
+    ).as_typed(scope)
 
 
 def _agent_commands(

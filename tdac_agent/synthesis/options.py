@@ -295,6 +295,17 @@ class SynthOptions:
             if getattr(self, field.name) is not field.default
         }
 
+    def as_typed(self, scope: str) -> SynthOptions:
+        """The same without the values that its search has anyway, for a command line.
+
+        Args:
+            scope: `task` or `set`, which decides on the usual search.
+        """
+        usual = RACE if scope == "set" else PAPER
+        own = USUAL[self.search or usual] | {"search": usual}
+        same = [name for name in own if getattr(self, name) == own[name]]
+        return self.changed(**dict.fromkeys(same))
+
     def restored(self, values: Mapping[str, Any]) -> SynthOptions:
         """The same with recorded values, or with those of a file.
 

@@ -11,8 +11,8 @@ import typer
 
 from tdac_agent.cli import synth_flags
 from tdac_agent.cli.main import PARTS, command_line
-from tdac_agent.cli.typed_options import typed_options, words_of
-from tdac_agent.option_fields import option
+from tdac_agent.cli.typed_options import typed_options
+from tdac_agent.option_fields import option, words_of
 from tdac_agent.synthesis.options import SynthOptions
 from tdac_envs.core.errors import TaskError
 

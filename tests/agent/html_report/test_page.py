@@ -155,6 +155,17 @@ def test_where_it_is_from(outline, runs):
         assert fact in shown
 
 
+def test_a_run_is_repeated_with_its_own_options(copied):
+    """Whatever they are; usual values are left out."""
+    own = {"iterations": 3, "refine": False, "max_output": 9}
+    names = {"learner": "openai:m", "optimizer": "openai:m"}
+    change_run(copied, **own, **names, base_url="http://a")
+    shown = " ".join("".join(Outline(make_page(copied).html.decode()).shown).split())
+    begun = "tdac synth --task run --learner {} -K 3 --no-refine --no-confirm {}"
+    assert begun.format("openai:m", "--base-url http://a --max-output 9") in shown
+    assert begun.format("replay:run", "--max-output 9") in shown
+
+
 def test_the_same_page_again(runs, page):
     """Nothing in it depends on when and where it was made."""
     assert make_page(runs).html.decode() == page
