@@ -88,7 +88,7 @@ PREPARED = {
     r"maze-1\b(?<!ppo-maze-1)": "tdac synth",
     r"runs( |$)|office": "tdac synth --task office",
     "epuck-1": "tdac synth --task epuck",
-    "depot-1": "tdac synth --map depot.yaml --start 0 2 --goal 6 3 "
+    "depot": "tdac synth --map depot.yaml --start 0 2 --goal 6 3 "
     "--robot turtlebot3-burger",
     r"drive\.mcap": "tdac play runs/depot-1 --mcap drive.mcap",
     r"sim\.mcap": "tdac play runs/depot-1 --mcap sim.mcap",
