@@ -23,7 +23,7 @@ from tdac_agent.option_fields import words_of
 from tdac_agent.plots import plot_breakdown
 from tdac_agent.runs.history import RunHistory, learner_named
 from tdac_agent.runs.improvement_record import read_improvement
-from tdac_agent.runs.resume import resume_line
+from tdac_agent.runs.resume import recorded_settings, resume_line
 from tdac_agent.runs.run_record import (
     AGENT,
     GIVEN_FILE,
@@ -32,7 +32,7 @@ from tdac_agent.runs.run_record import (
     Run,
 )
 from tdac_agent.runs.selection_record import asked_text
-from tdac_agent.synthesis.options import PAPER, SynthOptions
+from tdac_agent.synthesis.options import SynthOptions
 from tdac_agent.tasks.setting import tolerance_text
 from tdac_agent.tasks.task_file import SET_FILE
 from tdac_agent.tasks.units import UNITS
@@ -239,22 +239,17 @@ def _options(run: Run, name: str) -> SynthOptions:
     Its files are in a folder of this name.
     """
     scope, usual = "set" if run.on_set else "task", SynthOptions()
-    kept = {
-        key: run.options.get(key, old) for key, old in usual.recorded(scope).items()
-    }
-    kept |= {key: getattr(run, key) for key in kept.keys() & Run.model_fields.keys()}
-    # Earlier versions did not record these.
-    earlier = {"search": PAPER, "ask": usual.ask, "max_output": usual.max_output}
-    kept |= {key: value for key, value in earlier.items() if not kept[key]}
+    recorded = run.options | recorded_settings(run)
+    names = {*usual.recorded(scope), "optimizer", "seed"}
+    kept = {key: value for key, value in recorded.items() if key in names}
+    kept["max_output"] = run.max_output or usual.max_output  # 0 in early records
     written = (run.folder / PROMPT_FILE).is_file()
     return replace(
         usual,
         **kept,
-        optimizer=None if run.optimizer == run.learner else run.optimizer,
         prompt=f"{name}/{PROMPT_FILE}" if written else run.prompt,
         rules=Path(name, GIVEN_RULES_FILE) if run.given_rules else None,
         start_from=Path(name, GIVEN_FILE) if run.given_sha256 is not None else None,
-        seed=run.seed,
     ).as_typed(scope)
 
 

@@ -214,6 +214,18 @@ def settings_of(run: Run) -> dict[str, Any]:
         raise RunError(f"the given rules of {folder}: {error}") from error
     initial, prompt = folder / GIVEN_FILE, folder / PROMPT_FILE
     return {
+        **recorded_settings(run),
+        "index": run.index,
+        "start_from": _text(folder) if initial.is_file() else None,
+        "rules": book,
+        "prompt": run.prompt if is_shipped(run.prompt) else str(prompt),
+        "out": folder,
+    }
+
+
+def recorded_settings(run: Run) -> dict[str, Any]:
+    """Those settings of a run that its record has as they were given."""
+    return {
         "learner": run.learner,
         "optimizer": None if run.optimizer == run.learner else run.optimizer,
         "iterations": run.iterations,
@@ -226,15 +238,10 @@ def settings_of(run: Run) -> dict[str, Any]:
         "envelope": run.envelope,
         **_of_episodes(run),
         "seed": run.seed,
-        "index": run.index,
-        "start_from": _text(folder) if initial.is_file() else None,
         "base_url": run.base_url,
         "refine": run.refine,
-        "rules": book,
-        "prompt": run.prompt if is_shipped(run.prompt) else str(prompt),
         **({"omit": run.omit} if run.omit else {}),
         "max_output": run.max_output,
-        "out": folder,
     }
 
 

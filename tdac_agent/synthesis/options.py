@@ -302,7 +302,7 @@ class SynthOptions:
             scope: `task` or `set`, which decides on the usual search.
         """
         usual = RACE if scope == "set" else PAPER
-        own = USUAL[self.search or usual] | {"search": usual}
+        own = USUAL.get(self.search or usual, {}) | {"search": usual}
         same = [name for name in own if getattr(self, name) == own[name]]
         return self.changed(**dict.fromkeys(same))
 

@@ -164,6 +164,8 @@ def test_a_run_is_repeated_with_its_own_options(copied):
     begun = "tdac synth --task run --learner {} -K 3 --no-refine --no-confirm {}"
     assert begun.format("openai:m", "--base-url http://a --max-output 9") in shown
     assert begun.format("replay:run", "--max-output 9") in shown
+    change_run(copied, search="of another version")
+    assert "--search &#39;of another version&#39;" in make_page(copied).html.decode()
 
 
 def test_the_same_page_again(runs, page):

@@ -16,7 +16,7 @@ from tdac_envs import load_set
 from tdac_envs.core.errors import TaskError
 from tdac_envs.ladder.set_file import set_names
 
-# Worlds of BARN take seconds to read; the second set has the same ones.
+# Worlds of BARN take seconds to read.
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("barn", "barn-slow")]
 SETS = (*set_names(), *SLOW)
 UNIT = (

@@ -20,7 +20,7 @@ from tdac_agent.errors import RunError
 from tdac_agent.models.provider import MAX_OUTPUT_TOKENS
 from tdac_agent.option_fields import flag_of, option
 from tdac_agent.runs.ownership import is_own_folder, load_task
-from tdac_agent.runs.run_record import load_run
+from tdac_agent.runs.run_record import Run, load_run
 from tdac_agent.synthesis import synthesize as synthesis
 from tdac_agent.synthesis.options import SynthOptions
 
@@ -33,11 +33,19 @@ def test_each_option_is_a_flag_with_a_help_text():
         assert flag.help.endswith((".", "]")), field.name
 
 
-def test_defaults_are_those_of_the_providers():
-    """And each problem has its own options on record."""
+FIELDS = {
+    *("search", "iterations", "patience", "candidates", "improve", "ask", "envelope"),
+    *("omit", "refine", "base_url", "max_output", "episodes", "feedback_episodes"),
+}
+"""Options with a field of their own in the record; others are in its `options`."""
+
+
+def test_defaults_are_those_of_the_providers_and_the_record():
+    """The record keeps options under their own names."""
     assert SynthOptions().max_output == MAX_OUTPUT_TOKENS
     kept = SynthOptions().recorded("set").keys()
-    assert {"iterations", "refine", "base_url", "improve", "episodes"} <= kept
+    assert kept >= FIELDS
+    assert Run.model_fields.keys() >= {*FIELDS, "confirm"}
     assert SynthOptions().recorded("task").keys() - kept == {"confirm"}
 
 
