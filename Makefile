@@ -1,5 +1,5 @@
 # What each target checks; times are for two cores, without the installation:
-#   make test         Every feature on this machine as it is; at most 5 minutes.
+#   make test         Every feature on this machine as it is; about six minutes.
 #                     No test needs a quiet machine.
 #   make slow         Tests that take long or need a quiet machine: each controller of the
 #                     zoo on every sandbox tier, each bundled map, many seeds, killed runs.
