@@ -44,6 +44,7 @@ from benchmarks.recorded_answers import driven_on, episodes_in
 from tdac_agent import synthesize
 from tdac_agent.evaluation.policies import entrant_of, fitted
 from tdac_agent.falsify.falsify import SearchPlan, falsify
+from tdac_agent.runs.falsification import read_falsification
 from tdac_agent.storage.files import write_atomic
 from tdac_agent.synthesis.counterexample import FOLDER
 from tdac_agent.verification.judge.warm import WarmJudge
@@ -155,7 +156,13 @@ def _outcomes(
     driven = episodes_in(kept)
     tasks = load_set(cell.level)
     entrant = fitted(entrant_of(str(file)), tasks)
-    found = falsify(entrant, tasks, FAR, out=out / "far" / cell.name, judge=warm)
+    searched = out / "far" / cell.name
+    found = read_falsification(searched)
+    if found is None or (found.policy_sha256, found.budget) != (
+        entrant.sha256,
+        FAR.episodes,
+    ):
+        found = falsify(entrant, tasks, FAR, out=searched, judge=warm)
     failed = found.counterexample
     return {
         OUTCOME: float(driven["time_score"].mean()),
