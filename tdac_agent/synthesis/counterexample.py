@@ -20,7 +20,8 @@ from tdac_envs.ladder.task_sets import TaskSet
 
 WORLDS = 2
 """Most worlds of a set that share the episodes of a search."""
-LEAST_EACH = 16
+FOR_TWO = 64
+"""Episodes of each of two worlds: enough for each part alone, and for some together."""
 MOST_CHARS = 1200
 FOLDER = "envelope"
 
@@ -56,7 +57,7 @@ def counterexample_text(
     episodes = terms.options.envelope
     chosen: tuple[int, ...] = ()
     if episodes and isinstance(problem, TaskSet):
-        most = min(WORLDS, episodes // LEAST_EACH)
+        most = min(WORLDS, max(1, episodes // FOR_TWO))
         chosen = tuple(row.number for row in candidate.pool if row.success)[:most]
     if not episodes or (isinstance(problem, TaskSet) and not chosen):
         return ""
@@ -100,7 +101,7 @@ def _told(found: Falsification, first: int) -> str:
     lines = [f"- {survived_text(found)}"]
     failed = found.counterexample
     if failed is None:
-        lines.append("- no combination of deviations was found with which it fails")
+        lines.append(f"- no failure was found in {found.episodes} episodes")
     else:
         where = "" if found.split is None else f" in world {failed.number - first + 1}"
         lines.append(f"- smallest failure found{where}: {failure_text(failed, found)}")

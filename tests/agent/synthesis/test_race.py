@@ -124,7 +124,7 @@ def test_the_smallest_failure_of_the_best_one_is_told(race, out):
     for prompt, name in zip(others, best, strict=True):
         told = prompt.partition(f"### How far candidate {name} carries\n")[2]
         assert "there may be smaller failures.\n- " in told
-        assert ("smallest failure found in world" in told) or ("no comb" in told)
+        assert ("smallest failure found in world" in told) or ("no failure" in told)
     pool = {
         row["index"]
         for path in out.glob("iterations/k01/j0/improve-*/episodes.json")
@@ -135,6 +135,7 @@ def test_the_smallest_failure_of_the_best_one_is_told(race, out):
     for folder in folders:
         found = read_falsification(folder)
         assert found.episodes <= found.budget == 16
+        assert len(found.envelopes) == 1  # too few episodes for two worlds
         assert {each.number for each in found.envelopes} <= pool
 
 
