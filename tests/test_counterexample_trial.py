@@ -1,7 +1,9 @@
 """The plan and the analysis of the trial of counterexamples as feedback."""
 
 import itertools
+import json
 import math
+import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ from benchmarks.counterexample_trial import (
 )
 
 PLAN = Path("results/counterexample/plan.csv")
+KEPT = PLAN.parent
 
 
 def made_up():
@@ -66,3 +69,38 @@ def test_the_analysis_agrees_with_permutations():
     least, most = sorted([found[SHARE]["p"], found[NORM]["p"]])
     adjusted = sorted([found[SHARE]["holm"], found[NORM]["holm"]])
     assert adjusted == pytest.approx([min(1, 2 * least), max(2 * least, most)])
+
+
+def test_the_kept_drives_give_the_published_figures():
+    """Scores, p-value and interval, from the rows of all hidden episodes."""
+    scores = pd.read_csv(KEPT / "scores.csv").set_index(["group", "arm"])
+    driven: dict[tuple[str, str], list[tuple[float, bool]]] = {}
+    with tarfile.open(KEPT / "answers.tar.xz") as archive:
+        for cell in planned():
+            raw = archive.extractfile(f"./hidden/{cell.name}.jsonl").read()
+            rows = [json.loads(line) for line in raw.splitlines()]
+            assert len(rows) == 100
+            driven[cell.group, cell.arm] = [
+                (row["time_score"], row["outcome"] == "reached") for row in rows
+            ]
+    for key, episodes in driven.items():
+        score, share = np.mean(episodes, axis=0)
+        assert scores.loc[key, OUTCOME] == pytest.approx(score)
+        assert scores.loc[key, SHARE] == pytest.approx(share)
+    groups = sorted({group for group, _ in driven})
+    change = np.array(
+        [
+            np.mean(driven[group, "with"], axis=0)[0]
+            - np.mean(driven[group, "without"], axis=0)[0]
+            for group in groups
+        ]
+    )
+    signs = np.array(list(itertools.product((1, -1), repeat=len(change))))
+    p = np.mean(np.abs(signs @ change) >= abs(change.sum()) - 1e-12)
+    half = stats.t.ppf(0.975, len(change) - 1) * stats.sem(change)
+    page = (KEPT / "README.md").read_text(encoding="utf-8").replace("−", "-")
+    mean = change.mean()
+    assert f"{mean:+.3f} ({mean - half:.3f} to {mean + half:.3f})" in page
+    assert f"p = {p:.2f}" in page
+    found = tables(scores.reset_index())[OUTCOME]
+    assert (found["mean"], found["p"]) == pytest.approx((mean, p))
