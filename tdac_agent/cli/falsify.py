@@ -69,14 +69,12 @@ def run(flags: TaskFlags, options: FalsifyOptions) -> int:
         with WarmJudge(child_pool) as judge:
             where = options.tier, options.out, judge
             found = search(entrant, problem, plan, console, *where)
-    written = [] if options.out is None else ["falsify.json"]
-    if options.out is not None:
-        written += write_pictures(found, entrant, problem, options.out, options.tier)
     if options.as_json:
         print_json(found)
     else:
         show_falsification(found, console, _replay(found, entrant, flags, options))
         if options.out is not None:
+            written = ["falsify.json", *pictures_in(found)]
             print_plain(console, f"wrote {', '.join(written)} to {options.out}")
     return 1 if found.fails_plainly else 0
 
@@ -91,7 +89,7 @@ def search(
     judge: WarmJudge | None = None,
     go_on: str = "",
 ) -> Falsification:
-    """Searches with a progress bar; arguments as for `falsify`.
+    """Searches with a progress bar, and draws; arguments as for `falsify`.
 
     Args:
         entrant: The policy.
@@ -99,7 +97,7 @@ def search(
         plan: What is searched.
         console: Console to print to.
         tier: Sandbox tier.
-        out: Folder of the record.
+        out: Folder of the record and the pictures.
         judge: A warm judge.
         go_on: The command that goes on after an interruption; by default the same one.
     """
@@ -119,6 +117,7 @@ def search(
             out=out,
             judge=judge,
             watch=bar.show_count,
+            finish=lambda found: write_pictures(found, entrant, problem, out, tier),
         )
 
 
@@ -147,8 +146,6 @@ def show_envelope(
     words = ["tdac", "falsify", controller, "-n", str(episodes), "--out", str(out)]
     go_on = shlex.join(words) if own else ""
     found = search(entrant, problem, plan, console, tier, out, go_on=go_on)
-    if out is not None:
-        write_pictures(found, entrant, problem, out, tier)
     if not console.stderr:
         console.print()
         options = FalsifyOptions(controller, tier=tier)
@@ -192,19 +189,21 @@ def write_pictures(
     found: Falsification,
     entrant: Entrant,
     problem: Task | TaskSet,
-    out: Path,
+    out: Path | None,
     tier: str,
-) -> list[str]:
-    """Draws the counterexample beside the undisturbed drive; returns the files."""
-    written = []
+) -> None:
+    """Draws the counterexample beside the undisturbed drive, and the curves."""
     failed = found.counterexample
-    if failed is not None:
+    if out is not None and failed is not None:
         write_png(_picture(found, failed, entrant, problem, tier), out / PICTURE)
-        written.append(PICTURE)
-    if found.curves:
+    if out is not None and found.curves:
         draw_curves(found, out / CURVES)
-        written.append(CURVES)
-    return written
+
+
+def pictures_in(found: Falsification) -> list[str]:
+    """Names of the pictures of a search."""
+    drawn = (PICTURE, found.counterexample is not None), (CURVES, bool(found.curves))
+    return [name for name, exists in drawn if exists]
 
 
 def _picture(

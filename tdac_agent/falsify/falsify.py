@@ -87,6 +87,7 @@ def falsify(
     out: Path | None = None,
     judge: WarmJudge | None = None,
     watch: Watch | None = None,
+    finish: Callable[[Falsification], None] | None = None,
 ) -> Falsification:
     """Searches for the smallest deviation with which a policy fails.
 
@@ -102,6 +103,8 @@ def falsify(
         out: Folder for `falsify.json`.
         judge: A warm judge; None starts one for this call.
         watch: Called with the number of episodes so far.
+        finish: Called with the record, while what was driven is still kept in `out`:
+            an interruption loses nothing.
 
     Raises:
         TaskError: The policy does not drive there, or the plan is not valid there.
@@ -121,7 +124,14 @@ def falsify(
     if judge is None:
         with WarmJudge() as own_judge:
             return falsify(
-                entrant, problem, plan, tier=tier, out=out, judge=own_judge, watch=watch
+                entrant,
+                problem,
+                plan,
+                tier=tier,
+                out=out,
+                judge=own_judge,
+                watch=watch,
+                finish=finish,
             )
     split = "" if isinstance(problem, Task) else plan.split
     with Drives(
@@ -138,6 +148,8 @@ def falsify(
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             write_atomic(out / RECORD_FILE, found.model_dump_json(indent=2) + "\n")
+        if finish is not None:
+            finish(found)
     return found
 
 

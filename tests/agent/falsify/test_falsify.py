@@ -110,6 +110,20 @@ def test_the_same_seed_gives_the_same_bytes_and_goes_on(search, tmp_path):
     assert counts[-1] == found.episodes
 
 
+def test_an_interruption_while_drawing_loses_nothing(search, tmp_path):
+    def stop(found):
+        assert found.episodes <= 16
+        raise KeyboardInterrupt
+
+    kept = []
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            search(CAREFUL, replace(PLAN, episodes=16), out=tmp_path, finish=stop)
+        assert (tmp_path / "falsify.json").is_file()
+        kept.append((tmp_path / "unfinished" / "episodes.jsonl").read_bytes())
+    assert kept[0] == kept[1] != b""
+
+
 def test_a_worker_that_dies_between_two_batches_is_replaced(search, warm):
     """What it drove stays; the batches after it have another worker."""
     workers = []
