@@ -1,5 +1,5 @@
 # What each target checks; times are for two cores, without the installation:
-#   make test         Every feature on this machine as it is; about six minutes.
+#   make test         Every feature on this machine as it is; about four and a half minutes.
 #                     No test needs a quiet machine.
 #   make slow         Tests that take long or need a quiet machine: each controller of the
 #                     zoo on every sandbox tier, each bundled map, many seeds, killed runs.
@@ -29,9 +29,10 @@ BIN := $(VENV)/bin
 # Seed of the tests that slow-sample draws.
 SAMPLE ?= 1
 # Tests of one file share fixtures, so one process runs them all. The given order puts
-# files with short tests last, so that both processes end at about the same time.
+# files with short tests last, so that all processes end at about the same time. Three
+# processes on two cores, since tests wait for others a third of the time.
 # After a crash, a new process would wait for ever for the files of the old one.
-PARALLEL := -q -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
+PARALLEL := -q -n 3 --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 
 # Tests start hundreds of interpreters; without its cache, each compiles all that it imports.
 unexport PYTHONDONTWRITEBYTECODE
