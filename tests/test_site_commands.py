@@ -101,14 +101,15 @@ PREPARED = {
     "rules-1|--rules": "tdac synth --prompt underspecified --learner replay:rules "
     "--no-confirm --out runs/rules-1",
     "--rules": "tdac rules export runs/rules-1 --out rules.md",
-    "runs/ppo/|--from POLICY": "tdac train --set unknown --steps 4096 --out runs/ppo",
+    r"runs/ppo/|--from POLICY|falsify .*\.zip": "tdac train --set unknown --steps 4096 "
+    "--out runs/ppo",
     r"\.zip|ppo-maze-1": "tdac train --task maze --steps 4096",
 }
 """Commands that must have run before others, by what these name."""
 LEARNED = "runs/ppo-maze-1/policy.zip"
 """This policy stands for all those that the pages name, but for one."""
 FURTHER = "runs/ppo/policy.zip"
-"""The one with which a training on a set begins."""
+"""The one of a task set: a training begins with it, or a search for its failures."""
 
 
 def runs_here(line):
@@ -180,10 +181,10 @@ def prepare(line, folder):
         if re.search(pattern, line):
             run_once(first, folder)
     for name in re.findall(r"[\w/-]+\.zip", line):
-        if not (folder / name).exists():
+        on_set = re.search("--from|falsify", line)
+        if on_set or not (folder / name).exists():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            source = FURTHER if "--from" in line else LEARNED
-            shutil.copy(folder / source, folder / name)
+            shutil.copy(folder / (FURTHER if on_set else LEARNED), folder / name)
 
 
 def test_what_is_left_out():
